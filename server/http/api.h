@@ -19,31 +19,31 @@ struct api_library {
 struct proxies; /* address.h */
 
 enum api_access {
-    API_ACCESS_AUTO,   /* tokens, once there is one; before, anybody who reaches the daemon */
+    API_ACCESS_AUTO,   /* open until the first token is made, then tokens only */
     API_ACCESS_TOKENS, /* tokens only */
-    API_ACCESS_OPEN    /* anybody, as an admin */
+    API_ACCESS_OPEN    /* anybody, as admin */
 };
 
 struct api_config {
     const char *data_dir;
     int max_attempts;
     size_t queue_limit;      /* queued jobs */
-    size_t user_queue_limit; /* of them, of one user; 0: no limit */
-    size_t user_max_jobs;    /* that one user keeps; 0: no limit */
-    uint64_t user_max_bytes; /* that one user keeps; 0: no limit */
+    size_t user_queue_limit; /* queued jobs of one user; 0: no limit */
+    size_t user_max_jobs;    /* jobs of one user, in any state; 0: no limit */
+    uint64_t user_max_bytes; /* what one user keeps; 0: no limit */
     uint64_t max_upload_bytes;
-    uint64_t min_free_bytes;      /* of the disk; uploads never eat into it */
-    uint64_t admin_free_bytes;    /* more of it, which is kept for admins */
-    unsigned user_pledge_percent; /* of the free space that one user's uploads may hold before they arrive; 0: all */
+    uint64_t min_free_bytes;      /* of the disk; uploads leave at least this much free */
+    uint64_t admin_free_bytes;    /* more of it, kept for admins */
+    unsigned user_pledge_percent; /* share of the free space that one user's unfinished uploads may reserve; 0: all */
     size_t max_streams;           /* event streams at once */
     size_t user_max_streams, user_max_uploads, user_max_checks; /* of one user; 0: no limit */
     double keepalive_sec;
     enum api_access access;
-    const struct proxies *proxies; /* whose word on addresses counts (address.h); NULL: nobody's */
+    const struct proxies *proxies; /* trusted to name client addresses (address.h); NULL: none */
     bool is_tls;                   /* connections are encrypted by this daemon */
     int64_t scene_keep_ms, job_keep_ms, upload_keep_ms,
         empty_upload_ms /* 0: as upload_keep_ms */; /* see store/retention.h */
-    const char *server_names;                       /* besides loopback; separated by spaces or commas */
+    const char *server_names;                       /* host names besides loopback's; separated by spaces or commas */
     const struct api_library *libraries;
     size_t library_count;
 };
@@ -66,9 +66,9 @@ struct api {
     struct digests *digests;
     struct resumables *resumables;
     struct readiness *readiness;
-    struct listener *listener;             /* NULL before it listens; for metrics */
-    struct request_counts *request_counts; /* of requests */
-    struct auth_throttle *auth_throttle;   /* on wrong tokens */
+    struct listener *listener; /* NULL before it listens; for metrics */
+    struct request_counts *request_counts;
+    struct auth_throttle *auth_throttle; /* on wrong tokens */
     atomic_ullong uploaded_bytes;
 };
 

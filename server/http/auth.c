@@ -22,7 +22,7 @@ bool auth_is_open(const struct api *api) {
 
 /* --- tokens ------------------------------------------------------------------------------ */
 
-/* The cookie's value, cut out of `cookies`; false where it is absent. */
+/* Cuts the cookie's value out of `cookies`; false where it is absent. */
 static bool read_cookie(const char *cookies, char token[TOKEN_SIZE]) {
     size_t name = strlen(AUTH_COOKIE);
     for (const char *at = cookies; *at; at += strspn(at, "; ")) {
@@ -36,7 +36,7 @@ static bool read_cookie(const char *cookies, char token[TOKEN_SIZE]) {
     return false;
 }
 
-/* What the caller presents; false where that is nothing, or another scheme's. */
+/* The token that the caller presents; false where there is none, or another scheme. */
 static bool read_token(const struct request *r, char token[TOKEN_SIZE]) {
     const char *authorization = request_field(r, "Authorization");
     if (authorization && strncasecmp(authorization, "Bearer ", 7) == 0) {
@@ -47,7 +47,7 @@ static bool read_token(const struct request *r, char token[TOKEN_SIZE]) {
     return cookies && read_cookie(cookies, token);
 }
 
-/* 401 with what a caller without a valid token is told. */
+/* 401, with a detail that says how to authenticate. */
 static struct response *refuse(const struct request *r, const char *detail) {
     struct response *reply = problem_full(
         r, 401, detail, "`unbaked token add NAME` on the server makes a token, `unbake login` keeps it", NULL);
@@ -76,7 +76,7 @@ struct response *auth_reject(struct api *api, struct request *r) {
     struct response *reply = problem_full(r, 429, "too many invalid tokens came from this address",
                                           "a valid token is accepted at any time", members);
     response_field(reply, "Retry-After", "%.0f", ceil(wait_sec));
-    reply->must_close = true; /* the next try is to cost a connection */
+    reply->must_close = true; /* another try must cost a new connection */
     r->is_throttled = true;
     return reply;
 }
@@ -92,7 +92,7 @@ struct response *auth_check(struct api *api, struct request *r) {
     if (has_token)
         status = store_token_find(api->store, token, &r->caller, &err);
     if (status == STATUS_NOT_FOUND && is_open)
-        r->caller = (struct caller){.role = ROLE_ADMIN}; /* of another daemon, or of another time */
+        r->caller = (struct caller){.role = ROLE_ADMIN}; /* a cookie of another daemon, or an old one */
     else if (status == STATUS_NOT_FOUND)
         return auth_reject(api, r);
     else if (status != STATUS_OK)

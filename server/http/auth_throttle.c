@@ -1,4 +1,5 @@
-/* auth_throttle.c -- see auth_throttle.h. A table of sets, as a processor's cache has it: an address can only be in one set. */
+/* auth_throttle.c -- see auth_throttle.h. A set-associative table, as in a processor's cache: each address belongs to
+ * one set. */
 #include "server/http/auth_throttle.h"
 
 #include <math.h>
@@ -12,15 +13,15 @@
 #define WAY_COUNT 4    /* 4,096 addresses: 160 KiB */
 
 struct throttle_slot {
-    uint8_t key[16]; /* all zero, "::": the unknown address, or not in use, which is the same */
-    double room;     /* failures, at since_sec */
+    uint8_t key[16]; /* all zero ("::"): unknown address, or unused entry; they are treated alike */
+    double room;     /* failures left, at since_sec */
     double since_sec;
     bool is_throttled;
 };
 
 struct auth_throttle {
     pthread_mutex_t mutex;
-    uint64_t seed; /* so that nobody can aim at another's set */
+    uint64_t seed; /* random, so that nobody can choose addresses of another's set */
     struct throttle_slot slots[SET_COUNT][WAY_COUNT];
 };
 

@@ -13,15 +13,15 @@
 #include "server/http/message.h"
 
 #define AUTH_THROTTLE_BURST 20.0
-#define AUTH_THROTTLE_PER_SEC 0.5 /* a page that is left open with an old token comes back every 3 s */
+#define AUTH_THROTTLE_PER_SEC 0.5 /* a page left open with an old token retries every 3 s */
 
 struct auth_throttle; /* opaque */
 
 struct auth_throttle *auth_throttle_new(void);
 void auth_throttle_free(struct auth_throttle *b);
 
-/* A failure from `from` at `now_sec` (CLOCK_MONOTONIC). 0: there was room; else in how many seconds there is. *is_first:
- * it is the first one without room since there last was some. */
+/* A failure from `from` at `now_sec` (CLOCK_MONOTONIC). Returns 0 while the bucket has room, else seconds until it
+ * has. *is_first: the bucket has just run empty. */
 double auth_throttle_fail(struct auth_throttle *b, const struct address *from, double now_sec, bool *is_first);
 
 #endif

@@ -1,4 +1,4 @@
-/* collect.c -- /v1/collect: removes what has expired now, or says what would go. */
+/* collect.c -- /v1/collect: removes what has expired, or (dry run) lists it. */
 #include "server/data/collector.h"
 #include "server/http/handlers.h"
 #include "server/http/retention.h"

@@ -1,4 +1,4 @@
-/* embedded.h -- files of the source tree that the build puts into the binary as they are. */
+/* embedded.h -- files of the source tree that the build embeds in the binary. */
 #ifndef UNBAKE_HTTP_EMBEDDED_H
 #define UNBAKE_HTTP_EMBEDDED_H
 

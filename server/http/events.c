@@ -1,4 +1,4 @@
-/* events.c -- the requests for events, and for a job as it will be. */
+/* events.c -- requests for events, and GET of a job that waits for a change. */
 #include <stdio.h>
 
 #include "common/protocol.h"
@@ -12,9 +12,9 @@
 
 #define WAIT_MAX_SEC 300
 
-/* Fills *what from the query and the fields, up to where it begins: Last-Event-ID, ?after= or the
- * newest event; *is_resumed when the client named a place. NULL, or the refusal.
- * An EventSource reconnects with the URL that it was made with and adds Last-Event-ID, so that one is newer. */
+/* Fills *what from the query and the header fields. The stream starts after Last-Event-ID, else ?after=, else the
+ * newest event; *is_resumed when the client named a start. An EventSource reconnects with its original URL and adds
+ * Last-Event-ID, which is therefore the newer of the two. Returns NULL, or the refusal. */
 static struct response *read_request(struct api *api, const struct request *r, struct subscription *what,
                                      bool *is_resumed) {
     const char *accept = request_field(r, "Accept"), *follow = target_query(&r->target, "follow");
@@ -51,7 +51,7 @@ static struct response *stream_reply(struct api *api, const struct request *r, c
     struct response *reply = response_new(200);
     response_field(reply, "Content-Type", "%s", type);
     response_field(reply, "Cache-Control", "no-store");
-    response_field(reply, "X-Accel-Buffering", "no"); /* nginx: pass it on at once */
+    response_field(reply, "X-Accel-Buffering", "no"); /* nginx: do not buffer */
     if (!r->is_head)
         reply->stream = subscriber_new(api, &r->caller, what);
     else
@@ -79,7 +79,7 @@ struct response *events_get(struct api *api, struct request *r) {
         if (store_event_page(api->store, NULL, job.id, what.after, 1, 1, note_any, &has_more, &page, &err) != STATUS_OK)
             reply = problem_from(r, &err);
         else if (!has_more && page.pruned_id <= what.after)
-            reply = response_new(204); /* which an EventSource takes as the end */
+            reply = response_new(204); /* tells an EventSource to stop */
     }
     if (!reply)
         reply = limits_check_stream(api, r);
@@ -108,7 +108,7 @@ struct response *events_wait(struct api *api, struct request *r, const struct jo
     snprintf(etag, sizeof etag, "\"rev-%lld\"", (long long)job->revision);
     if (!field_number(target_query(&r->target, "wait"), 1, WAIT_MAX_SEC, &wait_sec))
         return problem(r, 400, "wait must be a number of seconds from 1 to %d", WAIT_MAX_SEC);
-    /* It has come already: then it is an ordinary reply. */
+    /* The change has happened already: an ordinary reply. */
     if (known ? !field_etag_listed(known, etag, true) : job_is_terminal(job->state))
         return NULL;
     struct response *reply = limits_check_stream(api, r);

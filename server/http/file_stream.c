@@ -7,14 +7,13 @@
 
 #include "common/mem.h"
 
-#define AHEAD_BYTES                                                                                                    \
-    ((size_t)256 << 10) /* read at once: a task of some 100 us from memory; each open download has so much */
+#define AHEAD_BYTES ((size_t)256 << 10) /* read at once, some 100 us from memory; each open download holds this much */
 
 struct file_stream {
     struct stream base;
     int fd;
-    uint64_t at, end; /* of what is to be read yet */
-    char *ahead;      /* [AHEAD_BYTES], of which [used, count) is to be sent */
+    uint64_t at, end; /* what is still to be read */
+    char *ahead;      /* [AHEAD_BYTES]; [used, count) is still to be sent */
     size_t used, count;
     bool has_failed;
 };

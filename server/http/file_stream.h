@@ -1,4 +1,4 @@
-/* file_stream.h -- a part of an open file as the body of a reply: read ahead on threads that may wait for the disk. */
+/* file_stream.h -- a part of an open file as the body of a reply, read ahead on threads that may block. */
 #ifndef UNBAKE_HTTP_FILE_STREAM_H
 #define UNBAKE_HTTP_FILE_STREAM_H
 
@@ -6,7 +6,7 @@
 
 #include "server/http/message.h"
 
-/* `length` bytes of fd from `offset` on; takes fd. A file that is shorter by then ends the stream too early. */
+/* `length` bytes of fd from `offset` on; takes fd. If the file has become shorter, the stream ends early. */
 struct stream *file_stream_new(int fd, uint64_t offset, uint64_t length);
 
 #endif

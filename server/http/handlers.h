@@ -1,4 +1,4 @@
-/* handlers.h -- the functions of the route table. Each gives a reply, never NULL. */
+/* handlers.h -- the functions of the route table. Each returns a reply, never NULL. */
 #ifndef UNBAKE_HTTP_HANDLERS_H
 #define UNBAKE_HTTP_HANDLERS_H
 
@@ -62,7 +62,7 @@ struct response *jobs_log(struct api *api, struct request *r);
 /* events.c */
 struct response *events_get(struct api *api, struct request *r);
 struct response *events_all(struct api *api, struct request *r);
-/* The reply to GET of a job with ?wait=; NULL where there is nothing to wait for. */
+/* GET of a job with ?wait=; NULL where the change has happened already. */
 struct response *events_wait(struct api *api, struct request *r, const struct job *job);
 
 #endif

@@ -22,8 +22,8 @@ static struct response *refuse(const struct request *r, int status, const char *
     return reply;
 }
 
-/* libmicrohttpd 0.9.75 appends what continues a line to the field's name: "Content-Length: 3" with
- * " 0" below it is a field Content-Length0, and the request has no length any more. */
+/* libmicrohttpd 0.9.75 appends a folded line to the field's name: "Content-Length: 3" followed by " 0" becomes a
+ * field Content-Length0, and the request loses its length. */
 static bool is_lost_framing(const char *name) {
     return (strncasecmp(name, "Content-Length", 14) == 0 && name[14] != '\0') ||
            (strncasecmp(name, "Transfer-Encoding", 17) == 0 && name[17] != '\0');
@@ -62,7 +62,7 @@ static struct response *check_framing(const struct request *r) {
         return refuse(r, 400, "Content-Length is not a number");
     if (coding && (field_occurrences(r, "Transfer-Encoding") > 1 || strcasecmp(coding, "chunked") != 0))
         return refuse(r, 400, "Transfer-Encoding must be \"chunked\" or absent");
-    if (expect && *expect && strcasecmp(expect, "100-continue") != 0) /* it is a list, which may be empty */
+    if (expect && *expect && strcasecmp(expect, "100-continue") != 0) /* a list, which may be empty */
         return refuse(r, 417, "the only expectation known here is 100-continue");
     return NULL;
 }
@@ -89,7 +89,7 @@ static struct response *check_host(const struct request *r, const char *version,
     if (authority && !field_host(authority, &length))
         return refuse(r, 400, "the request target's authority is not a host");
     if (authority)
-        host = authority; /* RFC 9112, 3.2.2: whatever the field has */
+        host = authority; /* RFC 9112, 3.2.2: overrides the Host field */
     if (!host)
         return NULL;
     if (server_names && !field_is_loopback_host(host, length) && !is_server_name(server_names, host, length)) {
@@ -129,7 +129,7 @@ void head_request_id(struct request *r) {
         }
     }
     uint64_t random = 0;
-    /* Eight bytes never block or fail once the machine is up; an id of zeros would do no harm. */
+    /* Eight bytes never block or fail once the machine is up; an id of zeros would be harmless. */
     if (getrandom(&random, sizeof random, 0) != sizeof random)
         random = 0;
     snprintf(r->id, sizeof r->id, "%016llx", (unsigned long long)random);

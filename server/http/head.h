@@ -8,13 +8,12 @@
 
 #include "server/http/message.h"
 
-/* NULL when the head is fine; the refusal otherwise, with must_close set where the framing of
- * what follows is in doubt. `version` is as sent: "HTTP/1.1". `server_names` are the hosts
- * besides loopback that this daemon answers for, separated by spaces or commas; NULL: any, as where
- * a token is asked for. */
+/* NULL when the head is acceptable, else the refusal, with must_close set where it is unclear where the next request
+ * begins. `version` is as sent: "HTTP/1.1". `server_names` are the hosts besides loopback that this daemon answers
+ * for, separated by spaces or commas; NULL: any, as where a token is required. */
 struct response *head_check(const struct request *r, const char *version, const char *server_names);
 
-/* Takes a caller's X-Request-Id where it is a plain word, or makes one. */
+/* Uses a caller's X-Request-Id where it is a plain word; otherwise makes one. */
 void head_request_id(struct request *r);
 
 #endif

@@ -1,4 +1,4 @@
-/* job_request.h -- what the body of POST /v1/jobs or of PATCH /v1/jobs/ID asks for. */
+/* job_request.h -- the body of POST /v1/jobs or of PATCH /v1/jobs/ID. */
 #ifndef UNBAKE_HTTP_JOB_REQUEST_H
 #define UNBAKE_HTTP_JOB_REQUEST_H
 
@@ -10,7 +10,7 @@
 #include "server/http/message.h"
 #include "server/store/store.h"
 
-/* Pointers lie in `body`. */
+/* Pointers point into `body`. */
 struct job_request {
     cJSON *body; /* owned */
     const char *scene, *name;
@@ -24,13 +24,12 @@ struct job_request {
     struct retention retention;
 };
 
-/* Reads and checks the request's body; all faults go into the array `params`, as problem_param puts them.
- * NULL, or a reply where the body is no JSON object at all. *w needs job_request_release in any case. */
+/* Reads and checks the request's body; all faults are added to the array `params` (problem_param). NULL, or a reply
+ * where the body is not a JSON object. *w needs job_request_release in any case. */
 struct response *job_request_read(const struct request *r, struct job_request *w, bool is_new, cJSON *params);
 void job_request_release(struct job_request *w);
 
-/* Applies the settings that it asks for, if any, over *settings; faults as above, their names with
- * "settings." before them. */
+/* Applies the body's settings, if any, to *settings; faults as above, with "settings." before their names. */
 void job_request_settings(const struct job_request *w, struct settings *settings, cJSON *params);
 
 /* NULL where mesh and photographs of the scene fit, as far as is known, or the job takes them as they are; else 409, with

@@ -46,7 +46,7 @@ struct response *jobs_list(struct api *api, struct request *r) {
         return refusal;
     struct job *jobs = mem_calloc(limit + 1, sizeof *jobs);
     struct error err;
-    /* One more than asked for tells whether there is another page. */
+    /* One row more than asked for shows that there is another page. */
     if (store_job_list(api->store, &r->caller, state_name ? (int)state : -1, before, limit + 1, jobs, &count, &err) !=
         STATUS_OK) {
         mem_free(jobs);
@@ -68,8 +68,8 @@ struct response *jobs_list(struct api *api, struct request *r) {
 
 /* --- submitting -------------------------------------------------------------------------- */
 
-/* The scene that the request names, if a job may use it; else an entry in params, or *refusal where the
- * database is at fault. */
+/* Loads the scene that the request names. false: with an entry in params where no job may use it, or *refusal where
+ * the database failed. */
 static bool find_scene(struct api *api, const struct request *r, const char *id, struct scene_row *row, cJSON *params,
                        struct response **refusal) {
     size_t digits = strspn(id, "0123456789abcdef");
@@ -127,7 +127,7 @@ static struct response *add_job(struct api *api, const struct request *r, const 
     bool replayed = false;
     enum status status = store_job_add(api->store, &job, api->config.queue_limit, &id, &replayed, &err);
     mem_free(settings);
-    /* The key was used for another request, or the scene was rejected or removed just now. */
+    /* The key was used for another request, or the scene has just been rejected or removed. */
     if (status == STATUS_CONFLICT || status == STATUS_NOT_FOUND)
         return problem_full(r, 422, err.message, err.hint, NULL);
     if (status != STATUS_OK)
@@ -244,7 +244,7 @@ struct response *jobs_patch(struct api *api, struct request *r) {
     return reply;
 }
 
-/* What removing the job would free. */
+/* The reply to a dry run: what removing the job would free. */
 static struct response *measure_job(struct api *api, const struct request *r, int64_t id) {
     struct job job;
     struct error err;

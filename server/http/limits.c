@@ -9,7 +9,7 @@
 #include "server/http/hub.h"
 #include "server/http/problem.h"
 
-#define ADMIN_STREAMS 10 /* one in so many is kept for admins */
+#define ADMIN_STREAMS 10 /* one stream in ten is kept for admins */
 
 bool limits_bind(const struct request *r) { return r->caller.user_id > 0 && r->caller.role != ROLE_ADMIN; }
 
@@ -32,7 +32,7 @@ static struct response *check_pledge(struct api *api, const struct request *r, u
         store_user_pledged(api->store, r->caller.user_id, clock_unix_ms() - api->config.empty_upload_ms, &pledged,
                            &err) != STATUS_OK)
         return problem_from(r, &err);
-    /* What is pledged has its blocks already: it is not free any more. */
+    /* Pledged bytes are allocated already: they are no longer free. */
     uint64_t share = ((room > keep ? room - keep : 0) + pledged) / 100 * api->config.user_pledge_percent;
     if (pledged + bytes <= share)
         return NULL;

@@ -22,12 +22,13 @@
 
 #define LIBRARY_THREADS 4
 #define QUICK_THREADS 4
-#define SLOW_THREADS 8 /* they wait for the disk more than they compute */
-/* The acceptor keeps to the limit; the library's own, a share of it for each thread, must never be met. */
+#define SLOW_THREADS 8 /* they spend more time waiting for the disk than computing */
+/* The acceptor enforces the limit. The library divides its own among its threads; it is set so high that it is never
+ * reached. */
 #define LIBRARY_LIMIT_FACTOR (2 * LIBRARY_THREADS)
-#define POOL_BYTES ((size_t)64 << 10) /* a connection's head and buffers; a larger head gets 431 */
-#define UNSENT_BYTES (256 << 10)      /* of a reply that wait in the kernel for a slow reader */
-#define BEGIN_MS 1000                 /* until the library has begun with what was accepted */
+#define POOL_BYTES ((size_t)64 << 10) /* for a connection's head and buffers; a larger head gets 431 */
+#define UNSENT_BYTES (256 << 10)      /* of a reply, queued in the kernel for a slow reader */
+#define BEGIN_MS 1000                 /* for the library to start on the connections that were accepted */
 
 const char *listener_library_version(void) { return MHD_get_version(); }
 
@@ -42,7 +43,7 @@ static void on_connection(void *user, struct MHD_Connection *connection, void **
     struct listener *l = user;
     if (code == MHD_CONNECTION_NOTIFY_STARTED) {
         int fd = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD)->connect_fd;
-        int unsent = UNSENT_BYTES; /* megabytes each, otherwise */
+        int unsent = UNSENT_BYTES; /* the default is megabytes for each */
         setsockopt(fd, IPPROTO_TCP, TCP_NOTSENT_LOWAT, &unsent, sizeof unsent);
         *socket_context = guard_add(l->guard, fd);
     } else {
@@ -57,7 +58,7 @@ static void on_connection(void *user, struct MHD_Connection *connection, void **
 
 /* --- starting and stopping --------------------------------------------------------------- */
 
-/* Says why, to who understands it, and closes. */
+/* Sends the reason in plain HTTP, and closes. */
 static bool turn_away(const struct listener *l, int fd, enum connection_answer answer) {
     static const char *const reply[] = {
         [CONNECTION_ADDRESS_FULL] = "HTTP/1.1 429 Too Many Requests\r\nRetry-After: 30\r\nContent-Type: text/plain\r\n"
@@ -66,7 +67,7 @@ static bool turn_away(const struct listener *l, int fd, enum connection_answer a
         [CONNECTION_FULL] = "HTTP/1.1 503 Service Unavailable\r\nRetry-After: 2\r\nContent-Type: text/plain\r\n"
                             "Connection: close\r\n\r\nthe limit of connections is reached; an administrator can"
                             " raise the option max_connections\n"};
-    if (!l->tls) /* whoever is not there to read it has not waited for it */
+    if (!l->tls) /* plain text means nothing to a TLS client */
         (void)!send(fd, reply[answer], strlen(reply[answer]), MSG_NOSIGNAL | MSG_DONTWAIT);
     shutdown(fd, SHUT_WR);
     close(fd);
@@ -155,12 +156,13 @@ enum status listener_start(struct listener **out, const struct listener_config *
 
 void listener_quiesce(struct listener *l) {
     acceptor_stop(l->acceptor);
-    /* The library's threads may not have begun with all that was accepted; if one never does, its memory was refused. */
+    /* The library's threads may not have started on all accepted connections. If one never starts, memory for it was
+     * refused. */
     for (int ms = 0; ms < BEGIN_MS && guard_count(l->guard) < acceptor_count(l->acceptor); ms++)
         usleep(1000);
 }
 
-/* Waits until none is left; for clients that do not read, not long enough; for others, plenty. */
+/* Waits up to 3 s for *count to become 0. Clients that do not read may take longer. */
 static void wait_for_none(struct listener *l, const size_t *count) {
     struct timespec until;
     clock_gettime(CLOCK_MONOTONIC, &until);
@@ -169,8 +171,8 @@ static void wait_for_none(struct listener *l, const size_t *count) {
         ;
 }
 
-/* Ends the streams and what the pools work on, and waits for both: nothing is suspended after, and what was done is
- * answered. */
+/* Ends the streams and waits until the pools have finished their work: afterwards no connection is suspended, and
+ * finished work has been answered. */
 static void settle(struct listener *l) {
     pthread_mutex_lock(&l->mutex);
     l->is_closing = true;
@@ -191,7 +193,7 @@ void listener_stop(struct listener *l) {
     if (l->daemon)
         MHD_stop_daemon(l->daemon);
     pool_free(l->quick);
-    pool_free(l->slow); /* with what was left to do after exchanges that have just ended */
+    pool_free(l->slow); /* with the last tasks of exchanges that have just ended */
     acceptor_free(l->acceptor);
     connection_counts_free(l->connection_counts);
     if (l->guard)

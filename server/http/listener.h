@@ -28,16 +28,16 @@ struct listener_config {
     struct guard_limits limits;
 };
 
-/* Listens and serves; *l is to be stopped, and is api->listener from then on. Nothing of `config` is
- * kept, `api` is borrowed. STATUS_INPUT: the address or the certificate is no good. */
+/* Listens and serves until listener_stop, which takes *l; *l is api->listener meanwhile. Keeps nothing of `config`;
+ * borrows `api`. STATUS_INPUT: the address or the certificate cannot be used. */
 enum status listener_start(struct listener **l, const struct listener_config *config, struct api *api,
                            struct error *err);
 uint16_t listener_port(const struct listener *l);
-/* Reads the certificate and its key again, if there are any. Any thread but not two at once. */
+/* Reads the certificate and its key again, if there are any. Any thread, but not two at once. */
 enum status listener_reload(struct listener *l, struct error *err);
-/* Accepts no further connection; those that exist are served. Any thread, one at a time. */
+/* Accepts no more connections; open ones are served. Any thread, but not two at once. */
 void listener_quiesce(struct listener *l);
-void listener_stop(struct listener *l); /* NULL is fine */
+void listener_stop(struct listener *l); /* NULL is allowed */
 
 size_t listener_connections(struct listener *l);
 uint64_t listener_late(struct listener *l); /* connections shut for being too slow */

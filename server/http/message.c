@@ -78,7 +78,7 @@ struct response *response_json(int status, cJSON *value) {
     char *text = json_text(value);
     cJSON_Delete(value);
     size_t length = strlen(text);
-    char *line = mem_printf("%s\n", text); /* a terminal is happier with a whole line */
+    char *line = mem_printf("%s\n", text); /* end with a newline, for terminals */
     mem_free(text);
     struct response *r = response_text(status, MIME_JSON, line, length + 1);
     response_field(r, "Cache-Control", "no-cache");
@@ -88,7 +88,7 @@ struct response *response_json(int status, cJSON *value) {
 struct response *response_static(const char *content_type, const void *text, size_t length) {
     struct response *r = response_new(200);
     response_field(r, "Content-Type", "%s", content_type);
-    /* The body is only read; the member is not const because others own theirs. */
+    /* The text is only read; the member is not const because other responses own theirs. */
     memcpy(&r->text, &text, sizeof text);
     r->text_is_static = true;
     r->length = length;

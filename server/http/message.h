@@ -29,7 +29,7 @@ struct upload;
 struct upload_patch;
 
 struct request {
-    int method;   /* enum method; METHOD_COUNT for a word that no route knows */
+    int method;   /* enum method; METHOD_COUNT for a method that no route has */
     bool is_head; /* HEAD: method is METHOD_GET and the body is left out */
     struct target target;
     struct field *fields; /* [field_count]; owned */
@@ -37,31 +37,31 @@ struct request {
     bool has_body;
     int64_t content_length;     /* -1: not known (chunked) */
     char id[REQUEST_ID_SIZE];   /* for X-Request-Id and logs */
-    struct address address;     /* where it comes from (address.h) */
-    bool is_throttled;          /* refused as one of too many wrong tokens */
+    struct address address;     /* the client's address (address.h) */
+    bool is_throttled;          /* refused after too many invalid tokens */
     const struct route *route;  /* set by routes_begin; static storage */
-    struct caller caller;       /* who asks; set by routes_begin */
-    struct buf body;            /* what was collected of it, for routes that take JSON */
-    struct upload *upload;      /* a body that goes to disk; owned */
-    struct upload_patch *patch; /* a body that goes on with an upload in parts; owned */
+    struct caller caller;       /* set by routes_begin */
+    struct buf body;            /* the part collected in memory, for routes that take JSON */
+    struct upload *upload;      /* an uploaded bundle; owned */
+    struct upload_patch *patch; /* a part of a resumable upload; owned */
 };
 
-/* After routes_drop_body, which knows what upload and patch are. */
+/* Call routes_drop_body first, which frees upload and patch. */
 void request_release(struct request *r);
-/* The value of the first field of that name (case does not matter), NULL where absent; borrowed. */
+/* The value of the first field with that name (case-insensitive), NULL where absent; borrowed. */
 const char *request_field(const struct request *r, const char *name);
 
-/* A body that is made while it is sent. The listener makes one call at a time, and close exactly once, the last. */
+/* A body that is produced while it is sent. One call at a time; close is the last and is called exactly once. */
 struct stream {
-    /* Bytes that are there already, put into to[size]; 0: fill must be called; -1: the end. Never waits. */
+    /* Copies available bytes into to[size]; 0: fill must be called; -1: the end. Never blocks. */
     ssize_t (*read)(struct stream *s, char *to, size_t size);
-    /* Gets more, on a thread that may wait for a disk; false: there is nothing now, call again after `wake`. */
+    /* Produces more; may block. false: there is nothing now, call again after `wake`. */
     bool (*fill)(struct stream *s);
-    void (*close)(struct stream *s); /* frees s; as fill */
-    bool is_sized; /* of as many bytes as the response says; else the connection is cut. It is never woken */
-    bool must_say; /* without a byte it must not look whole: its connection is cut */
-    /* Set by the listener before the first call; thread-safe; may be called until close, also
-     * when the stream is not waiting. */
+    void (*close)(struct stream *s); /* frees s; may block */
+    bool is_sized; /* must deliver the response's length, else the connection is cut; is never woken */
+    bool must_say; /* must deliver at least a byte, else the connection is cut */
+    /* Set by the listener before the first call. Thread-safe. May be called until close, also when the stream is not
+     * waiting. */
     void (*wake)(void *waker);
     void *waker;
 };
@@ -81,7 +81,7 @@ struct response {
 
 struct response *response_new(int status);
 void response_free(struct response *r);
-/* Sets a field; one of that name is replaced. */
+/* Sets a field; replaces one of that name. */
 void response_field(struct response *r, const char *name, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 struct response *response_json(int status, cJSON *value); /* takes value */

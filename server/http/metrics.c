@@ -1,5 +1,5 @@
-/* metrics.c -- GET /metrics: values in the text format of Prometheus, version 0.0.4. Counters are
- * those since the daemon started; labels have few values, whatever users do. */
+/* metrics.c -- GET /metrics: values in Prometheus's text format 0.0.4. Counters start at 0 with the daemon; the
+ * number of label values does not depend on what users do. */
 #include <stdio.h>
 #include <time.h>
 #include <unistd.h>

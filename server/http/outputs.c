@@ -43,7 +43,7 @@ struct response *outputs_list(struct api *api, struct request *r) {
     return response_json(200, value);
 }
 
-/* A strong tag for the file: of its content where that is known, else of its version. */
+/* A strong ETag for the file: from its content where the digest is known, else from its version. */
 static void make_etag(const struct digests_file *file, bool by_content, char etag[ETAG_SIZE]) {
     if (by_content)
         snprintf(etag, ETAG_SIZE, "\"sha256-%s\"", file->hex);
@@ -51,7 +51,7 @@ static void make_etag(const struct digests_file *file, bool by_content, char eta
         snprintf(etag, ETAG_SIZE, "\"file-%s\"", file->tag);
 }
 
-/* The part of the file that is asked for, or all of it. Ranges are of GET alone (RFC 9110, 14.2). */
+/* Applies Range: the part of the file that is asked for, or all of it. Only for GET (RFC 9110, 14.2). */
 static void apply_range(const struct request *r, uint64_t size, struct response **reply) {
     const char *range = request_field(r, "Range");
     uint64_t first = 0, count = size;
@@ -72,8 +72,8 @@ static void apply_range(const struct request *r, uint64_t size, struct response 
     }
 }
 
-/* The file or its part, and what goes with it. `etag` becomes the tag that If-Range named, where that is one of this
- * version: whoever has a part by that tag can tell that the rest belongs to it. */
+/* The file or a part of it, with its header fields. Where If-Range named an ETag of this version, that one is sent:
+ * whoever has a part under that ETag can tell that the rest belongs to it. */
 static struct response *send_bytes(const struct request *r, int fd, const struct digests_file *file,
                                    const char *content_type, const char *version_etag, char etag[ETAG_SIZE]) {
     const char *if_range = request_field(r, "If-Range");
@@ -82,7 +82,7 @@ static struct response *send_bytes(const struct request *r, int fd, const struct
     reply->fd = fd;
     reply->length = file->bytes;
     response_field(reply, "Content-Type", "%s", content_type);
-    /* A worker wrote it, from what a stranger uploaded: in a browser it must not act as its reader. */
+    /* A worker wrote the file from a stranger's upload: in a browser it must not act with its reader's rights. */
     response_field(reply, "Content-Security-Policy", "sandbox allow-same-origin; script-src 'none'");
     if (*file->hex) {
         field_digest_format(file->hex, digest);
@@ -97,7 +97,7 @@ static struct response *send_bytes(const struct request *r, int fd, const struct
     return reply;
 }
 
-/* Whether a part is asked for of the content that has some digest, and what this file's is is not known yet. */
+/* Whether the request asks for a part of the content with a certain digest while that of this file is not known yet. */
 static bool is_too_early(const struct request *r, const struct digests_file *file) {
     const char *if_range = request_field(r, "If-Range");
     return !*file->hex && !r->is_head && request_field(r, "Range") && if_range &&
@@ -160,7 +160,7 @@ struct response *outputs_get(struct api *api, struct request *r) {
 
 /* --- the log ----------------------------------------------------------------------------- */
 
-/* The last `bytes` bytes of fd, from the first whole line on; the caller's. */
+/* The last `bytes` bytes of fd, starting at a whole line; the caller's. */
 static char *read_tail(int fd, size_t bytes, size_t *length) {
     struct stat info;
     off_t size = fstat(fd, &info) == 0 && S_ISREG(info.st_mode) ? info.st_size : 0;

@@ -6,11 +6,11 @@
 #include "common/json.h"
 #include "server/http/message.h"
 
-/* A reply of that HTTP status; its type and title follow from it. */
+/* A reply with that HTTP status, which decides its type and title. */
 struct response *problem(const struct request *r, int status, const char *detail_format, ...)
     __attribute__((format(printf, 3, 4)));
-/* The same with a hint ("" for none) and further members (an object, taken; NULL for none), which may have
- * their own type and title. */
+/* The same with a hint ("" for none) and more members (an object, taken; NULL for none), which may override type and
+ * title. */
 struct response *problem_full(const struct request *r, int status, const char *detail, const char *hint,
                               cJSON *members);
 /* 422 with invalid_params (an array of {name, reason, hint?}; taken). */
@@ -19,10 +19,10 @@ struct response *problem_invalid(const struct request *r, const char *detail, cJ
 void problem_param(cJSON *params, const char *name, const char *hint, const char *reason_format, ...)
     __attribute__((format(printf, 4, 5)));
 
-/* What a failed call of the store or of the system becomes. Defects and broken devices are
- * logged here, with the request's id, and told the caller without details. */
+/* The reply to a failed call of the store or the system. Bugs and device errors are logged here with the request's
+ * id; the caller gets no details. */
 struct response *problem_from(const struct request *r, const struct error *err);
-/* The HTTP status of a reply to such an error. */
+/* The HTTP status for such an error. */
 int problem_status(enum status status);
 
 #endif

@@ -17,20 +17,20 @@ struct readiness {
     struct store *store;
     const char *data_dir;
     pthread_t thread;
-    pthread_mutex_t mutex; /* guards what follows; not held while the disk is asked */
+    pthread_mutex_t mutex; /* guards what follows; not held during the probe */
     pthread_cond_t changed;
     bool is_wanted, is_asking, stopping;
-    double asked_sec;       /* when the one began that goes on */
-    unsigned long answered; /* how often */
-    struct error answer;    /* the last; its status STATUS_OK: all is well */
+    double asked_sec;       /* when the probe under way began */
+    unsigned long answered; /* number of finished probes */
+    struct error answer;    /* result of the last one; STATUS_OK: all is well */
     uint64_t free_bytes;
 };
 
-/* A file goes to the disk and comes back. */
+/* Writes a file and reads it back. */
 static enum status probe_disk(const struct readiness *r, struct error *err) {
     static const char text[] = "can this be read back?\n";
     struct buf found;
-    char *path = layout_trash_file(r->data_dir, "probe"); /* removed at the next start, too */
+    char *path = layout_trash_file(r->data_dir, "probe"); /* a leftover is removed at the next start */
     buf_init(&found, 4096);
     enum status status = file_replace(path, text, sizeof text - 1, err);
     if (status == STATUS_OK)

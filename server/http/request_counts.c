@@ -1,5 +1,5 @@
-/* request_counts.c -- see request_counts.h. The labels are few, whatever clients ask for: what no route takes is one
- * row, and a status that is none of ours is 0. */
+/* request_counts.c -- see request_counts.h. The number of labels is bounded whatever clients send: requests without a
+ * route share a row, and a status that this daemon never sends counts as 0. */
 #include "server/http/request_counts.h"
 
 #include <stdatomic.h>

@@ -8,7 +8,7 @@
 #include "common/mem.h"
 #include "server/http/problem.h"
 
-/* 2026-11-21T15:00:00Z, with or without a fraction; Unix milliseconds, 0 where it is none. */
+/* Parses 2026-11-21T15:00:00Z, with or without a fraction, to Unix milliseconds; 0 if it is malformed. */
 static int64_t read_time(const char *text) {
     struct tm utc = {0};
     const char *rest = strptime(text, "%Y-%m-%dT%H:%M:%S", &utc);

@@ -1,5 +1,4 @@
-/* route.h -- one row of the table of routes: which requests it takes, from whom, and what is done with
- * their bodies. */
+/* route.h -- a row of the route table: which requests it takes, from whom, and where their bodies go. */
 #ifndef UNBAKE_HTTP_ROUTE_H
 #define UNBAKE_HTTP_ROUTE_H
 
@@ -8,30 +7,30 @@
 struct api;
 
 enum route_body {
-    ROUTE_BODY_IGNORED, /* a small one is read and forgotten */
+    ROUTE_BODY_IGNORED, /* read and dropped */
     ROUTE_BODY_JSON,    /* collected in request.body */
-    ROUTE_BODY_UPLOAD,  /* goes to disk */
-    ROUTE_BODY_PATCH    /* goes on with an upload in parts; as JSON it is a change of it instead */
+    ROUTE_BODY_UPLOAD,  /* written to disk */
+    ROUTE_BODY_PATCH    /* written to a resumable upload; a JSON body changes the upload instead */
 };
 
-/* The role that a caller must have at least. */
+/* The lowest role that is allowed. */
 enum route_access { ROUTE_PUBLIC, ROUTE_VIEWER, ROUTE_USER, ROUTE_ADMIN };
 
-/* On what threads it is worked on; see listener.h. */
+/* Which threads run the handler; see listener.h. */
 enum route_pace {
-    ROUTE_AT_ONCE, /* needs neither the store nor a disk, nor who asks */
-    ROUTE_QUICK,   /* asks or changes the store, opens a file */
-    ROUTE_SLOW     /* syncs, hashes or looks through files as large as users make them */
+    ROUTE_AT_ONCE, /* uses neither store, disk nor caller */
+    ROUTE_QUICK,   /* uses the store, opens a file */
+    ROUTE_SLOW     /* syncs, hashes, or reads files whose size users choose */
 };
 
 struct route {
     enum method method;
-    const char *pattern; /* "/v1/jobs/{job}": {x} is one part, {x...} one or more at the end */
+    const char *pattern; /* "/v1/jobs/{job}": {x} is one segment, {x...} one or more at the end */
     enum route_access access;
     struct response *(*handle)(struct api *api, struct request *r);
     enum route_body body;
     enum route_pace pace;
-    const char *query; /* the names that it takes, separated by spaces */
+    const char *query; /* names of the query's parameters, separated by spaces */
 };
 
 #endif

@@ -85,15 +85,14 @@ static bool is_tus(const struct request *r) {
            strcmp(r->target.segments[1], "uploads") == 0;
 }
 
-/* Each reply about uploads says the protocol's version, also one that was made before uploads.c was asked.
- * NULL stays NULL. */
+/* Every reply to a tus request names the protocol's version, early refusals too. NULL stays NULL. */
 static struct response *answer(const struct request *r, struct response *reply) {
     if (reply && is_tus(r))
         response_field(reply, "Tus-Resumable", TUS_VERSION);
     return reply;
 }
 
-/* For clients that can send no other methods than GET and POST, as the tus protocol has it. */
+/* X-HTTP-Method-Override of the tus protocol, for clients that can only send GET and POST. */
 static void override_method(struct request *r) {
     const char *other = request_field(r, "X-HTTP-Method-Override");
     if (!other || r->method != METHOD_POST || r->target.segment_count != 3 || !is_tus(r))
@@ -104,7 +103,7 @@ static void override_method(struct request *r) {
         r->method = METHOD_DELETE;
 }
 
-/* 404, or 405 where another method would do. */
+/* 404, or 405 where the path takes another method. */
 static struct response *no_route(const struct request *r) {
     static const char *const names[] = {"GET, HEAD", "POST", "PATCH", "DELETE", "OPTIONS"};
     char allow[64] = "";

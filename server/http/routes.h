@@ -17,12 +17,12 @@ const struct route *routes_table(size_t *count);
 #define ROUTES_BODY_MAX ((size_t)1 << 20) /* bytes of a body that is not an upload */
 
 struct response *routes_find(struct request *r);
-/* Whether its body goes to disk as it comes. */
+/* Whether its body is written to disk as it arrives. */
 bool routes_body_is_stored(const struct request *r);
 struct response *routes_begin(struct api *api, struct request *r);
 struct response *routes_data(struct api *api, struct request *r, const void *data, size_t length);
 struct response *routes_finish(struct api *api, struct request *r);
-/* Forgets what came of the body, on disk too: the request is refused, or over. */
+/* Drops what has arrived of the body, on disk too: the request was refused, or is over. */
 void routes_drop_body(struct request *r);
 
 #endif

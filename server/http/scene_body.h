@@ -6,11 +6,11 @@
 #include "server/http/api.h"
 #include "server/http/message.h"
 
-/* Start of request r's body: sets r->upload, or refuses with a reply. */
+/* Start of the body of r: sets r->upload, or refuses with a reply. */
 struct response *scene_body_begin(struct api *api, struct request *r);
-/* The next bytes; NULL, or the reply that ends it. */
+/* The next bytes; NULL, or a reply that ends the request. */
 struct response *scene_body_data(struct api *api, struct request *r, const void *data, size_t length);
-/* All has come: checks the caller's digests, syncs, and says the content's SHA-256. */
+/* The body is complete: checks the caller's digests, syncs; id is the content's SHA-256. */
 struct response *scene_body_end(struct request *r, char id[SHA256_HEX_SIZE]);
 
 #endif

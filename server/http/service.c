@@ -11,7 +11,7 @@
 
 static void renew_reserve(void *store) { store_reserve_renew(store); }
 
-/* An upload has become a scene: its check is to begin. */
+/* An upload has become a scene, which must be checked. */
 static void scene_added(void *scheduler) { scheduler_wake(scheduler); }
 
 static void maintain_uploads(void *resumables) { resumables_maintain(resumables); }
@@ -20,7 +20,7 @@ static enum status forget_upload(void *resumables, const char *id, struct error 
     return resumable_forget(resumables, id, err);
 }
 
-/* What works in the data folder. Uploads that are whole become scenes before the folders are swept. */
+/* Opens what works in the data folder. Complete uploads become scenes before leftovers are removed. */
 static enum status open_folder(struct api *api, struct error *err) {
     struct store *store = api->store;
     enum status status = folder_open(&api->folder, api->config.data_dir, renew_reserve, store, err);

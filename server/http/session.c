@@ -1,4 +1,4 @@
-/* session.c -- /v1/session: who asks, and what he keeps; the web page's token, in a cookie that no script can read. */
+/* session.c -- /v1/session: the caller and what he keeps; the web page's token, in a cookie that no script can read. */
 #include <string.h>
 
 #include "server/http/auth.h"
@@ -28,7 +28,7 @@ struct response *session_get(struct api *api, struct request *r) {
     return describe(api, r, &r->caller);
 }
 
-/* Over TLS, ours or (as it says) a proxy's, the cookie stays there. */
+/* Over TLS, of this daemon or (by its header field) a proxy, the cookie is marked Secure. */
 static void set_cookie(const struct api *api, const struct request *r, struct response *reply, const char *token,
                        int age_sec) {
     const char *scheme = request_field(r, "X-Forwarded-Proto");

@@ -1,4 +1,4 @@
-/* space.h -- room on the disk of the data folder: who may have more of it, and how it is given back. */
+/* space.h -- free space on the disk of the data folder, and each user's share of it. */
 #ifndef UNBAKE_HTTP_SPACE_H
 #define UNBAKE_HTTP_SPACE_H
 
@@ -8,10 +8,11 @@
 #include "server/http/api.h"
 #include "server/http/message.h"
 
-/* Refuses with the reply when the disk holds less than min_free_bytes + `bytes`. */
+/* Refuses with a reply unless min_free_bytes + `bytes` are free. */
 struct response *space_check_room(struct api *api, const struct request *r, uint64_t bytes);
-/* The same when the caller keeps so much, but for the scene `but_scene` (NULL: all), that `bytes` more pass
- * user_max_bytes. Under api->folder.scene_mutex where it must hold: two at once would both find room. */
+/* Refuses when what the caller keeps, not counting the scene `but_scene` (NULL: none), plus `bytes` passes
+ * user_max_bytes. A caller that goes on to add the scene holds api->folder.scene_mutex: two at once would both find
+ * room. */
 struct response *space_check_share(struct api *api, const struct request *r, const char *but_scene, uint64_t bytes);
 
 #endif

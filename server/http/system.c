@@ -1,4 +1,4 @@
-/* system.c -- what the daemon says about itself. */
+/* system.c -- the web page, health, metrics, version, settings, API description. */
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
@@ -18,7 +18,7 @@
 
 /* --- the web page -------------------------------------------------------------------------- */
 
-/* A file of the page: it runs what comes from here and nothing else, and nobody frames it. */
+/* A file of the web page. It may only load from this origin and cannot be framed. */
 static struct response *page_part(const char *content_type, const void *text, size_t length) {
     struct response *reply = response_static(content_type, text, length);
     response_field(reply, "Content-Security-Policy",
@@ -39,7 +39,7 @@ struct response *system_page_js(struct api *api, struct request *r) {
     return page_part("text/javascript; charset=utf-8", embedded_page_js, embedded_page_js_size);
 }
 
-/* A page for browsers, which name text/html; links for all others. */
+/* The web page for browsers (Accept names text/html); links for others. */
 struct response *system_root(struct api *api, struct request *r) {
     (void)api;
     const char *accept = request_field(r, "Accept");

@@ -28,7 +28,7 @@
 #include "server/uploads/resumable.h"
 #include "server/uploads/upload_writer.h"
 
-#define METADATA_MAX 1000 /* bytes; it is given back in a field */
+#define METADATA_MAX 1000 /* bytes; it is sent back in a header field */
 #define METADATA_HINT "name has 1 to 200 bytes of UTF-8 without control characters, sha256 has 64 lower-case hex digits"
 
 enum checksum { CHECKSUM_NONE, CHECKSUM_SHA1, CHECKSUM_SHA256 };
@@ -41,9 +41,9 @@ struct upload_patch {
     struct sha256 sha256;
 };
 
-/* --- what all of them have ------------------------------------------------------------------ */
+/* --- shared --------------------------------------------------------------------------------- */
 
-/* The protocol's version: must be said where `is_needed`. NULL when it is ours. */
+/* Checks Tus-Resumable, which is required where `is_needed`. NULL when the version is ours. */
 static struct response *check_version(const struct request *r, bool is_needed) {
     const char *version = request_field(r, "Tus-Resumable");
     if (version ? strcmp(version, TUS_VERSION) == 0 : !is_needed)
@@ -56,7 +56,7 @@ static struct response *check_version(const struct request *r, bool is_needed) {
 }
 
 static struct response *refuse(const struct request *r, const struct error *err) {
-    if (err->status == STATUS_LIMIT) /* longer than was said; a full queue is told otherwise */
+    if (err->status == STATUS_LIMIT) /* longer than announced; a full queue has another message */
         return problem_full(r, 413, err->message, err->hint, NULL);
     return problem_from(r, err);
 }
@@ -65,8 +65,7 @@ static bool is_upload_id(const char *id) {
     return strlen(id) == UPLOAD_ID_SIZE - 1 && strspn(id, "0123456789abcdef") == UPLOAD_ID_SIZE - 1;
 }
 
-/* The id in the path, where there is such an upload and it is the caller's; or *refusal. Others'
- * uploads do not exist for a caller. */
+/* The id in the path, of an upload of the caller's; or *refusal. Others' uploads do not exist for the caller. */
 static const char *find_upload(struct api *api, const struct request *r, struct response **refusal) {
     const char *id = r->target.segments[2];
     struct upload_row row = {0};
@@ -90,11 +89,11 @@ static void add_expiry(struct response *reply, int64_t expires_ms) {
         return;
     time_t seconds = (time_t)(expires_ms / 1000);
     gmtime_r(&seconds, &utc);
-    strftime(text, sizeof text, "%a, %d %b %Y %H:%M:%S GMT", &utc); /* the locale is always C */
+    strftime(text, sizeof text, "%a, %d %b %Y %H:%M:%S GMT", &utc); /* pinned */
     response_field(reply, "Upload-Expires", "%s", text);
 }
 
-/* Where the upload stands, in fields. */
+/* Adds Upload-Offset, Upload-Length and the like. */
 static void add_place(struct response *reply, const struct upload_row *row) {
     response_field(reply, "Upload-Offset", "%" PRIu64, row->received);
     if (*row->scene_id)
@@ -116,7 +115,7 @@ struct response *uploads_options(struct api *api, struct request *r) {
 
 /* --- creation ------------------------------------------------------------------------------- */
 
-/* Takes a pair of Upload-Metadata that we know; the others are kept but mean nothing here. */
+/* Takes a pair of Upload-Metadata that we know; others are stored but have no effect. */
 static bool take_pair(struct upload_row *row, const char *key, size_t key_length, const char *value,
                       size_t value_length, struct error *err) {
     error_set(err, STATUS_INPUT, "Upload-Metadata is not a list of keys with values in base64");
@@ -165,7 +164,7 @@ static struct response *read_metadata(const struct request *r, struct upload_row
     return NULL;
 }
 
-/* NULL, or why the upload cannot be made. Fills what the client says of it. */
+/* Checks the creation request and fills *row; NULL, or the refusal. */
 static struct response *read_creation(struct api *api, const struct request *r, struct upload_row *row) {
     const char *text = request_field(r, "Upload-Length");
     int64_t length = 0;
@@ -190,7 +189,7 @@ static struct response *read_creation(struct api *api, const struct request *r, 
     return read_metadata(r, row);
 }
 
-/* Where there is room for it; or why it is not made. */
+/* Creates the upload if there is room; or returns the refusal. */
 static struct response *create(struct api *api, const struct request *r, struct upload_row *row) {
     struct error err;
     pthread_mutex_lock(&api->folder.scene_mutex); /* two at once would both find room */
@@ -223,7 +222,7 @@ struct response *uploads_add(struct api *api, struct request *r) {
     return reply;
 }
 
-/* --- looking -------------------------------------------------------------------------------- */
+/* --- reading -------------------------------------------------------------------------------- */
 
 struct response *uploads_get(struct api *api, struct request *r) {
     struct response *reply = check_version(r, r->is_head);
@@ -269,7 +268,7 @@ struct response *uploads_list(struct api *api, struct request *r) {
     return view_page(r, items, next);
 }
 
-/* --- going on ------------------------------------------------------------------------------- */
+/* --- continuing ----------------------------------------------------------------------------- */
 
 static struct response *read_checksum(const struct request *r, struct upload_patch *p) {
     const char *text = request_field(r, "Upload-Checksum");

@@ -1,4 +1,4 @@
-/* uploads.h -- the body of PATCH /v1/uploads/ID on its way to the upload that it goes on with. */
+/* uploads.h -- the body of PATCH /v1/uploads/ID, written to its upload. */
 #ifndef UNBAKE_HTTP_UPLOADS_H
 #define UNBAKE_HTTP_UPLOADS_H
 
@@ -7,10 +7,10 @@
 
 struct upload_patch; /* opaque */
 
-/* Start of request r's body: sets r->patch, or refuses with a reply. */
+/* Start of the body of r: sets r->patch, or refuses with a reply. */
 struct response *uploads_begin(struct api *api, struct request *r);
-/* The next bytes; NULL, or the reply that ends it. */
+/* The next bytes; NULL, or a reply that ends the request. */
 struct response *uploads_data(struct api *api, struct request *r, const void *data, size_t length);
-void uploads_drop(struct upload_patch *p); /* NULL is fine; what has come stays with the upload */
+void uploads_drop(struct upload_patch *p); /* NULL is allowed; what has arrived stays in the upload */
 
 #endif

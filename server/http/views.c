@@ -26,7 +26,7 @@ static void add_time(cJSON *object, const char *key, int64_t unix_ms) {
     json_add_string(object, key, unix_ms > 0 ? text : NULL);
 }
 
-/* JSON text that the store keeps; it checked it when it took it. */
+/* Adds JSON text from the store, which checked it on the way in. */
 static void add_text(cJSON *object, const char *key, const char *text) {
     cJSON *value = cJSON_Parse(text);
     json_add(object, key, value ? value : cJSON_CreateNull());
@@ -41,7 +41,7 @@ static void add_disk_bytes(cJSON *object, int64_t bytes) {
         json_add(object, "disk_bytes", cJSON_CreateNull());
 }
 
-/* Where its states are told, and what became of the messages. */
+/* Adds the job's webhook, and what became of its messages. */
 static void add_webhook(cJSON *v, const struct job *job, const struct caller *who) {
     bool is_his = who->role == ROLE_ADMIN || who->user_id == job->owner_id;
     json_add_string(v, "webhook", is_his ? or_null(job->webhook) : NULL);
@@ -83,7 +83,7 @@ cJSON *view_job(const struct job *job, const struct caller *who) {
     json_add_bool(v, "pinned", job->is_pinned);
     add_time(v, "expires_at", job->expires_ms);
     json_add_string(v, "stage", or_null(job->stage));
-    /* The last that was reported is of its last stage. */
+    /* A succeeded job may not have reported the end of its last stage. */
     json_add_number(v, "progress", job->state == JOB_SUCCEEDED ? 1.0 : job->progress);
     if (job->eta_sec >= 0)
         json_add_number(v, "eta_sec", job->eta_sec);

@@ -6,7 +6,7 @@
 #include "server/http/message.h"
 #include "server/store/store.h"
 
-/* For `who`: the URL of its webhook is a secret between its owner and the receiver. */
+/* As `who` sees it: the URL of its webhook is shown to its owner only. */
 cJSON *view_job(const struct job *job, const struct caller *who);
 cJSON *view_scene(const struct scene_row *row);
 cJSON *view_upload(const struct upload_row *row);
@@ -16,12 +16,12 @@ cJSON *view_output(int64_t job_id, const struct output_row *row);
 /* Unix milliseconds as 2026-11-21T12:00:00.123Z. */
 void view_time(int64_t unix_ms, char text[VIEW_TIME_SIZE]);
 
-/* `limit` of a list's query, or *refusal. */
+/* Reads `limit` of a list's query; or *refusal. */
 size_t view_limit(const struct request *r, struct response **refusal);
-/* {"items", "next"} and Link: `next` is the cursor, "" on the last page. Takes items. */
+/* {"items", "next"} and Link. `next` is the cursor, "" on the last page. Takes items. */
 struct response *view_page(const struct request *r, cJSON *items, const char *next);
 
-/* The reply to GET of a thing whose ETag is that text: 304 where the caller has it. Takes value. */
+/* The reply to GET with that ETag: 304 where the caller has it. Takes value. */
 struct response *view_tagged(const struct request *r, cJSON *value, const char *etag);
 
 #endif

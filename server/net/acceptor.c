@@ -12,35 +12,35 @@
 #include "common/mem.h"
 #include "server/net/bind.h"
 
-#define PAUSE_MS 100 /* before the next try, when there are no descriptors or no memory left */
+#define PAUSE_MS 100 /* before another try when descriptors or memory have run out */
 
 struct acceptor {
     int listen_fd; /* -1: none, or stopped */
-    int wake_fd;   /* an eventfd: there is room again, or it is to stop */
+    int wake_fd;   /* an eventfd: there is room again, or the thread must stop */
     size_t connection_max;
     acceptor_take *take;
     void *user;
     atomic_size_t count;
     atomic_bool stopping;
-    bool is_in_trouble; /* of the thread: the last try failed */
-    bool runs;          /* there is a thread */
+    bool is_in_trouble; /* the thread's own: the last try failed */
+    bool runs;          /* the thread was started */
     pthread_t thread;
 };
 
-/* Whether the next may be tried at once. */
+/* Returns whether the next connection may be tried at once. */
 static bool take_one(struct acceptor *a) {
     struct sockaddr_storage address;
     socklen_t size = sizeof address;
     int fd = accept4(a->listen_fd, (struct sockaddr *)&address, &size, SOCK_NONBLOCK | SOCK_CLOEXEC);
     if (fd >= 0) {
-        atomic_fetch_add(&a->count, 1); /* first: it may have ended before take() returns */
+        atomic_fetch_add(&a->count, 1); /* counted first: the connection may end before take() returns */
         if (!a->take(a->user, fd, (struct sockaddr *)&address, size))
             atomic_fetch_sub(&a->count, 1);
         a->is_in_trouble = false;
         return true;
     }
     if (errno != EMFILE && errno != ENFILE && errno != ENOBUFS && errno != ENOMEM)
-        return true; /* the connection's own fault, or there is none */
+        return true; /* the connection's own fault, or none is waiting */
     if (!a->is_in_trouble) {
         struct error err;
         error_set_errno(&err, errno, "cannot accept connections for now");

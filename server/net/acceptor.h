@@ -15,19 +15,21 @@
 
 struct acceptor; /* opaque; thread-safe */
 
-/* Is given the connection `fd`, which neither blocks nor outlives an exec; false: that was refused, and is closed. */
+/* Takes over the connection `fd`, which is non-blocking and close-on-exec. false: it was refused, and is already
+ * closed. */
 typedef bool acceptor_take(void *user, int fd, const struct sockaddr *address, socklen_t size);
 
-/* Listens, as bind_listen. What arrives waits in the kernel until acceptor_start, and later while connection_max are
+/* Listens as bind_listen does. Connections wait in the kernel until acceptor_start, and whenever connection_max are
  * open. */
 enum status acceptor_new(struct acceptor **a, const char *address, uint16_t *port, size_t connection_max,
                          acceptor_take *take, void *user, struct error *err);
 enum status acceptor_start(struct acceptor *a, struct error *err); /* once */
-/* One that was taken has ended. Any thread, as the next. */
+/* A connection that was taken has ended. Any thread may call this and the next. */
 void acceptor_ended(struct acceptor *a);
 size_t acceptor_count(struct acceptor *a); /* taken and not ended */
-/* Takes no more, those that wait in the kernel are refused; may be said again, but not by two threads at once. */
+/* Stops accepting; connections waiting in the kernel are refused. May be called again, but not by two threads at
+ * once. */
 void acceptor_stop(struct acceptor *a);
-void acceptor_free(struct acceptor *a); /* stops it, too; NULL is fine */
+void acceptor_free(struct acceptor *a); /* also stops it; NULL is allowed */
 
 #endif

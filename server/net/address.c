@@ -108,7 +108,7 @@ bool proxies_trust(const struct proxies *p, const struct address *a) {
 
 /* --- the fields -------------------------------------------------------------------------- */
 
-/* Takes the last element off value[*length], commas within quotes aside; false where none is left. */
+/* Takes the last comma-separated element off value[*length], minding quotes; false where none is left. */
 static bool take_last(const char *value, size_t *length, const char **element, size_t *size) {
     size_t start = 0;
     bool is_quoted = false;
@@ -135,7 +135,7 @@ static void trim(const char **text, size_t *length) {
         --*length;
 }
 
-/* The value of for= of one element of Forwarded, without its quotes; what it is not stays as it is. */
+/* Reduces one element of Forwarded to the value of its for=, without quotes; leaves it alone if it has none. */
 static void take_for(const char **text, size_t *length) {
     for (const char *at = *text, *end = *text + *length; at < end;) {
         size_t size = 0;

@@ -17,16 +17,16 @@
 #define ADDRESS_PROXIES_MAX 64
 #define ADDRESS_TEXT_SIZE 46 /* INET6_ADDRSTRLEN */
 
-/* Of IPv6, or of IPv4 as ::ffff:a.b.c.d, in network order; all 0 where it is not known. */
+/* In IPv6 form (IPv4 as ::ffff:a.b.c.d), network byte order; all 0 if unknown. */
 struct address {
     uint8_t bytes[16];
 };
 
-/* Addresses of proxies; IPv4 ones are of ::ffff:0:0/96. */
+/* Addresses of proxies; IPv4 prefixes lie in ::ffff:0:0/96. */
 struct proxies {
     struct {
         struct address base;
-        unsigned bits; /* of the prefix, 0 to 128 */
+        unsigned bits; /* length of the prefix, 0 to 128 */
     } net[ADDRESS_PROXIES_MAX];
     size_t count;
     const char *field; /* the one that they set: "X-Forwarded-For" or "Forwarded"; static storage */
@@ -40,11 +40,11 @@ bool proxies_trust(const struct proxies *p, const struct address *a);
 /* text[length]: "10.1.2.3", "10.1.2.3:80", "::1", "[::1]:80". */
 bool address_parse(const char *text, size_t length, struct address *a);
 struct address address_of_socket(const struct sockaddr *from);
-/* As people write it: "10.1.2.3", "2001:db8::1". */
+/* In the usual notation: "10.1.2.3", "2001:db8::1". */
 void address_text(const struct address *a, char text[ADDRESS_TEXT_SIZE]);
 
-/* Where a request with field[count] comes from, whose connection is from `peer`. What a trusted proxy says and is no
- * address counts as the proxy's own. */
+/* The client's address for a request with field[count] on a connection from `peer`. Where a trusted proxy names
+ * something that is not an address, the proxy's own address counts. */
 struct address address_of_request(const struct field *field, size_t count, const struct address *peer,
                                   const struct proxies *p);
 

@@ -6,8 +6,8 @@
 
 #include "common/error.h"
 
-/* Listens at a numeric address. *port, 0 for any free one, becomes the one that it is. *fd, which does not
- * block, is the caller's. STATUS_INPUT: that is no address. */
+/* Listens at a numeric address. *port 0 picks a free port, which *port becomes. *fd is non-blocking and the caller's.
+ * STATUS_INPUT: not an address. */
 enum status bind_listen(int *fd, const char *address, uint16_t *port, struct error *err);
 
 #endif

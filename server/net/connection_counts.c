@@ -6,11 +6,11 @@
 
 #include "common/mem.h"
 
-#define KEPT_SHARE 20 /* one connection in so many is kept for loopback */
+#define KEPT_SHARE 20 /* one connection in 20 is kept for loopback */
 #define KEPT_MIN 2
 
 struct connection_counts {
-    size_t most, of_one; /* of all but loopback; of one address */
+    size_t most, of_one; /* limit for all but loopback; for one address */
     const struct proxies *proxies;
     pthread_mutex_t mutex; /* guards what follows */
     size_t all;            /* connections */
@@ -18,7 +18,7 @@ struct connection_counts {
     struct place {
         struct address from;
         size_t connections;
-    } * place; /* [room], count in use: not more than there are connections, so they are looked through */
+    } * place; /* [room], of which count are in use; few enough for a linear search */
 };
 
 struct connection_counts *connection_counts_new(size_t connection_max, size_t of_one, const struct proxies *proxies) {

@@ -17,7 +17,7 @@ struct connection_counts *connection_counts_new(size_t connection_max, size_t of
 void connection_counts_free(struct connection_counts *c);
 
 enum connection_answer { CONNECTION_OK, CONNECTION_ADDRESS_FULL, CONNECTION_FULL };
-/* One more from there; CONNECTION_OK: it is counted until connection_counts_leave. */
+/* Counts one more connection from that address; after CONNECTION_OK it counts until connection_counts_leave. */
 enum connection_answer connection_counts_enter(struct connection_counts *c, const struct address *from);
 void connection_counts_leave(struct connection_counts *c, const struct address *from);
 

@@ -57,7 +57,7 @@ bool field_is_type(const char *content_type, const char *type) {
     return name == strlen(type) && strncasecmp(content_type, type, name) == 0;
 }
 
-/* Digits from *at on; false when there are none or too many. */
+/* Reads digits from *at on; false when there are none or too many. */
 static bool read_digits(const char **at, uint64_t *value) {
     const char *start = *at;
     *value = 0;
@@ -87,7 +87,7 @@ enum field_range field_range(const char *range, uint64_t size, uint64_t *first, 
     }
     if (at[strspn(at, " \t")] != '\0' || (!has_from && !has_last) || (has_from && has_last && last < from))
         return FIELD_RANGE_WHOLE;
-    if (!has_from) { /* the last so many bytes */
+    if (!has_from) { /* a suffix range: the last bytes */
         if (last == 0 || size == 0)
             return FIELD_RANGE_OUTSIDE;
         *count = last < size ? last : size;
@@ -168,6 +168,6 @@ bool field_is_loopback_host(const char *host, size_t length) {
         return true;
     if (length == 5 && memcmp(host, "[::1]", 5) == 0)
         return true;
-    /* A dotted quad that begins with 127: only digits and dots, so no name can pretend to be one. */
+    /* 127.0.0.0/8: digits and dots only, so that no host name can pass for it */
     return length > 4 && memcmp(host, "127.", 4) == 0 && strspn(host, "0123456789.") >= length;
 }

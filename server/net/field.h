@@ -28,19 +28,19 @@ enum field_range { FIELD_RANGE_WHOLE, FIELD_RANGE_PART, FIELD_RANGE_OUTSIDE };
  * Several ranges, other units and bad syntax mean the whole file (RFC 9110, 14.2). */
 enum field_range field_range(const char *range, uint64_t size, uint64_t *first, uint64_t *count);
 
-/* Reads "sha-256=:base64:" out of a Repr-Digest field (RFC 9530) into 64 hex digits and a NUL;
- * false where it has none or a broken one. */
+/* Reads "sha-256=:base64:" out of a Repr-Digest field (RFC 9530) into 64 hex digits and a NUL; false where it is
+ * absent or malformed. */
 bool field_digest(const char *repr_digest, char hex[65]);
-/* The other way round; `text` holds at least 64 characters. */
+/* The inverse; `text` holds at least 64 characters. */
 void field_digest_format(const char *hex, char text[64]);
 
-/* A decimal number of [minimum, maximum] and nothing else. */
+/* A decimal number in [minimum, maximum] and nothing else. */
 bool field_number(const char *text, int64_t minimum, int64_t maximum, int64_t *value);
 
 bool field_is_sha256(const char *text); /* 64 lower-case hex digits */
 
-/* A Host (or the host of an Origin) without its port is `host`'s first *length bytes; false when
- * the syntax is bad. An IPv6 address keeps its brackets. */
+/* The first *length bytes of `host` are its name without the port; false when the syntax is bad. An IPv6 address
+ * keeps its brackets. `host` is a Host field, or the host of an Origin. */
 bool field_host(const char *host, size_t *length);
 /* True for localhost, *.localhost, 127.0.0.0/8 and [::1]. */
 bool field_is_loopback_host(const char *host, size_t length);

@@ -19,10 +19,10 @@ struct guarded {
     enum guard_phase phase;
     double phase_sec;      /* start of the phase */
     double since_sec;      /* start of the window */
-    uint64_t window_bytes; /* arrived in the window; in GUARD_REPLY: taken before it */
-    bool has_backlog;      /* GUARD_REPLY: there is a window */
+    uint64_t window_bytes; /* bytes that arrived in the window; in GUARD_REPLY: bytes acknowledged before it */
+    bool has_backlog;      /* GUARD_REPLY: a window has begun */
     bool is_shut;
-    double held_sec; /* since when it is held; 0: it is not */
+    double held_sec; /* since when it is held; 0: not held */
     struct guarded *next, *previous;
 };
 
@@ -39,7 +39,7 @@ struct guard {
     pthread_t thread;
 };
 
-/* How many bytes the other side has taken in all; false when none wait for it, or it is no TCP. */
+/* Bytes that the peer has acknowledged in all; false when none are outstanding, or the socket is not TCP. */
 static bool look_at_backlog(int fd, uint64_t *taken) {
     struct tcp_info info = {0};
     socklen_t size = sizeof info;
@@ -116,7 +116,7 @@ static void *run(void *user) {
         clock_gettime(CLOCK_MONOTONIC, &until);
         until.tv_sec++;
         while (!g->stopping && pthread_cond_timedwait(&g->changed, &g->mutex, &until) == 0)
-            ; /* another connection came or went: the second still runs */
+            ; /* woken by a connection that came or went: the second is not over */
         pthread_mutex_unlock(&g->mutex);
         guard_look(g, clock_sec());
         if (g->tick)

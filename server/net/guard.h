@@ -30,8 +30,8 @@ enum guard_phase { GUARD_HEAD, GUARD_BODY, GUARD_SHORT_BODY, GUARD_REPLY, GUARD_
 struct guard;   /* opaque; thread-safe */
 struct guarded; /* one connection; opaque */
 
-/* Starts a thread that looks once a second while there are connections, and then calls
- * tick(user) too; it sleeps while there are none. */
+/* Starts a thread that checks all connections once a second, and then calls tick(user). It sleeps while there are
+ * none. */
 enum status guard_new(struct guard **g, const struct guard_limits *limits, void (*tick)(void *user), void *user,
                       struct error *err);
 /* Stops the thread. All connections must be gone. */
@@ -40,19 +40,18 @@ void guard_free(struct guard *g);
 struct guarded *guard_add(struct guard *g, int fd);
 void guard_remove(struct guard *g, struct guarded *c);
 void guard_enter(struct guard *g, struct guarded *c, enum guard_phase phase);
-/* While it is held, what the other side does not do is not its fault: its phase goes on afterwards as if no time had
- * passed. guard_enter ends it, too. */
+/* While a connection is held, its deadlines stand still: the delay is ours. guard_enter ends the hold. */
 void guard_hold(struct guard *g, struct guarded *c, bool is_held);
-void guard_body(struct guard *g, struct guarded *c, size_t bytes); /* arrived just now */
+void guard_body(struct guard *g, struct guarded *c, size_t bytes); /* bytes of a body have arrived */
 
-/* What the other side has not taken of a reply is not kept in the kernel for minutes after the
- * connection is closed. By the thread that serves it. */
+/* Drops what the peer has not acknowledged when the connection is closed; the kernel would keep it for minutes.
+ * Called by the thread that serves it. */
 void guard_discard_unsent(struct guarded *c);
 
 size_t guard_count(struct guard *g);        /* connections */
-uint64_t guard_shut_count(struct guard *g); /* shut down for being late, ever */
+uint64_t guard_shut_count(struct guard *g); /* connections ever shut down for being late */
 
-/* One look at all connections as of `now_sec` (CLOCK_MONOTONIC); the thread's step, for tests. */
+/* Checks all connections as of `now_sec` (CLOCK_MONOTONIC). The thread's step; for tests. */
 void guard_look(struct guard *g, double now_sec);
 
 #endif

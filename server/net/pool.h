@@ -7,16 +7,16 @@
 #include "common/error.h"
 
 struct task {
-    void (*run)(struct task *task); /* may free the task, or give it to a pool again */
-    struct task *next;              /* the pool's */
+    void (*run)(struct task *task); /* may free the task, or queue it again */
+    struct task *next;              /* the pool's own */
 };
 
 struct pool; /* opaque; thread-safe */
 
-/* `name`, of at most 15 bytes, is that of the threads. */
+/* `name` is the threads' name, at most 15 bytes. */
 enum status pool_new(struct pool **p, const char *name, size_t thread_count, struct error *err);
-void pool_give(struct pool *p, struct task *task); /* borrowed until it has run; never waits */
-/* What was given is done first, also what that gives. NULL is fine. */
+void pool_give(struct pool *p, struct task *task); /* borrowed until it has run; never blocks */
+/* Runs all queued tasks first, and those that they queue. NULL is allowed. */
 void pool_free(struct pool *p);
 
 #endif

@@ -19,8 +19,7 @@ static int hex_digit(char c) {
     return -1;
 }
 
-/* Decodes text[length] into a string of the caller's; NULL for a broken escape, a control byte or
- * what is not UTF-8. */
+/* Decodes text[length] into a new string; NULL for a broken escape, a control byte or invalid UTF-8. */
 static char *decode(const char *text, size_t length, int plus_is_space) {
     char *out = mem_alloc(length + 1);
     size_t used = 0;
@@ -111,7 +110,7 @@ static enum status parse_query(struct target *t, const char *query, struct error
     return STATUS_OK;
 }
 
-/* Takes scheme and authority off an absolute form ("http://host:80/path"); what follows, or raw. */
+/* Strips scheme and authority from an absolute form ("http://host:80/path"); returns the rest, or raw. */
 static const char *take_authority(struct target *t, const char *raw) {
     size_t scheme = strncasecmp(raw, "http://", 7) == 0 ? 7 : strncasecmp(raw, "https://", 8) == 0 ? 8 : 0;
     if (scheme == 0)
@@ -128,7 +127,7 @@ enum status target_parse(struct target *t, const char *raw, struct error *err) {
     /* An absolute form may have no path (RFC 9110, 4.2.3). */
     t->path = t->authority && path_length == 0 ? mem_strdup("/") : mem_strndup(raw, path_length);
     for (char *at = t->path; *at; at++)
-        if (*at <= 0x20 || *at >= 0x7f) /* negative, too: for logs and replies */
+        if (*at <= 0x20 || *at >= 0x7f) /* negative values too; the text goes into logs and replies */
             *at = '?';
     for (const char *at = raw; *at; at++)
         if (*at <= 0x20 || *at >= 0x7f)

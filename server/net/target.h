@@ -16,8 +16,8 @@
 #define TARGET_QUERY_MAX 16
 
 struct target {
-    char *authority; /* of an absolute form, "host:port", not yet checked: it takes the place of Host; owned; or NULL */
-    char *path;      /* as sent, without the query, '?' for what no URL may have; owned */
+    char *authority; /* of an absolute form, "host:port", unchecked; overrides Host; owned; or NULL */
+    char *path;      /* as sent, without the query; '?' for bytes that no URL may have; owned */
     char *segments[TARGET_SEGMENTS_MAX]; /* decoded; owned; none for "/" */
     size_t segment_count;
     char *names[TARGET_QUERY_MAX], *values[TARGET_QUERY_MAX]; /* decoded query; owned */
@@ -34,8 +34,7 @@ const char *target_query(const struct target *t, const char *name);
 /* The segments from `first` on, joined by slashes; the caller's (mem_free). */
 char *target_rest(const struct target *t, size_t first);
 
-/* `text` with all but unreserved characters percent-encoded; slashes stay where `keep_slash`.
- * The caller's (mem_free). */
+/* `text` with all but unreserved characters percent-encoded; slashes too unless keep_slash. The caller's (mem_free). */
 char *target_encode(const char *text, int keep_slash);
 
 #endif

@@ -13,8 +13,8 @@
 #define CHAIN_MAX 16
 #define FILE_MAX_BYTES ((size_t)1 << 20)
 
-/* A certificate as it was read once. A handshake that has begun goes on with what it was given,
- * so older ones are kept until the end: there is one for each SIGHUP. */
+/* A certificate and key as read once. Handshakes may still use an older pair, so all are kept until the end; each
+ * SIGHUP adds one. */
 struct pair {
     gnutls_pcert_st chain[CHAIN_MAX];
     unsigned count;
@@ -27,7 +27,7 @@ struct tls {
     _Atomic(struct pair *) newest;
 };
 
-static _Atomic(struct tls *) current; /* the callback below is told nothing else */
+static _Atomic(struct tls *) current; /* libmicrohttpd's callback has no user pointer */
 
 static enum status failed(int code, const char *file, struct error *err) {
     return error_set(err, STATUS_INPUT, "%s: %s", file, gnutls_strerror(code));
@@ -42,7 +42,7 @@ static enum status read_file(const char *path, gnutls_datum_t *datum, struct buf
     return status;
 }
 
-/* GnuTLS looks whether a key belongs to a certificate only when it makes credentials of them. */
+/* GnuTLS checks that key and certificate belong together only when it makes credentials of them. */
 static enum status check_match(const struct tls *tls, const gnutls_datum_t *chain, const gnutls_datum_t *key,
                                struct error *err) {
     gnutls_certificate_credentials_t credentials;
@@ -152,7 +152,7 @@ static int give_certificate(gnutls_session_t session, const gnutls_datum_t *auth
 void *tls_certificate_callback(void) { return (void *)give_certificate; }
 
 void tls_send(void *session, const void *data, size_t length) {
-    /* A few hundred bytes; where they do not fit the socket, nobody reads. */
+    /* A few hundred bytes fit into the socket's buffer unless the client does not read. */
     (void)!gnutls_record_send(session, data, length);
 }
 

@@ -10,7 +10,7 @@
 
 #include "common/error.h"
 
-/* In GnuTLS's words. Of TLS 1.2 only what has forward secrecy: no static RSA, and no SHA-1, as a MAC or in a signature. */
+/* A GnuTLS priority string. TLS 1.2 only with forward secrecy: no static RSA, and no SHA-1 in MACs or signatures. */
 #define TLS_PRIORITIES                                                                                                 \
     "NORMAL:-VERS-ALL:+VERS-TLS1.3:+VERS-TLS1.2:-RSA:-SHA1:-SIGN-RSA-SHA1:-SIGN-DSA-SHA1:-SIGN-ECDSA-SHA1"
 
@@ -18,14 +18,13 @@ struct tls; /* opaque */
 
 /* PEM files: a chain, the server's certificate first, and its key. */
 enum status tls_new(struct tls **tls, const char *certificate_file, const char *key_file, struct error *err);
-/* Reads the files again; connections that begin from now on get what they hold. On an error, what
- * was there before stays. */
+/* Reads the files again, for connections that begin from now on. On an error the old certificate stays in use. */
 enum status tls_reload(struct tls *tls, struct error *err);
-void tls_free(struct tls *tls); /* NULL is fine; no connection is left */
+void tls_free(struct tls *tls); /* NULL is allowed; no connection may be left */
 
-/* What libmicrohttpd takes as MHD_OPTION_HTTPS_CERT_CALLBACK. */
+/* The value for MHD_OPTION_HTTPS_CERT_CALLBACK. */
 void *tls_certificate_callback(void);
-/* Writes into a connection's session what is no part of a reply; as many bytes as go at once. */
+/* Writes into a connection's session, past libmicrohttpd; sends only what fits at once. */
 void tls_send(void *session, const void *data, size_t length);
 
 /* Days until the file's first certificate expires (negative: days since), for `unbaked doctor`. */
