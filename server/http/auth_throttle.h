@@ -1,8 +1,8 @@
 /* auth_throttle.h -- how often an address may present wrong tokens.
  *
- * A token bucket for each address: AUTH_THROTTLE_BURST failures, refilled at AUTH_THROTTLE_PER_SEC. A failure beyond it is
- * answered with 429 and the end of the connection, and not logged. Tokens are 192 random bits, which nobody guesses at any
- * rate: the limit keeps such attempts from filling the log and loading the store. A valid token is always accepted, so
+ * A token bucket for each address: AUTH_THROTTLE_BURST failures, refilled at AUTH_THROTTLE_PER_SEC. Further failures
+ * get 429, are not logged, and cost the connection. Tokens are 192 random bits, which cannot be guessed at any rate:
+ * the limit keeps such attempts from filling the log and loading the store. A valid token is always accepted, so
  * nobody behind the same address (a proxy that is not trusted, a lab's gateway) can lock the others out.
  *
  * An IPv6 address stands for its /64, which is one customer's. Memory is bounded: the address with most room left makes

@@ -14,8 +14,8 @@
 #include "server/job/memory.h"
 #include "server/job/oom.h"
 
-#define EVENTS_MAX 500000      /* of one attempt; at 2 a second, which is much, of three days */
-#define CHECK_LIMIT_SEC 3600.0 /* a scene's check that takes longer is taken for stuck */
+#define EVENTS_MAX 500000      /* of one attempt: three days at 2 a second, which is a lot */
+#define CHECK_LIMIT_SEC 3600.0 /* a scene's check that takes longer is considered stuck */
 
 static enum status write_order(const char *dir, cJSON *order, struct error *err) {
     char *text = json_text(order), *path = layout_order(dir);
@@ -25,7 +25,7 @@ static enum status write_order(const char *dir, cJSON *order, struct error *err)
     return status;
 }
 
-/* The members that both kinds of order have. */
+/* The members that orders for jobs and for checks share. */
 static cJSON *new_order(const char *kind, const struct scheduler_config *config, int thread_count) {
     cJSON *order = cJSON_CreateObject();
     json_add_string(order, "kind", kind);
@@ -112,7 +112,7 @@ static enum status check_scene(struct store *store, const struct job *job, struc
     return status;
 }
 
-/* What a retry from a stage asks for; done before the process starts, so it is done once. */
+/* Carries out a retry from a stage, before the process starts and therefore once. */
 static enum status restart(struct attempt *a, struct store *store, const struct job *job, struct error *err) {
     bool keeps_checkpoint;
     if (!job->restart_from[0])
@@ -123,7 +123,7 @@ static enum status restart(struct attempt *a, struct store *store, const struct 
     return status == STATUS_OK ? store_job_restarted(store, job->id, a->number, err) : status;
 }
 
-/* Enters that an attempt could not even begin. */
+/* Records that an attempt could not even start. */
 static enum status enter_false_start(struct store *store, int64_t job_id, int number, const struct error *why,
                                      struct error *err) {
     switch (why->status) {
@@ -134,7 +134,7 @@ static enum status enter_false_start(struct store *store, int64_t job_id, int nu
     case STATUS_LIMIT:
         return store_job_block(store, job_id, number, why->message,
                                "Delete jobs or scenes that you do not need, then resume the job.", err);
-    default: { /* the machine is at fault: it costs the job nothing, but must not be hurried */
+    default: { /* The machine is at fault: the job loses no attempt, and is not retried at once. */
         enum status status = store_job_stop(store, job_id, number, why->message, err);
         if (status == STATUS_OK && err)
             *err = *why;
@@ -151,7 +151,7 @@ enum status attempt_start_job(struct attempt *a, const struct scheduler_config *
     int number;
     enum status status = store_job_start(store, job_id, &number, err);
     if (status == STATUS_CONFLICT || status == STATUS_NOT_FOUND)
-        return STATUS_OK; /* its user was faster: paused, cancelled, deleted */
+        return STATUS_OK; /* meanwhile a user has paused, cancelled or deleted it */
     if (status != STATUS_OK)
         return status;
     *a = (struct attempt){.job_id = job_id,
@@ -173,7 +173,7 @@ enum status attempt_start_job(struct attempt *a, const struct scheduler_config *
         a->oom_kills = oom_kills("");
         status = check_scene(store, &job, &scene, &why);
     }
-    if (status == STATUS_OK) /* what it has written itself does not stop a job that has begun */
+    if (status == STATUS_OK) /* a full disk does not stop a job whose own files fill it */
         status = store_share_check(store, &(struct share){config->user_max_bytes, job.owner_id, NULL, job_id}, 0, &why);
     if (status == STATUS_OK)
         status = restart(a, store, &job, &why);
@@ -226,7 +226,7 @@ enum status attempt_start_check(struct attempt *a, const struct scheduler_config
         log_info("scene %.12s: checked by process %d", scene_id, (int)a->worker.pid);
         return STATUS_OK;
     }
-    /* It stays in `checking`: the scheduler tries again in a while. */
+    /* The scene stays in `checking`; the scheduler retries later. */
     attempt_empty(a);
     if (err)
         *err = why;
@@ -237,7 +237,7 @@ void attempt_charge(struct attempt *a, struct store *store, struct counters *cou
     double used = supervisor_cpu_sec(&a->worker), more = used - a->charged_sec;
     if (!a->job_id || !(more > 0.0))
         return;
-    (void)store_usage_add(store, a->owner_id, more, NULL); /* keeps what it cannot enter */
+    (void)store_usage_add(store, a->owner_id, more, NULL); /* a failed charge is kept for later */
     atomic_fetch_add(&counters->cpu_ms, (unsigned long long)(more * 1e3));
     a->charged_sec = used;
 }

@@ -22,9 +22,9 @@ enum attempt_phase { ATTEMPT_EMPTY, ATTEMPT_ALIVE, ATTEMPT_ENDED };
 struct attempt {
     enum attempt_phase phase;
     int64_t job_id;     /* 0: the check of a scene */
-    int64_t owner_id;   /* whose job or scene it is */
-    double charged_sec; /* CPU time that was entered for that user */
-    int number;         /* fences what is entered for the job */
+    int64_t owner_id;   /* the owner of the job or scene */
+    double charged_sec; /* CPU time that was charged to that user */
+    int number;         /* fences what is written for the job */
     char scene_id[SCENE_ID_SIZE];
     char *reading;           /* with which a scene is checked, JSON; owned; NULL for a job */
     uint64_t user_max_bytes; /* as scheduler_config has it, for the check of a scene */
@@ -32,39 +32,38 @@ struct attempt {
     struct worker worker;
     int wait_status;                /* when ended */
     bool stopping;                  /* it was asked to stop */
-    bool killed;                    /* by us */
+    bool killed;                    /* by this daemon */
     double kill_at_sec;             /* as clock_sec; 0: never */
-    char *settings;                 /* of the job, as asked for; owned; NULL for a check */
-    int thread_count, memory_step;  /* what it was to have, and how often that was made smaller */
-    uint64_t oom_kills;             /* before it started */
-    long event_count, event_max;    /* what it has reported; after how much of that it is thinned */
-    double thinned_at;              /* when something was entered last since then, as clock_sec */
-    bool said_thinned, said_unread; /* the job's events, and the log, say so */
-    double iteration, rays;         /* the newest that it reported; negative iteration: none yet */
-    bool complained;                /* a report could not be entered, and the log says so */
-    /* What it said of itself. */
+    char *settings;                 /* the job's, as submitted; owned; NULL for a check */
+    int thread_count, memory_step;  /* as ordered, and how often that was reduced */
+    uint64_t oom_kills;             /* the machine's count before the attempt started */
+    long event_count, event_max;    /* reports so far; above event_max they are thinned */
+    double thinned_at;              /* when the last thinned report was entered, as clock_sec */
+    bool said_thinned, said_unread; /* an event, and a line of the log, say so */
+    double iteration, rays;         /* the newest values reported; negative iteration: none yet */
+    bool complained;                /* the log says that a report could not be entered */
+    /* Reported by the worker: */
     bool has_end;
     enum status end_status;
     char *end_message, *end_hint;
     cJSON *problems, *facts; /* of a scene */
-    long problems_left_out;  /* more of them than are kept */
+    long problems_left_out;  /* problems beyond the number that is kept */
     cJSON *untaken;          /* announced files that are still to be entered; NULL: none */
-    cJSON *late_progress;    /* the newest, where that is still to be entered; NULL: none */
+    cJSON *late_progress;    /* the newest, if it is still to be entered; NULL: none */
 };
 
-/* Starts the job, which is queued in the store. STATUS_OK: it has left the queue, and the attempt
- * is alive or (the input is at fault, the disk is full, the user was faster) still empty. Else
- * the job is in the queue again and it is of no use to try at once. */
+/* Starts a job that is queued in the store. STATUS_OK: it has left the queue; the attempt is alive or, where the
+ * input is at fault, the disk is full or a user was faster, still empty. Otherwise the job is queued again and an
+ * immediate retry is pointless. */
 enum status attempt_start_job(struct attempt *a, const struct scheduler_config *config, struct store *store,
                               struct counters *counters, int64_t job_id, int thread_count, struct error *err);
 /* Starts the check of a scene, which is in `checking` and stays there if this fails. */
 enum status attempt_start_check(struct attempt *a, const struct scheduler_config *config, struct store *store,
                                 const struct unchecked *scene, int thread_count, struct error *err);
 
-/* Enters the CPU time since the last call for the job's owner. Where the store fails, it keeps it and enters
- * it later. */
+/* Charges the CPU time since the last call to the owner. Where the store fails, the time is kept and charged later. */
 void attempt_charge(struct attempt *a, struct store *store, struct counters *counters);
 
-void attempt_empty(struct attempt *a); /* forgets all of it */
+void attempt_empty(struct attempt *a); /* forgets everything */
 
 #endif

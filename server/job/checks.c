@@ -6,7 +6,7 @@
 
 #include "common/mem.h"
 
-/* When a check of that user began last; 0: long ago. */
+/* The clock when a check of that user last began; 0: long ago. */
 static uint64_t begun(const struct checks *c, int64_t owner_id) {
     for (size_t i = 0; i < c->count; i++)
         if (c->last[i].owner_id == owner_id)
@@ -20,7 +20,7 @@ static void note(struct checks *c, int64_t owner_id) {
         at++;
     if (at == c->count && c->count < CHECKS_USERS)
         c->count++;
-    else if (at == c->count) { /* forget who had his turn the longest ago */
+    else if (at == c->count) { /* Forget the user whose turn is longest past. */
         at = 0;
         for (size_t i = 1; i < c->count; i++)
             at = c->last[i].begun < c->last[at].begun ? i : at;
@@ -29,7 +29,7 @@ static void note(struct checks *c, int64_t owner_id) {
     c->last[at].begun = ++c->clock;
 }
 
-/* Of list[count], the one whose turn it is; NULL: nobody may have one more. busy[busy_count] are being checked, in
+/* Chooses from list[count] the scene to check next; NULL: none may start. busy[busy_count] are being checked, in
  * `slots` slots. */
 static const struct unchecked *choose(const struct checks *c, const struct unchecked *list, size_t count,
                                       const struct unchecked *busy, size_t busy_count, size_t slots) {

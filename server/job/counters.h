@@ -1,6 +1,4 @@
-/* counters.h -- what has been done since the daemon started: counters that only grow, for /metrics.
- *
- * Written by the scheduler's thread, read by any. */
+/* counters.h -- counters since the daemon started, for /metrics. Written by the scheduler's thread, read by any. */
 #ifndef UNBAKE_JOB_COUNTERS_H
 #define UNBAKE_JOB_COUNTERS_H
 
@@ -13,13 +11,13 @@ enum attempt_end {
     END_CRASHED,
     END_MEMORY,  /* it ran out of memory */
     END_STOPPED, /* paused, cancelled, or the daemon stopped */
-    END_DISK,    /* it cannot go on until there is room on the disk */
+    END_DISK,    /* blocked until there is disk space */
     END_COUNT
 };
 
 struct counters {
     atomic_ullong ends[END_COUNT];
-    atomic_ullong first_start_count, first_wait_ms; /* jobs' first attempts, and how long they waited */
+    atomic_ullong first_start_count, first_wait_ms; /* jobs' first attempts, and how long they were queued */
     atomic_ullong iteration_count, ray_count;
     atomic_ullong checkpoint_count, checkpoint_us, checkpoint_bytes;
     atomic_ullong cpu_ms; /* of workers */

@@ -15,11 +15,11 @@
 #include "server/data/layout.h"
 #include "server/worker/progress.h"
 
-/* Who did not answer in time has less of it the next time: others wait for their turns. */
+/* Every receiver that timed out has less time at the next try: others wait for their turns. */
 #define LIMIT_SEC 20.0
 #define LIMIT_AGAIN_SEC 10.0
 
-/* Its process is gone, and so is what it was given. */
+/* Cleans up after the process: its pipe and its order. */
 static void clear_away(struct delivery *d) {
     struct error err;
     supervisor_release(&d->worker);
@@ -65,7 +65,7 @@ enum status delivery_start(struct delivery *d, const struct scheduler_config *co
     return status;
 }
 
-/* The lines that say what was answered, and how it ended. */
+/* Reads the lines with the HTTP status and with how it ended. */
 static void take_line(void *user, const char *text, size_t length) {
     struct delivery *d = user;
     const char *type, *message, *word;
@@ -84,7 +84,7 @@ static void take_line(void *user, const char *text, size_t length) {
     cJSON_Delete(line);
 }
 
-/* Enters what became of it. */
+/* Enters the outcome in the store. */
 static bool settle(struct delivery *d, struct store *store) {
     struct error err;
     bool gave_up;

@@ -18,20 +18,20 @@ struct delivery {
     double kill_at_sec;
     struct worker worker;
     char *dir;
-    char reason[256];          /* why it failed, by its own words */
+    char reason[256];          /* why it failed, as the process reports */
     int64_t owner_id;          /* of the job */
-    int status;                /* that was answered; 0: none */
-    bool is_final;             /* it said that another try would end like this one */
-    bool has_ended, delivered; /* its process; the message, then */
-    bool complained;           /* that could not be entered, and the log says so */
+    int status;                /* that the receiver answered with; 0: none */
+    bool is_final;             /* the process says that another try would end the same way */
+    bool has_ended, delivered; /* the process has ended; the message was delivered */
+    bool complained;           /* the log says that the outcome could not be entered */
 };
 
-/* Starts the message of that row. */
+/* Starts delivering that message. */
 enum status delivery_start(struct delivery *d, const struct scheduler_config *config, const struct outbox_row *row,
                            struct error *err);
-/* Notices its end, or brings it about, and enters it. True when it is empty again. */
+/* Reads from the process, ends it when its time is up, and enters the outcome. True when the slot is empty again. */
 bool delivery_listen(struct delivery *d, struct store *store);
-/* Ends it; it is empty then. */
+/* Ends the process and empties the slot. */
 void delivery_stop(struct delivery *d, struct store *store);
 
 #endif

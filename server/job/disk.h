@@ -13,16 +13,16 @@
 struct disk_watch {
     uint64_t low_bytes; /* 0: never low */
     bool is_low;
-    bool was_seen;    /* it was looked at once */
+    bool was_seen;    /* has been measured once */
     double looked_at; /* as clock_sec */
-    char reason[128]; /* for jobs that wait; the same text as long as low_bytes is the same */
+    char reason[128]; /* for jobs that wait; depends on low_bytes only */
 };
 
-#define DISK_REASON "the disk is nearly full" /* how every such reason begins */
+#define DISK_REASON "the disk is nearly full" /* the beginning of every such reason */
 #define DISK_HINT "It goes on by itself when there is room: delete jobs or scenes that nobody needs."
 
 void disk_init(struct disk_watch *w, uint64_t low_bytes);
-/* Looks at most every DISK_LOOK_SEC. True when is_low has changed, and the first time. */
+/* Measures at most every DISK_LOOK_SEC. True when is_low has changed, and the first time. */
 bool disk_check(struct disk_watch *w, const char *dir);
 
 #endif

@@ -15,8 +15,7 @@
 #include "server/job/measure.h"
 
 enum status housekeeping_drop_checkpoint(const char *dir, struct error *err) {
-    /* The journal first: what is left of the two is looked for by the other's name, and a journal must not meet a
-     * database that is not its own. */
+    /* The journal first: files are found by the database's name, and a journal must never meet another database. */
     char *journal = layout_checkpoint_journal(dir), *checkpoint = layout_checkpoint(dir);
     enum status status = file_remove_tree(journal, err);
     if (status == STATUS_OK)
@@ -26,7 +25,7 @@ enum status housekeeping_drop_checkpoint(const char *dir, struct error *err) {
     return status;
 }
 
-/* As file_replace calls a file until it is whole, and whoever uses file_put_in_place. */
+/* Temporary names as file_replace and file_put_in_place make them. */
 static bool is_temporary(const char *name) {
     static const char part[] = ".part", temporary[] = ".tmp-";
     size_t length = strlen(name), random = 6;
@@ -81,8 +80,8 @@ void housekeeping_after_kill(const struct scheduler_config *config, struct store
     }
 }
 
-/* Whatever ends it half way, the next start measures what is left. Where not even that can be entered, the disk may be
- * full: all the more it goes. */
+/* If this is interrupted, the next start measures what is left. The checkpoint goes even where that cannot be
+ * entered: the disk may be full. */
 static enum status drop_checkpoint(struct store *store, int64_t id, const char *folder, struct error *err) {
     const struct disk_use unknown = {.job_id = id, .bytes = -1};
     if (store_disk_enter(store, &unknown, 1, err) != STATUS_OK)
@@ -91,7 +90,7 @@ static enum status drop_checkpoint(struct store *store, int64_t id, const char *
     return status == STATUS_OK ? measure_job(store, id, folder, err) : status;
 }
 
-/* A job in doubt keeps what it has. */
+/* When in doubt, a job keeps its checkpoint. */
 static bool is_old(struct store *store, int64_t id, int64_t before_ms) {
     struct job job;
     if (store_job_get(store, id, &job, NULL) != STATUS_OK)

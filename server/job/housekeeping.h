@@ -1,20 +1,19 @@
-/* housekeeping.h -- what is of no use any more, removed by the scheduler: what time alone makes superfluous,
- * now and then, and what a process that was killed left. */
+/* housekeeping.h -- removes what is no longer needed: old checkpoints and events, now and then, and leftovers of
+ * killed processes. */
 #ifndef UNBAKE_JOB_HOUSEKEEPING_H
 #define UNBAKE_JOB_HOUSEKEEPING_H
 
 #include "server/job/scheduler_config.h"
 #include "server/store/store.h"
 
-/* Removes the checkpoints of jobs that succeeded longer than checkpoint_keep_sec ago (those of all
- * others stay, since a retry goes on from them) and the events of jobs that ended longer than
- * event_keep_sec ago. Failures are logged. */
+/* Removes the checkpoints of jobs that succeeded more than checkpoint_keep_sec ago (all others stay: a retry
+ * continues from them) and the events of jobs that ended more than event_keep_sec ago. Failures are logged. */
 void housekeeping_run(const struct scheduler_config *config, struct store *store);
 
-/* Removes what a killed process was writing in the folder of a job or scene, and in its outputs: files that
- * had not got their names yet (common/file.h). Nobody works there any more. Failures are logged. */
+/* Removes unfinished files (common/file.h) of a killed process from the folder of a job or scene, and from its
+ * outputs. No process may be working there. Failures are logged. */
 void housekeeping_drop_temporary(const char *dir);
-/* The same for all jobs that the store says run, though none does: after the daemon was killed. */
+/* The same for all jobs that the store has as running while none is: after the daemon was killed. */
 void housekeeping_after_kill(const struct scheduler_config *config, struct store *store);
 
 /* Removes DIR's checkpoint. */

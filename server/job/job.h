@@ -39,11 +39,11 @@ const char *job_wanted_name(enum job_wanted wanted); /* "run", "pause", "cancel"
 const char *scene_state_name(enum scene_state state);
 bool scene_state_parse(const char *name, enum scene_state *state);
 bool job_is_terminal(enum job_state state);
-/* The arrows of the diagram above. */
+/* Whether the diagram above has an arrow between the states. */
 bool job_may_become(enum job_state from, enum job_state to);
 
-/* The stages that a retry can begin with, and whether one keeps the checkpoint: what comes before
- * the end of the optimisation is done anew from the start of it. */
+/* The stages that a retry may begin with. *keeps_checkpoint: for a stage before the end of the optimisation, it
+ * starts over without one. */
 bool job_stage_parse(const char *name, bool *keeps_checkpoint);
 
 #define SCENE_ID_SIZE 65 /* the SHA-256 of the uploaded content, in hex, and the NUL */
@@ -51,9 +51,9 @@ bool job_stage_parse(const char *name, bool *keeps_checkpoint);
 /* A row of the jobs table. Strings are owned; job_release frees them. */
 struct job {
     int64_t id;
-    int64_t revision; /* grows by one with every change; the ETag */
+    int64_t revision; /* grows by one with every change; in the ETag */
     char scene_id[SCENE_ID_SIZE];
-    int64_t owner_id; /* the user who made it; 0: nobody */
+    int64_t owner_id; /* the user who submitted it; 0: nobody */
     char *owner;      /* that user's name; "" */
     bool is_shared;   /* with the lab: every caller may read it */
     char *name;
@@ -63,21 +63,21 @@ struct job {
     int64_t turn;   /* among jobs of one priority: smaller first */
     enum job_state state;
     enum job_wanted wanted;
-    int attempt; /* of the present or last run; 0 before the first */
+    int attempt; /* of the current or last run; 0 before the first */
     int attempts_left;
     int64_t created_ms, started_ms, finished_ms; /* Unix time, 0: not yet */
     char *stage;                                 /* last reported; "" before */
-    char *restart_from;                          /* the stage that the next attempt begins with; "": where it was */
-    int memory_step;                             /* how often its working set was made smaller; see job/memory.h */
+    char *restart_from; /* the stage that the next attempt begins with; "": where the last one stopped */
+    int memory_step;    /* how often its working set was reduced; see job/memory.h */
     bool is_pinned;
     int64_t expires_ms; /* Unix time as of now, 0: never; see store/retention.h */
-    int64_t disk_bytes; /* that its folder takes, as of the end of its last attempt; -1: not known */
+    int64_t disk_bytes; /* size of its folder at the end of its last attempt; -1: unknown */
     double progress;    /* 0..1, of the stage */
     double eta_sec;     /* negative: unknown */
-    char *delivery;     /* what became of its messages: JSON object text; "": it has no webhook */
-    char *webhook;      /* the URL that is told of its states; "": none */
+    char *delivery;     /* outcome of its messages: JSON object text; "": it has no webhook */
+    char *webhook;      /* the URL that is told its states; "": none */
     char *reason;       /* why it failed or is paused, in plain words; "" if not */
-    char *hint;         /* what to do about it; "" if nothing is known */
+    char *hint;         /* what to do about it; "" if unknown */
 };
 
 void job_release(struct job *job);

@@ -6,7 +6,7 @@
 #include "common/mem.h"
 #include "server/data/layout.h"
 
-#define AT_ONCE 64 /* entered in one transaction */
+#define AT_ONCE 64 /* rows entered in one transaction */
 
 int64_t measure_folder(const char *dir) {
     struct error err;
@@ -32,7 +32,7 @@ void measure_unknown(const struct scheduler_config *config, struct store *store)
     struct disk_use list[AT_ONCE];
     struct error err;
     enum status status;
-    size_t count, failed = 0; /* these come first in the list, and are skipped */
+    size_t count, failed = 0; /* the failed ones come first in the list, and are skipped */
     do {
         status = store_disk_unknown(store, failed, AT_ONCE, list, &count, &err);
         for (size_t i = 0; i < count; i++) {

@@ -14,7 +14,7 @@ static double halved(double value, int times, double least) {
     return value;
 }
 
-/* Replaces one setting where `smaller` is. */
+/* Replaces one setting if `smaller` is smaller. */
 static void replace(cJSON *settings, const char *name, double present, double smaller, struct buf *what) {
     if (smaller >= present)
         return;

@@ -1,20 +1,19 @@
-/* memory.h -- the smaller working set of an attempt that follows one which ran out of memory.
+/* memory.h -- a smaller working set for the attempt after one that ran out of memory.
  *
- * Step 0 is what was asked for. Each step halves the threads and quarters the texels of an
- * iteration, which goes on from the checkpoint; the second step and all after it also halve the
- * textures, which begins anew. The result differs from what the settings alone would give: the
- * job's events and its report say what was made smaller. */
+ * Step 0 is what was submitted. Each step halves the threads and quarters the texels of an iteration; such an attempt
+ * resumes from the checkpoint. From step 2 on the textures are halved too, and the attempt starts over. The result
+ * differs from that of the settings as submitted: the job's events and its report say what was reduced. */
 #ifndef UNBAKE_JOB_MEMORY_H
 #define UNBAKE_JOB_MEMORY_H
 
 #include "common/buf.h"
 #include "common/json.h"
 
-/* A copy of the job's settings, and its threads, as step `step` has them. Appends what is smaller
- * to *what, for people: "1 thread, texels_per_iteration 1024"; nothing where nothing is. */
+/* A copy of the job's settings, and its threads, after `step` reductions. Appends to *what, for people, what is
+ * smaller: "1 thread, texels_per_iteration 1024"; nothing if nothing is. */
 cJSON *memory_reduce(const cJSON *settings, int step, int *thread_count, struct buf *what);
 
-/* Whether step + 1 is smaller than step; then *what (appended to) is how. */
+/* Whether another reduction is possible; *what (appended to) describes it. */
 bool memory_can_reduce(const cJSON *settings, int step, int thread_count, struct buf *what);
 
 #endif

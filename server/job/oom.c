@@ -1,6 +1,6 @@
-/* oom.c -- see oom.h. A service may not see /proc/vmstat (ProcSubset=pid of its systemd unit), but sees its own
- * cgroup; and what is killed elsewhere on the machine is no matter of its workers. Both kinds of cgroup count kills for
- * the group's own limit and for want of memory of the whole machine, before the process gets its signal. */
+/* oom.c -- see oom.h. A service may not see /proc/vmstat (ProcSubset=pid in its systemd unit) but sees its own
+ * cgroup; and kills elsewhere on the machine are irrelevant to its workers. Both cgroup versions count kills, for the
+ * group's own limit and for the machine's, before the process gets its signal. */
 #include "server/job/oom.h"
 
 #include <stdbool.h>
@@ -26,8 +26,8 @@ static bool read_count(const char *root, const char *folder, const char *name, u
     return found;
 }
 
-/* By a line of /proc/self/cgroup, "0::/a/b" (version 2) or "4:memory:/a/b" (version 1). In a container the path may be
- * one of the host's: then what is mounted is the container's own group. */
+/* From a line of /proc/self/cgroup, "0::/a/b" (version 2) or "4:memory:/a/b" (version 1). In a container the path may
+ * be the host's; then the container's own group is mounted at the root. */
 static bool read_group(const char *root, char *line, uint64_t *count) {
     line[strcspn(line, "\n")] = '\0';
     char *controllers = strchr(line, ':'), *path = controllers ? strchr(controllers + 1, ':') : NULL;

@@ -24,7 +24,7 @@ enum outcome {
     OUTCOME_OK,
     OUTCOME_INPUT,
     OUTCOME_CRASH,
-    OUTCOME_MEMORY, /* a crash that a smaller working set may mend */
+    OUTCOME_MEMORY, /* a crash that a smaller working set may avoid */
     OUTCOME_STOPPED,
     OUTCOME_BLOCKED
 };
@@ -98,12 +98,12 @@ static void judge(const struct attempt *a, struct verdict *v) {
         judge_exit(a, v);
     else
         judge_signal(a, v);
-    /* We wanted it to end: how it did is of no interest. */
+    /* The process was asked to stop: how it ended does not matter. */
     if ((v->outcome == OUTCOME_CRASH || v->outcome == OUTCOME_MEMORY) && a->stopping)
         say(v, OUTCOME_STOPPED, "", "");
     if (v->outcome != OUTCOME_CRASH && v->outcome != OUTCOME_MEMORY)
         return;
-    if (a->has_end && a->end_status != STATUS_OK) /* it could speak for itself */
+    if (a->has_end && a->end_status != STATUS_OK) /* the worker reported its own end */
         return;
     char *words = supervisor_last_words(&a->worker, LAST_WORDS_MAX);
     size_t used = strlen(v->reason);
@@ -112,11 +112,11 @@ static void judge(const struct attempt *a, struct verdict *v) {
     mem_free(words);
 }
 
-/* Enters an attempt that ran out of memory: the next one gets by with less, where it can. */
+/* Enters an attempt that ran out of memory: the next one gets a smaller working set, if possible. */
 static enum status settle_memory(const struct attempt *a, struct store *store, const struct verdict *v,
                                  struct error *err) {
     struct buf reason, what;
-    cJSON *settings = cJSON_Parse(a->settings); /* as its order was made of them */
+    cJSON *settings = cJSON_Parse(a->settings); /* the order was made from them, so they parse */
     int step = a->memory_step;
     buf_init(&what, 4096);
     buf_init(&reason, 4096);
@@ -171,7 +171,7 @@ static void add_problem(struct attempt *a, const char *reason, const char *hint)
     cJSON_AddItemToArray(a->problems, problem);
 }
 
-/* Once, though the entry may be tried again. */
+/* Adds it once, though the entry may be tried again. */
 static void add_left_out(struct attempt *a) {
     char *reason = mem_printf("%ld more problems are not listed", a->problems_left_out);
     add_problem(a, reason, NULL);
@@ -179,7 +179,7 @@ static void add_left_out(struct attempt *a) {
     a->problems_left_out = 0;
 }
 
-/* Enters what a good scene takes of the disk. More than its owners may keep is a problem of the scene. */
+/* Enters the size of a good scene. A size above what its owners may keep is a problem of the scene. */
 static enum status settle_size(struct attempt *a, struct store *store, struct error *err) {
     struct error why = {0};
     struct disk_use use = {.bytes = measure_folder(a->dir)};
@@ -213,7 +213,7 @@ static bool is_good(const struct attempt *a, const struct verdict *v) {
 
 static enum status settle_check(struct attempt *a, struct store *store, struct trash *trash, const struct verdict *v,
                                 struct error *err) {
-    if (v->outcome == OUTCOME_STOPPED) /* still `checking`: checked again */
+    if (v->outcome == OUTCOME_STOPPED) /* The scene is still in `checking` and is checked again. */
         return STATUS_OK;
     enum status status = is_good(a, v) ? settle_size(a, store, err) : STATUS_OK;
     if (status != STATUS_OK)
@@ -248,8 +248,8 @@ bool outcome_lacks_room(const struct attempt *a) {
            WEXITSTATUS(a->wait_status) == PROGRESS_EXIT_NO_SPACE;
 }
 
-/* Files that were announced must be entered before a job ends, but a full disk does not hold up who stops it: they are
- * announced again by the next attempt, if there is one. */
+/* Announced files must be entered before a job ends. A full disk does not delay a stop, though: the next attempt
+ * announces them again. */
 static enum status make_up(struct attempt *a, struct store *store, struct error *err) {
     enum status status = worker_messages_retry(a, store, err);
     struct job job = {0};
@@ -273,7 +273,7 @@ enum status outcome_settle(struct attempt *a, struct store *store, struct trash 
         status = measure_job(store, a->job_id, a->dir, err);
     if (status == STATUS_OK)
         status = a->job_id ? settle_job(a, store, &verdict, err) : settle_check(a, store, trash, &verdict, err);
-    /* Fenced, or deleted meanwhile: there is nothing left to enter. */
+    /* Fenced, or deleted meanwhile: nothing is left to enter. */
     if (status != STATUS_OK && status != STATUS_CONFLICT && status != STATUS_NOT_FOUND)
         return status;
     static const enum attempt_end ends[] = {

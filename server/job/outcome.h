@@ -1,5 +1,5 @@
-/* outcome.h -- how an attempt ended, judged from what its process left and said, and what that makes of the
- * job or the scene. */
+/* outcome.h -- judges from its exit status and its messages how an attempt ended, and enters the outcome for the job
+ * or scene. */
 #ifndef UNBAKE_JOB_OUTCOME_H
 #define UNBAKE_JOB_OUTCOME_H
 
@@ -7,12 +7,12 @@
 
 struct trash; /* data/trash.h */
 
-/* Whether an ended attempt was too large for the disk. */
+/* Whether an ended attempt ran out of disk space. */
 bool outcome_lacks_room(const struct attempt *a);
 
-/* Enters the outcome of an ended attempt and empties it. Where that fails (the disk of state.db is full) the
- * attempt stays ended and is settled again later: nothing of the outcome is lost. What a failed check has unpacked goes to
- * `trash`, or is removed at once where that is NULL. */
+/* Enters the outcome of an ended attempt and empties it. Where that fails (the disk of state.db is full) the attempt
+ * stays ended and is settled later: nothing is lost. What a failed check has unpacked goes to `trash`; where that is
+ * NULL it is removed at once. */
 enum status outcome_settle(struct attempt *a, struct store *store, struct trash *trash, struct counters *counters,
                            struct error *err);
 

@@ -31,30 +31,30 @@
 #include "server/job/outcome.h"
 
 #define HOUSEKEEPING_SEC 600.0
-#define DELIVERIES 8          /* webhooks that are called at the same time */
-#define USER_DELIVERIES 2     /* of them, of one user: a receiver that hangs holds up no other user's */
-#define RETRY_SEC 5.0         /* after the store or a start failed */
-#define NO_PIDFD_POLL_SEC 0.2 /* where the kernel cannot tell us that a process has ended */
+#define DELIVERIES 8          /* webhooks called at the same time */
+#define USER_DELIVERIES 2     /* of them, of one user: a receiver that hangs delays no other user's messages */
+#define RETRY_SEC 5.0         /* after a failure of the store or of a start */
+#define NO_PIDFD_POLL_SEC 0.2 /* where the kernel has no pidfd to report that a process has ended */
 
 struct scheduler {
     struct scheduler_config config;
     struct store *store;
-    int wake_fd; /* an eventfd: survives any number of calls before it is read */
+    int wake_fd; /* an eventfd: many calls become one wake-up */
     atomic_bool stopping;
     atomic_int running;
     struct counters counters;
     atomic_ulong rounds;
     size_t job_slots, slot_count;
-    struct attempt *slot; /* [slot_count]; the first job_slots are of jobs */
+    struct attempt *slot; /* [slot_count]; the first job_slots run jobs */
     struct checks checks;
-    struct trash *trash;    /* NULL: trees are removed by this thread */
+    struct trash *trash;    /* NULL: this thread removes trees itself */
     bool must_retry;        /* something failed that may work later */
-    double housekeeping_at; /* as clock_sec */
+    double housekeeping_at; /* when it is due, as clock_sec */
     struct disk_watch disk;
     atomic_bool waits_for_disk; /* disk.is_low, for other threads */
-    uint64_t check_room;        /* free bytes with which scenes that had too little are checked again; 0: none wait */
+    uint64_t check_room;        /* free bytes above which scenes that had too little are checked again; 0: none waits */
     struct delivery delivery[DELIVERIES];
-    double outbox_at;    /* when the next message's time comes, as clock_sec */
+    double outbox_at;    /* when the next message is due, as clock_sec */
     struct pollfd *poll; /* [1 + 2 * slot_count + DELIVERIES] */
 };
 
@@ -96,7 +96,7 @@ void scheduler_free(struct scheduler *s) {
 
 void scheduler_wake(struct scheduler *s) {
     uint64_t one = 1;
-    /* It fails only when the counter is full, and then the loop is awake already. */
+    /* write fails only when the counter is full; then the loop is awake already */
     if (write(s->wake_fd, &one, sizeof one) < 0)
         return;
 }
@@ -112,15 +112,15 @@ int scheduler_running(const struct scheduler *s) { return atomic_load(&s->runnin
 
 bool scheduler_waits_for_disk(const struct scheduler *s) { return atomic_load(&s->waits_for_disk); }
 
-/* Something failed that is not the job's fault: say so once per round and try again. */
+/* A failure that is not the job's fault: log it once per round and retry. */
 static void retry_later(struct scheduler *s, const char *what, const struct error *err) {
     if (!s->must_retry)
         log_error("%s: %s", what, err->message);
     s->must_retry = true;
 }
 
-/* Threads for one more job: an equal share among those that run or could run now. A worker keeps
- * what it was started with, so the shares are fair, not exact. */
+/* Threads for one more job: an equal share among the jobs that run or could run now. A worker keeps the threads it
+ * started with, so the shares are approximate. */
 static int thread_share(struct scheduler *s) {
     struct store_counts counts;
     int64_t limit = (int64_t)s->job_slots, sharing = 1;
@@ -131,7 +131,7 @@ static int thread_share(struct scheduler *s) {
     return share > 0 ? share : 1;
 }
 
-/* Before it is decided whose turn it is. */
+/* Charges CPU time, before the next user is chosen. */
 static void charge_all(struct scheduler *s) {
     struct store_counts counts;
     if (store_count(s->store, &counts, NULL) != STATUS_OK || counts.jobs_by_state[JOB_QUEUED] == 0)
@@ -139,7 +139,7 @@ static void charge_all(struct scheduler *s) {
     for (size_t i = 0; i < s->slot_count; i++)
         if (s->slot[i].phase == ATTEMPT_ALIVE)
             attempt_charge(&s->slot[i], s->store, &s->counters);
-    (void)store_usage_pay(s->store, NULL); /* what attempts that have ended could not enter */
+    (void)store_usage_pay(s->store, NULL); /* charges that failed earlier */
 }
 
 static void start_jobs(struct scheduler *s) {
@@ -147,7 +147,7 @@ static void start_jobs(struct scheduler *s) {
         return;
     for (size_t i = 0; i < s->job_slots; i++) {
         struct error err;
-        /* A job that came to nothing has left the queue: look at the next one. */
+        /* The slot stays empty if the job left the queue without starting: take the next one. */
         while (s->slot[i].phase == ATTEMPT_EMPTY) {
             int64_t id;
             charge_all(s);
@@ -164,8 +164,8 @@ static void start_jobs(struct scheduler *s) {
     }
 }
 
-/* A check that is tried in vain fills the disk for a moment, so there must clearly be more room than
- * there was: an eighth. */
+/* A check that fails for lack of space fills the disk for a moment. It is retried only when there is clearly more
+ * space: an eighth more. */
 static void postpone_check(struct scheduler *s) {
     uint64_t room = 0;
     struct error err;
@@ -203,7 +203,7 @@ static void start_checks(struct scheduler *s) {
         retry_later(s, "cannot check a scene", &err);
 }
 
-/* SIGTERM, and SIGKILL when the grace is over. */
+/* SIGTERM now, SIGKILL after the grace period. */
 static void ask_to_stop(struct scheduler *s, struct attempt *a) {
     if (a->phase != ATTEMPT_ALIVE || a->stopping)
         return;
@@ -223,11 +223,11 @@ static void follow_wish(struct scheduler *s, struct attempt *a, enum job_wanted 
         ask_to_stop(s, a);
     } else if (wanted == JOB_WANT_CANCEL && !a->killed) {
         a->stopping = true;
-        kill_now(a); /* nothing of its state is wanted any more */
+        kill_now(a); /* its state is no longer wanted */
     }
 }
 
-/* A job that claims to run and has no attempt: the entry of its false start had failed. */
+/* A job that the store has as running without an attempt: entering its false start had failed. */
 static void requeue_orphan(struct scheduler *s, int64_t id) {
     struct job job;
     struct error err;
@@ -240,7 +240,7 @@ static void requeue_orphan(struct scheduler *s, int64_t id) {
 }
 
 static void follow_wishes(struct scheduler *s) {
-    size_t limit = s->slot_count + 16, count; /* of orphans the rest comes with the next round */
+    size_t limit = s->slot_count + 16, count; /* any further orphans are handled in the next round */
     int64_t *ids = mem_array(limit, sizeof *ids);
     enum job_wanted *wanted = mem_array(limit, sizeof *wanted);
     struct error err;
@@ -269,7 +269,7 @@ static bool any_alive(const struct scheduler *s) {
     return false;
 }
 
-/* While the disk is nearly full, jobs are stopped at a checkpoint, and those that wait say why. */
+/* While the disk is nearly full, running jobs are stopped at a checkpoint, and queued jobs give the reason. */
 static void watch_disk(struct scheduler *s) {
     struct error err;
     bool changed = disk_check(&s->disk, s->config.data_dir);
@@ -283,7 +283,7 @@ static void watch_disk(struct scheduler *s) {
         retry_later(s, "cannot say why jobs wait", &err);
 }
 
-/* Kills whose time is up; returns how long poll may sleep, in ms. */
+/* Kills workers whose time is up; returns poll's timeout, in ms. */
 static int keep_deadlines(struct scheduler *s) {
     double now = clock_sec(), sleep = s->must_retry ? RETRY_SEC : (double)INFINITY;
     if (any_alive(s) || s->disk.is_low)
@@ -305,14 +305,14 @@ static int keep_deadlines(struct scheduler *s) {
     }
     for (size_t i = 0; i < DELIVERIES; i++) {
         const struct delivery *d = &s->delivery[i];
-        if (d->has_ended) /* and could not be entered */
+        if (d->has_ended) /* its outcome could not be entered */
             sleep = fmin(sleep, RETRY_SEC);
         else if (d->id)
             sleep = fmin(sleep, d->worker.pid_fd < 0 ? NO_PIDFD_POLL_SEC : fmax(d->kill_at_sec - now, 0.05));
     }
     if (!atomic_load(&s->stopping))
         sleep = fmin(sleep, fmax(s->outbox_at - now, 0.0));
-    return isinf(sleep) ? -1 : (int)ceil(sleep * 1000.0); /* rounded down it would spin */
+    return isinf(sleep) ? -1 : (int)ceil(sleep * 1000.0); /* rounded up: rounded down, the loop would spin */
 }
 
 unsigned long scheduler_rounds(const struct scheduler *s) { return atomic_load(&s->rounds); }
@@ -331,7 +331,7 @@ static void wait_for_something(struct scheduler *s, int timeout_ms) {
     for (size_t i = 0; i < DELIVERIES; i++)
         if (s->delivery[i].id)
             s->poll[count++] = (struct pollfd){.fd = s->delivery[i].worker.pid_fd, .events = POLLIN};
-    poll(s->poll, count, timeout_ms); /* a signal ends it early, which does no harm */
+    poll(s->poll, count, timeout_ms); /* a signal ends it early, which is harmless */
     uint64_t calls;
     if (s->poll[0].revents && read(s->wake_fd, &calls, sizeof calls) < 0)
         return;
@@ -353,7 +353,7 @@ static void listen_and_settle(struct scheduler *s) {
     atomic_store(&s->running, running);
 }
 
-/* Users with as many deliveries under way as one may have; their number. */
+/* Lists the users that have as many deliveries under way as one may have; returns their number. */
 static size_t busy_users(const struct scheduler *s, int64_t users[DELIVERIES]) {
     size_t count = 0;
     for (size_t i = 0; i < DELIVERIES; i++) {
@@ -367,7 +367,7 @@ static size_t busy_users(const struct scheduler *s, int64_t users[DELIVERIES]) {
     return count;
 }
 
-/* Sends what the outbox has, as far as there are hands for it. */
+/* Starts deliveries of due messages while there are free slots. */
 static void deliver(struct scheduler *s) {
     struct error err;
     int64_t after = 0, skip[DELIVERIES];
@@ -376,7 +376,7 @@ static void deliver(struct scheduler *s) {
     bool is_free = false;
     for (size_t i = 0; i < DELIVERIES; i++)
         is_free = delivery_listen(&s->delivery[i], s->store) || is_free;
-    /* Asked before what is due is taken, so that no message's time comes in between. */
+    /* Asked before the due messages are read, so that none becomes due in between. */
     if (store_outbox_wait(s->store, &wait, &err) != STATUS_OK)
         wait = RETRY_SEC;
     for (size_t i = 0; i < DELIVERIES && is_free; i++) {
@@ -398,7 +398,7 @@ static void deliver(struct scheduler *s) {
         if (status != STATUS_OK && status != STATUS_NOT_FOUND)
             retry_later(s, "cannot call a webhook", &err);
     }
-    /* Messages that are due, while all hands are busy, go on when one of these ends, which wakes us. */
+    /* Messages that are due while all slots are busy go out when a delivery ends, which wakes the loop. */
     s->outbox_at = clock_sec() + wait;
 }
 
@@ -440,9 +440,9 @@ enum status scheduler_run(struct scheduler *s, struct error *err) {
         wait_for_something(s, keep_deadlines(s));
     }
     (void)store_usage_pay(s->store, NULL);
-    /* What was under way is sent again by the next start. */
+    /* Deliveries under way are repeated after the next start. */
     for (size_t i = 0; i < DELIVERIES; i++)
         delivery_stop(&s->delivery[i], s->store);
-    /* What could not be entered is "running" in the store: the next start queues it again. */
+    /* Attempts that could not be entered are "running" in the store; the next start queues them again. */
     return STATUS_OK;
 }

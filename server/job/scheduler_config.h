@@ -1,4 +1,4 @@
-/* scheduler_config.h -- what jobs and their workers may take, and how long things wait and stay. */
+/* scheduler_config.h -- limits on jobs and workers, and how long things are kept. */
 #ifndef UNBAKE_JOB_SCHEDULER_CONFIG_H
 #define UNBAKE_JOB_SCHEDULER_CONFIG_H
 
@@ -9,17 +9,17 @@ struct scheduler_config {
     const char *data_dir;         /* borrowed; holds scenes/ID/, jobs/ID/ */
     const char *worker_binary;    /* /proc/self/exe */
     int max_running;              /* jobs at once */
-    int user_max_running;         /* of them, of one user; 0: all */
-    int max_checks;               /* of scenes, at once; 0: CHECKS_AT_ONCE */
+    int user_max_running;         /* jobs of one user at once; 0: no limit */
+    int max_checks;               /* checks of scenes at once; 0: CHECKS_AT_ONCE */
     int thread_count;             /* shared between running jobs; 0: all processors */
-    uint64_t user_max_bytes;      /* that one user keeps; 0: no limit */
+    uint64_t user_max_bytes;      /* what one user may keep; 0: no limit */
     uint64_t worker_memory_bytes; /* 0: no limit */
     double checkpoint_interval_sec;
     double stop_grace_sec;      /* SIGTERM to SIGKILL */
-    double checkpoint_keep_sec; /* of a job that has succeeded */
-    double event_keep_sec;      /* of a job that has ended */
-    long attempt_events_max;    /* that one attempt reports before they are thinned; 0: 500,000 */
-    uint64_t low_disk_bytes;    /* with less free space, work waits; 0: never */
+    double checkpoint_keep_sec; /* from SIGTERM to SIGKILL */
+    double event_keep_sec;      /* checkpoints, after the job has succeeded */
+    long attempt_events_max;    /* reports of one attempt before they are thinned; 0: 500,000 */
+    uint64_t low_disk_bytes;    /* work waits while less is free; 0: never */
     bool webhook_private;       /* webhooks may go to private addresses */
     bool sandbox;
 };

@@ -21,12 +21,12 @@
 #include "server/data/layout.h"
 #include "server/worker/progress.h"
 
-#define LOG_KEEP 65536 /* of earlier attempts, when the log has grown past LOG_LARGE */
+#define LOG_KEEP 65536 /* kept of earlier attempts when the log has passed LOG_LARGE */
 #define LOG_LARGE (1 << 20)
-#define LINES_AT_ONCE (256 * 1024) /* bytes read before the scheduler looks at others again */
-#define FIRST_FREE_FD 10           /* the child's own descriptors are below */
+#define LINES_AT_ONCE (256 * 1024) /* bytes read from one worker before the others' turn */
+#define FIRST_FREE_FD 10           /* lower numbers are for the child's own descriptors */
 
-/* A descriptor that the child's dup2 calls cannot run over; closed on exec. */
+/* Moves a descriptor above those that the child's dup2 calls overwrite; close-on-exec. */
 static int out_of_the_way(int fd) {
     if (fd < 0)
         return fd;
@@ -37,7 +37,7 @@ static int out_of_the_way(int fd) {
     return moved;
 }
 
-/* Cuts the log to its tail when it has become large. */
+/* Cuts the log to its tail once it is large. */
 static enum status trim_log(const char *path, int fd, struct error *err) {
     off_t length = lseek(fd, 0, SEEK_END);
     if (length < LOG_LARGE)
@@ -53,9 +53,9 @@ static enum status trim_log(const char *path, int fd, struct error *err) {
     return status;
 }
 
-/* What of the daemon's environment a worker gets: where programs and libraries are, how the C library and the
- * sanitizers behave, what tests slip under it. Not the rest: it may hold a token or another secret. The caller's
- * (mem_free); the strings are the environment's. */
+/* The part of the daemon's environment that a worker gets: where programs and libraries are, settings of the C
+ * library and the sanitizers, what tests preload. Anything else may be a secret. The caller's (mem_free); the strings
+ * are the environment's. */
 static char **worker_environment(void) {
     static const char *const kept[] = {"PATH=",
                                        "LANG=",
@@ -97,7 +97,7 @@ static void become_worker(const struct spawn *spawn) __attribute__((noreturn));
 static void become_worker(const struct spawn *spawn) {
     setsid();
     prctl(PR_SET_PDEATHSIG, SIGKILL);
-    if (getppid() != spawn->parent) /* the daemon died before the line above */
+    if (getppid() != spawn->parent) /* the daemon died before PR_SET_PDEATHSIG was set */
         _exit(127);
     for (int signal_number = 1; signal_number < NSIG; signal_number++)
         signal(signal_number, SIG_DFL);
@@ -106,13 +106,13 @@ static void become_worker(const struct spawn *spawn) {
     sigprocmask(SIG_SETMASK, &none, NULL);
     int oom = open("/proc/self/oom_score_adj", O_WRONLY | O_CLOEXEC);
     if (oom >= 0 && write(oom, "500", 3) != 3) {
-        /* Only who is killed first would change: go on. */
+        /* Only the OOM killer's choice would change: continue. */
     }
     if (dup2(spawn->null_fd, STDIN_FILENO) < 0 || dup2(spawn->log_fd, STDOUT_FILENO) < 0 ||
         dup2(spawn->log_fd, STDERR_FILENO) < 0 || dup2(spawn->pipe_fd, PROGRESS_FD) < 0)
         _exit(127);
-    /* Everything else is close-on-exec by our rule; what a library forgot is closed here. Kernels
-     * before 5.9 do not have the call. */
+    /* Everything else is close-on-exec by convention; this closes what a library forgot. Kernels before 5.9 lack the
+     * call. */
     syscall(SYS_close_range, PROGRESS_FD + 1, ~0u, 0);
     execve(spawn->binary, spawn->argv, spawn->environment);
     static const char message[] = "cannot execute the worker's program\n";
@@ -238,7 +238,7 @@ bool supervisor_reap(struct worker *w, int *wait_status, void (*each)(void *user
     siginfo_t info = {0};
     if (w->pid <= 0 || waitid(P_PID, (id_t)w->pid, &info, WEXITED | WNOHANG | WNOWAIT) != 0 || info.si_pid == 0)
         return false;
-    /* Not yet reaped, so its number still names its session and nobody else's. */
+    /* The process is not reaped yet, so its number still names its session. */
     kill(-w->pid, SIGKILL);
     read_pipe(w, (size_t)64 << 20, each, user);
     struct rusage used = {0};
@@ -272,7 +272,7 @@ char *supervisor_last_words(const struct worker *w, size_t limit) {
     close(fd);
     size_t length = got > 0 ? (size_t)got : 0;
     text[length] = '\0';
-    if (!whole) { /* begin with a whole line where there is one */
+    if (!whole) { /* start at a whole line if there is one */
         char *newline = memchr(text, '\n', length);
         if (newline && newline[1]) {
             length -= (size_t)(newline + 1 - text);
@@ -283,7 +283,7 @@ char *supervisor_last_words(const struct worker *w, size_t limit) {
         text[--length] = '\0';
     for (size_t i = 0; i < length; i++) {
         unsigned char c = (unsigned char)text[i];
-        if (c < 0x20 || c >= 0x7f) /* it ends in JSON and in a terminal: plain ASCII */
+        if (c < 0x20 || c >= 0x7f) /* the text goes into JSON and terminals: ASCII only */
             text[i] = c == '\n' ? ' ' : '?';
     }
     return text;

@@ -1,11 +1,11 @@
 /* worker_messages.c -- see worker_messages.h.
  *
- * A worker that says too much must not keep the daemon from its other work. Beyond event_max reports an attempt is
- * heard once a second: what it reports more often is then
+ * A worker that reports too much must not keep the daemon from other work. Above event_max reports, an attempt's
+ * reports are entered once a second; of those in between
  *
- *      files       all entered, the newest of each name
- *      progress    the newest is entered
- *      the rest    left out, and one event says so
+ *      files       are all entered, the newest of each name
+ *      progress    only the newest is entered
+ *      the rest    is dropped, and one event says so
  */
 #include "server/job/worker_messages.h"
 
@@ -20,7 +20,7 @@
 #include "server/data/layout.h"
 
 #define THINNED_SEC 1.0
-#define UNTAKEN_MAX 2000  /* files; an honest job has some hundred */
+#define UNTAKEN_MAX 2000  /* files; a normal job has a few hundred */
 #define PROBLEMS_MAX 1000 /* of one scene */
 
 struct message_listener {
@@ -30,13 +30,13 @@ struct message_listener {
 };
 
 static void complain(struct attempt *a, const char *type, const struct error *err) {
-    if (!a->complained) /* once: the next thousand reports would say the same */
+    if (!a->complained) /* logged once: the next thousand would say the same */
         log_warning("job %lld: cannot record a %s event: %s", (long long)a->job_id, type, err->message);
     a->complained = true;
 }
 
-/* `data` is as the worker has it. What only the daemon says of an event is not for a worker to say:
- * it may be that of another job, or run by whoever sent the scene. */
+/* `data` is as the worker sent it. Members that only the daemon sets are removed: the worker has read a stranger's
+ * files and may name another job. */
 static void put_event(struct attempt *a, struct store *store, const char *type, cJSON *data) {
     static const char *const daemons[] = {"job", "attempt", "at", "snapshot"};
     struct error err;
@@ -65,7 +65,7 @@ static void say_thinned(struct attempt *a, struct store *store) {
     mem_free(message);
 }
 
-/* Whether one more report is one too many. */
+/* Whether this report is above the attempt's limit. */
 static bool is_thinned(struct attempt *a, struct store *store) {
     if (a->event_count < a->event_max) {
         a->event_count++;
@@ -87,8 +87,8 @@ static void enter_event(const struct message_listener *l, const char *type, cJSO
     }
 }
 
-/* The file must be there, whole, and a plain file: what is announced is served to users. A disk that cannot tell is
- * asked once more, for the last time when the worker has ended. */
+/* The file must exist, complete and regular, since it will be served to users. Where the disk gives no answer, it is
+ * asked again, for the last time after the worker has ended. */
 static enum status put_file(const struct attempt *a, struct store *store, const char *type, const cJSON *line,
                             bool is_last, struct error *err) {
     const char *name, *sha256, *content_type;
@@ -115,12 +115,12 @@ static enum status put_file(const struct attempt *a, struct store *store, const 
     return status;
 }
 
-/* Another try would end like this one. */
+/* Whether another try would fail the same way. */
 static bool is_final(enum status status) {
     return status == STATUS_OK || status == STATUS_INPUT || status == STATUS_CONFLICT || status == STATUS_NOT_FOUND;
 }
 
-/* A newer file has taken its place. */
+/* Drops a file that a newer one has replaced. */
 static void drop_untaken(struct attempt *a, const cJSON *line) {
     const cJSON *name = cJSON_GetObjectItemCaseSensitive(line, "name");
     for (int i = cJSON_GetArraySize(a->untaken); i-- > 0;)
@@ -134,7 +134,7 @@ static void log_file(const struct attempt *a, enum status status, const struct e
                     is_final(status) ? "" : " yet", err->message);
 }
 
-/* A file for later, in the place of an older one of that name. */
+/* Keeps a file for later; it replaces an older one of that name. */
 static void keep_file(struct attempt *a, const char *type, const cJSON *line) {
     cJSON *kept = cJSON_Duplicate(line, true);
     json_add_string(kept, "type", type);
@@ -158,7 +158,7 @@ static void enter_file(const struct message_listener *l, const char *type, const
         keep_file(a, type, line);
 }
 
-/* Takes the files off a->untaken that are entered, or never will be. */
+/* Enters the files of a->untaken; removes those that are entered or can never be. */
 static enum status take_files(struct attempt *a, struct store *store, bool is_last, struct error *err) {
     const cJSON *line;
     while ((line = cJSON_GetArrayItem(a->untaken, 0)) != NULL) {
@@ -180,7 +180,7 @@ enum status worker_messages_retry(struct attempt *a, struct store *store, struct
     return take_files(a, store, true, err);
 }
 
-/* What a thinned attempt has said lately. */
+/* Enters what a thinned attempt has reported since the last time. */
 static void enter_late(struct attempt *a, struct store *store) {
     struct error err;
     double now = clock_sec();
@@ -191,7 +191,7 @@ static void enter_late(struct attempt *a, struct store *store) {
         put_event(a, store, EVENT_PROGRESS, a->late_progress);
     cJSON_Delete(a->late_progress);
     a->late_progress = NULL;
-    (void)take_files(a, store, false, &err); /* what fails stays for the next time */
+    (void)take_files(a, store, false, &err); /* what fails is kept for the next time */
 }
 
 static void note_end(struct attempt *a, const cJSON *line) {
@@ -232,8 +232,8 @@ static void note_checkpoint(const struct message_listener *l, const cJSON *line)
     cJSON_Delete(data);
 }
 
-/* How far the optimiser is: the loss comes with its iteration, `rays` is only counted.
- * True when the metric is none of the job's curves. */
+/* Counts iterations and rays. A loss comes with its iteration; `rays` is only counted. True when the metric is not
+ * one of the job's curves. */
 static bool note_counters(const struct message_listener *l, const cJSON *line) {
     struct attempt *a = l->attempt;
     const char *series;
@@ -243,7 +243,7 @@ static bool note_counters(const struct message_listener *l, const cJSON *line) {
         json_number(line, "value", "metric", 0, &value, NULL) != STATUS_OK)
         return false;
     bool is_rays = strcmp(series, "rays") == 0;
-    /* The first iteration that is heard of may be a resumed one: only what follows is new. */
+    /* The first iteration reported may be that of a resumed job: only later ones count as new. */
     if (strcmp(series, "loss") == 0 && step < 1e15) {
         if (a->iteration >= 0.0 && step > a->iteration)
             atomic_fetch_add(&l->counters->iteration_count, (unsigned long long)(step - a->iteration));
@@ -256,7 +256,7 @@ static bool note_counters(const struct message_listener *l, const cJSON *line) {
     return is_rays;
 }
 
-/* An honest worker says nothing that is not understood. Once: more would be of that kind. */
+/* A worker that works as intended never sends unknown lines. Logged once. */
 static void say_unread(struct attempt *a, const char *what) {
     if (!a->said_unread && a->job_id)
         log_warning("job %lld: a line of its worker %s and is ignored", (long long)a->job_id, what);
@@ -270,13 +270,13 @@ static void take_line(void *user, const char *text, size_t length) {
     struct attempt *a = l->attempt;
     cJSON *line;
     if (json_parse(text, length, "a worker's line", &line, NULL) != STATUS_OK) {
-        say_unread(a, "is no JSON object"); /* a line of an unknown type means nothing either */
+        say_unread(a, "is no JSON object"); /* lines of an unknown type are ignored too */
         return;
     }
-    /* Events have their type beside their data, not in it. */
+    /* An event's type is stored beside its data, not in it. */
     cJSON *kept = cJSON_DetachItemFromObjectCaseSensitive(line, "type");
     const char *type = kept && kept->valuestring ? kept->valuestring : "";
-    if (strcmp(type, "stage") == 0) { /* a stage begins: its progress is none */
+    if (strcmp(type, "stage") == 0) { /* a new stage starts without progress */
         json_add_number(line, "done", 0.0);
         json_add_number(line, "total", 0.0);
         json_add_number(line, "eta_sec", -1.0);

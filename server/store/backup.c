@@ -1,8 +1,8 @@
 /* backup.c -- a copy of state.db while the daemon works; see store.h.
  *
- * SQLite's online backup, read through the store's one connection, a few pages at a time: other
- * callers get their turns in between, and what they write meanwhile goes into the copy too
- * (https://sqlite.org/backup.html), so that it is the database as of its last page. */
+ * SQLite's online backup reads through the store's only connection, some pages at a time. Other callers run in between,
+ * and their writes go into the copy too (https://sqlite.org/backup.html): it is the database at the time of its last
+ * page. */
 #include <errno.h>
 
 #include "server/store/internal.h"
@@ -10,7 +10,7 @@
 
 #define PAGES_AT_ONCE 1024
 
-/* `number` is the errno of the call that failed. */
+/* `number` is the errno of the failed call. */
 static enum status failed(sqlite3 *to, int code, int number, const char *path, struct error *err) {
     if (!sql_is_full(code, number))
         return error_set(err, STATUS_IO, "cannot copy the database to %s: %s", path, sqlite3_errmsg(to));
@@ -18,7 +18,7 @@ static enum status failed(sqlite3 *to, int code, int number, const char *path, s
     return error_hint(err, "Free some space on the disk that holds the file.");
 }
 
-/* SQLITE_DONE, or how it failed, with errno. */
+/* Copies page by page; returns SQLITE_DONE, or the error, with errno set. */
 static int copy_pages(struct store *store, sqlite3 *to) {
     store_lock(store);
     sqlite3_backup *backup = sqlite3_backup_init(to, "main", store->sql.db, "main");
@@ -47,7 +47,7 @@ enum status store_backup(struct store *store, const char *path, struct error *er
     int code = sqlite3_open_v2(path, &to, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE, NULL);
     if (code == SQLITE_OK)
         code = copy_pages(store, to);
-    if (code == SQLITE_DONE) { /* One plain file: without this it would ask for a write-ahead log beside it. */
+    if (code == SQLITE_DONE) { /* Make it one plain file; otherwise it would need a write-ahead log beside it. */
         errno = 0;
         code = sqlite3_exec(to, "PRAGMA journal_mode=DELETE", NULL, NULL, NULL);
     }

@@ -48,7 +48,7 @@ static enum status read_outputs(struct contents *c, struct sql *sql, struct erro
         while (job < c->job_count && c->jobs[job].id < id)
             job++;
         if (job == c->job_count || c->jobs[job].id != id)
-            continue; /* of no job: the database's own rules forbid it */
+            continue; /* an output of no job: foreign keys rule it out */
         if (c->jobs[job].count++ == 0)
             c->jobs[job].first = c->output_count;
         c->outputs = mem_realloc_array(c->outputs, c->output_count + 1, sizeof *c->outputs);

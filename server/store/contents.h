@@ -1,4 +1,4 @@
-/* contents.h -- what a copy of the database names that lies in files beside it: for backups. */
+/* contents.h -- lists the files beside the database that a copy of it refers to: for backups. */
 #ifndef UNBAKE_STORE_CONTENTS_H
 #define UNBAKE_STORE_CONTENTS_H
 
@@ -17,13 +17,13 @@ struct contents_job {
     int64_t id;
     int attempt;
     bool is_running, is_terminal;
-    size_t first, count; /* of its outputs */
+    size_t first, count; /* its outputs: [first, first + count) */
 };
 
 struct contents_output {
     char *name; /* owned */
     uint64_t bytes;
-    char sha256[65]; /* as it was announced */
+    char sha256[65]; /* as the worker announced it */
 };
 
 struct contents {
@@ -33,7 +33,7 @@ struct contents {
     size_t scene_count, job_count, output_count;
 };
 
-/* Reads the file, which nobody else may have open. Release *c in any case. */
+/* Reads the database file, which nobody else may have open. Release *c in any case. */
 enum status contents_read(struct contents *c, const char *path, struct error *err);
 void contents_release(struct contents *c);
 

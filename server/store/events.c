@@ -7,11 +7,11 @@
 #include "server/store/internal.h"
 #include "server/store/store.h"
 
-#define PRUNE_EVERY 64 /* events; until then a job has so many too many */
+#define PRUNE_EVERY 64 /* events by which a job may exceed its limit */
 
 void store_keep_events(struct store *store, size_t per_job) { store->events_per_job = per_job; }
 
-/* Removes a job's events up to `last`, and remembers that. */
+/* Removes a job's events up to `last`, and records that. */
 static enum status prune_job(struct store *store, int64_t job_id, int64_t last, struct error *err) {
     enum status status =
         sql_run(&store->sql, err, "DELETE FROM events WHERE job_id = ? AND id <= ?", "ii", job_id, last);
@@ -47,7 +47,7 @@ static enum status prune(struct store *store, int64_t before_ms, bool *more, str
         *more = true;
         status = sql_int(&store->sql, 0, &last, err,
                          "SELECT id FROM events WHERE job_id = ? ORDER BY id DESC LIMIT 1 OFFSET 1", "i", job_id);
-        if (status == STATUS_OK) /* before 0 there is none */
+        if (status == STATUS_OK) /* ids start above 0 */
             status = prune_job(store, job_id, last, err);
         if (status == STATUS_OK)
             status = sql_run(&store->sql, err, "UPDATE jobs SET events_gone = 1 WHERE id = ?", "i", job_id);
@@ -87,7 +87,7 @@ enum status store_fence(struct store *store, int64_t job_id, int attempt, struct
     return STATUS_OK;
 }
 
-/* Takes the present place of the job from a progress event into its row. */
+/* Copies the progress of an event into the job's row. */
 static enum status update_progress(struct store *store, int64_t job_id, const char *data, struct error *err) {
     cJSON *object;
     const char *stage;
@@ -148,7 +148,7 @@ enum status store_event_list(struct store *store, int64_t job_id, int64_t after,
     return status;
 }
 
-/* What the page says of the job, where it is one that `who` may read. */
+/* Fills the page's facts about the job, if `who` may read it. */
 static enum status page_of_job(struct store *store, const struct caller *who, int64_t job_id, struct event_page *page,
                                struct error *err) {
     sqlite3_stmt *stmt;
@@ -223,7 +223,7 @@ enum status store_event_page(struct store *store, const struct caller *who, int6
         }
     }
     page->is_full = page->count == limit || bytes >= byte_limit;
-    /* Others' events after the last of ours need not be looked at again. */
+    /* Events of others after the last of the caller's are not read again. */
     if (status == STATUS_OK && !page->is_full && job_id == 0)
         status = sql_int(&store->sql, after, &page->last_id, err, "SELECT max(?, ifnull(max(id), 0)) FROM events", "i",
                          page->last_id);

@@ -1,4 +1,4 @@
-/* internal.h -- what the files of the store share and nobody else sees. */
+/* internal.h -- what the store's files share; no other folder includes it. */
 #ifndef UNBAKE_STORE_INTERNAL_H
 #define UNBAKE_STORE_INTERNAL_H
 
@@ -7,29 +7,29 @@
 
 #include "server/store/sql.h"
 
-/* What reserve.c knows of the space of the database's files. */
+/* What reserve.c knows of the disk space of the database's files. */
 struct reserve {
-    char *dir;           /* of the data; owned */
+    char *dir;           /* the data folder; owned */
     int wal_fd;          /* -1: not open yet */
-    bool is_unsupported; /* the file system does not allocate beforehand */
+    bool is_unsupported; /* the file system cannot preallocate */
     bool is_tight;
     int page_bytes;
-    int64_t cushion_bytes; /* that are kept */
-    int64_t wal_frames;    /* that the log holds */
-    int64_t wal_bytes;     /* that it has space for */
-    int64_t page_count;    /* that the database file has space for */
-    int64_t pages_used;    /* by the database, with the present transaction */
+    int64_t cushion_bytes; /* bytes kept ahead of the log's end */
+    int64_t wal_frames;    /* frames in the log */
+    int64_t wal_bytes;     /* bytes allocated for it */
+    int64_t page_count;    /* pages allocated for the database file */
+    int64_t pages_used;    /* pages in use, including the current transaction */
 };
 
 struct store {
-    pthread_mutex_t mutex; /* around every use of sql */
+    pthread_mutex_t mutex; /* held for every use of sql */
     struct sql sql;
     struct reserve reserve;
     void (*changed)(void *user, int64_t job_id);
     void *changed_user;
     void (*digest_wanted)(void *user);
     void *digest_wanted_user;
-    size_t events_per_job; /* kept */
+    size_t events_per_job; /* kept for each job */
     struct unpaid {        /* CPU time that could not be entered; see turns.c */
         int64_t owner_id;
         double weight;
@@ -40,21 +40,20 @@ struct store {
 
 #define STORE_NOTHING_CHANGED (-1)
 
-/* The schema as steps: step i takes a database of version i to version i + 1. A step that was
- * ever released is never edited; a change is a new step. */
+/* Schema migrations: step i takes a database from version i to version i + 1. A released step is never edited; every
+ * change is a new step. */
 extern const char *const schema_steps[];
 extern const int schema_version; /* the number of steps */
 
-/* transaction.c. Reading: the mutex alone. Writing: the mutex and a transaction. store_end commits or, where
- * `status` is not STATUS_OK, rolls back; unlocks; and tells the subscriber about `changed_job`
- * (0: a scene) after a commit. */
+/* transaction.c. A read holds the mutex; a write also a transaction. store_end commits, or rolls back where `status`
+ * is not STATUS_OK; unlocks; and after a commit notifies the subscriber of `changed_job` (0: a scene). */
 void store_lock(struct store *store);
 void store_unlock(struct store *store);
 enum status store_begin(struct store *store, struct error *err);
-/* One that frees space or stops work: also while the disk is full; see reserve.c. Where it fails with STATUS_NO_SPACE
- * it is to be tried again after store_reserve_spend, while that is true. */
+/* A transaction that frees space or stops work, and therefore works on a full disk; see reserve.c. Where it fails
+ * with STATUS_NO_SPACE, the caller repeats it after store_reserve_spend, as long as that returns true. */
 enum status store_begin_freeing(struct store *store, struct error *err);
-bool store_reserve_spend(struct store *store); /* gives DATA/reserve up; false when it is gone already */
+bool store_reserve_spend(struct store *store); /* gives DATA/reserve up; false if that was done already */
 enum status store_end(struct store *store, enum status status, int64_t changed_job, struct error *err);
 
 int64_t store_now_ms(void); /* Unix time */
@@ -74,7 +73,7 @@ int64_t store_now_ms(void); /* Unix time */
     "(CASE WHEN pinned = 1 THEN 0 WHEN expires_ms > 0 THEN expires_ms"                                                 \
     " ELSE updated_ms + (SELECT iif(received = 0 AND scene_id = '', min(empty_upload_ms, upload_ms), upload_ms)"       \
     " FROM retention) END)"
-/* What a struct retention changes of a row, for an UPDATE: ?1 pin, ?2 sets_expiry, ?3 expires_ms. */
+/* Applies a struct retention to a row, in an UPDATE: ?1 pin, ?2 sets_expiry, ?3 expires_ms. */
 #define RETENTION_SET                                                                                                  \
     "pinned = CASE ?1 WHEN 0 THEN pinned WHEN 1 THEN 1 ELSE 0 END,"                                                    \
     " expires_ms = iif(?2, ?3, expires_ms)"
@@ -82,25 +81,25 @@ int64_t store_now_ms(void); /* Unix time */
 /* users.c, while the store is opened: sets has_users. */
 enum status store_look_for_users(struct store *store, struct error *err);
 
-/* reserve.c, under the mutex. After the database was opened; after it was closed. */
+/* reserve.c, under the mutex: after the database was opened; after it was closed. */
 enum status reserve_open(struct store *store, const char *dir, struct error *err);
 void reserve_close(struct store *store);
-/* Before a commit; after it. What cannot be had is tried again after the next. */
+/* Before a commit; after it. Space that cannot be had is tried again after the next. */
 enum status reserve_look(struct store *store, struct error *err);
 void reserve_keep(struct store *store);
-/* Before an ordinary transaction: STATUS_NO_SPACE while it is tight. */
+/* Before an ordinary transaction: STATUS_NO_SPACE while space is tight. */
 enum status reserve_check(struct store *store, struct error *err);
 
-/* Inside a transaction: appends one event. */
+/* Inside a transaction: appends an event. */
 enum status store_event_append(struct store *store, int64_t job_id, int attempt, const char *type, const char *data,
                                struct error *err);
-/* Inside a transaction: gives a job a webhook; tells the job's webhook, if it has one, of a state. */
+/* Inside a transaction: gives a job a webhook; queues a message to it, if there is one, about a state. */
 enum status store_webhook_set(struct store *store, int64_t job_id, const char *url, const char *secret,
                               struct error *err);
 enum status store_webhook_post(struct store *store, int64_t job_id, int attempt, const char *state, const char *reason,
                                const char *hint, struct error *err);
 struct count_limits; /* store.h */
-/* Inside a transaction: STATUS_LIMIT unless one more job of this owner (0: nobody) may be queued. */
+/* Inside a transaction: STATUS_LIMIT unless this owner (0: nobody) may queue one more job. */
 enum status store_queue_check(struct store *store, int64_t owner_id, const struct count_limits *limits,
                               struct error *err);
 /* scene_reading.c, inside a transaction: gives the scene a reading for user owner_id (-1: whom no other's jobs hinder) as

@@ -1,5 +1,4 @@
-/* jobs.c -- the rows of the jobs table: adding, reading, editing, choosing; see store.h. What
- * changes a job's state is in transitions.c. */
+/* jobs.c -- the jobs table: adds, reads, edits, chooses; see store.h. Changes of state are in transitions.c. */
 #include <limits.h>
 #include <string.h>
 
@@ -58,7 +57,7 @@ static enum status not_found(int64_t id, struct error *err) {
     return error_set(err, STATUS_NOT_FOUND, "there is no job %lld", (long long)id);
 }
 
-/* Each owner has keys of its own: as it is stored, a key begins with its owner's number. */
+/* Keys are per owner: the stored key begins with the owner's number. */
 static char *stored_key(const struct job_new *job) {
     return !job->idempotency_key ? NULL
            : job->owner_id == 0  ? mem_strdup(job->idempotency_key)
@@ -83,8 +82,8 @@ static enum status find_replay(struct store *store, const struct job_new *job, c
     return error_hint(err, "Use a new key for a new request.");
 }
 
-/* Whether the job's owner may keep one more. What has ended is not removed for it: its results may be all that is left
- * of days of work. */
+/* Whether the owner may keep one more job. Ended jobs are not removed to make room: their results may be all that is
+ * left of days of work. */
 static enum status check_kept(struct store *store, const struct job_new *job, struct error *err) {
     int64_t kept = 0, oldest = 0;
     if (job->user_max_jobs == 0 || job->owner_id == 0)
@@ -104,7 +103,7 @@ static enum status check_kept(struct store *store, const struct job_new *job, st
                   : error_hint(err, "delete jobs that you do not need");
 }
 
-/* Whether one more job may join the queue for this scene. */
+/* Whether one more job may be queued for this scene. */
 static enum status check_new(struct store *store, const struct job_new *job, size_t queue_limit, struct error *err) {
     int64_t state;
     enum status status =
@@ -203,7 +202,7 @@ enum status store_job_list(struct store *store, const struct caller *who, int st
     return status;
 }
 
-/* Gives job `id` its place before `next`, of the same owner; all after that move by one. */
+/* Places job `id` before `next`, of the same owner; all jobs after it move by one. */
 static enum status place_before(struct store *store, int64_t id, int64_t next, struct error *err) {
     int64_t turn, priority;
     enum status status = sql_int(&store->sql, INT64_MIN, &turn, err,

@@ -35,7 +35,7 @@ void output_row_release(struct output_row *row) {
     *row = (struct output_row){0};
 }
 
-/* Letters, digits, '_', '-', '.' and '/' between parts that do not begin with a dot. */
+/* Letters, digits, '_', '-', '.', and '/' between parts that do not begin with a dot. */
 static bool name_is_plain(const char *name) {
     size_t length = strlen(name);
     if (length == 0 || length > 200)

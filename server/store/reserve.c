@@ -1,18 +1,18 @@
-/* reserve.c -- room that is kept for transactions which free space or stop work: a full disk must not hinder them.
+/* reserve.c -- keeps disk space for transactions that free space or stop work: they must succeed on a full disk.
  *
- *      room      (WAL and database have their space beforehand)   every transaction
+ *      ample     (space for WAL and database is preallocated)     every transaction
  *       │  ▲
- *       ▼  └─ (the disk has room again)
- *      tight     (they cannot be extended)                        only those that free or stop
+ *       ▼  └─ (the disk has space again)
+ *      tight     (they cannot be extended)                        only those that free space or stop work
  *
- * 1. After each commit the write-ahead log is extended to a cushion beyond what it holds, and the database file to
- *    spare pages beyond its last. Ordinary transactions are refused with STATUS_NO_SPACE as soon as that cannot be done, so what is
- *    kept is left to the others, which need no block that the disk does not have already.
- * 2. While it is tight, each commit is followed by a checkpoint, so that the same part of the log is used again.
- * 3. Where the file system cannot allocate beforehand, or writes elsewhere even then (copy on write), DATA/reserve is
- *    the second line: a file of nothing that is removed when such a transaction has failed, which is then tried again.
+ * 1. After each commit the write-ahead log is extended by a cushion beyond its content, and the database file by spare
+ *    pages. As soon as that fails, ordinary transactions are refused with STATUS_NO_SPACE; the others use the
+ *    preallocated blocks.
+ * 2. While space is tight, each commit is followed by a checkpoint, so that the same part of the log is reused.
+ * 3. Some file systems cannot preallocate, or allocate again on writing (copy on write). There DATA/reserve, a file of
+ *    zeros, is removed when such a transaction has failed, and the transaction is repeated.
  *
- * Under the store's mutex, except store_reserve_spend and store_reserve_renew. */
+ * Called under the store's mutex, except store_reserve_spend and store_reserve_renew. */
 #include <errno.h>
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -25,29 +25,29 @@
 #include "server/store/internal.h"
 #include "server/store/store.h"
 
-/* A cancelled job is some 12 pages; of a job that is removed most pages are freed, and those are not written. */
-#define CUSHION_BYTES ((int64_t)4 << 20) /* on a disk that has 64 MiB free at the start; else a 16th of it */
+/* Cancelling a job writes about 12 pages. Removing one frees most of its pages, and freed pages are not written. */
+#define CUSHION_BYTES ((int64_t)4 << 20) /* with 64 MiB free at the start; otherwise a 16th of the free space */
 #define CUSHION_BYTES_MIN ((int64_t)128 << 10)
-#define STEP_SHARE 4           /* of the cushion, by which the log grows, so that not every commit extends it */
-#define SPARE_SHARE 4          /* of the cushion, for new pages of the database: what stops a job adds an event */
-#define CHUNK_BYTES (64 << 10) /* by which the database's file grows */
+#define STEP_SHARE 4  /* the log grows by a quarter of the cushion, so that not every commit extends it */
+#define SPARE_SHARE 4 /* a quarter of the cushion, for new pages of the database: stopping a job adds an event */
+#define CHUNK_BYTES (64 << 10) /* the database file grows by this much */
 #define WAL_HEADER 32          /* bytes: sqlite.org/fileformat2.html, 4.1 */
 #define FRAME_HEADER 24
 #define CHECKPOINT_FRAMES 1000 /* SQLite's own default */
 #define CHECKPOINT_TIGHT 16
 
-#define FILE_BYTES ((uint64_t)16 << 20) /* of DATA/reserve */
+#define FILE_BYTES ((uint64_t)16 << 20) /* size of DATA/reserve */
 #define FILE_BYTES_MIN ((uint64_t)256 << 10)
 
-/* SQLite calls it after each commit, with what the log holds. Its own hook, which this one takes the place of, makes the
- * checkpoints; one that fails is made up for by the next. */
+/* Called by SQLite after each commit, with the frames in the log. It replaces SQLite's own hook, which makes the
+ * checkpoints; the next commit makes up for a failed one. */
 static int committed(void *user, sqlite3 *db, const char *name, int frames) {
     struct reserve *r = user;
     bool is_reset = frames < r->wal_frames;
     struct stat info;
     r->wal_frames = frames;
     if (is_reset && r->wal_fd >= 0 && fstat(r->wal_fd, &info) == 0 && info.st_size < r->wal_bytes)
-        r->wal_bytes = info.st_size; /* journal_size_limit has cut it */
+        r->wal_bytes = info.st_size; /* journal_size_limit has truncated it */
     if (frames >= (r->is_tight ? CHECKPOINT_TIGHT : CHECKPOINT_FRAMES))
         sqlite3_wal_checkpoint_v2(db, name, SQLITE_CHECKPOINT_PASSIVE, NULL, NULL);
     return SQLITE_OK;
@@ -55,13 +55,13 @@ static int committed(void *user, sqlite3 *db, const char *name, int frames) {
 
 static bool is_full(int number) { return number == ENOSPC || number == EDQUOT || number == EFBIG; }
 
-/* False where the disk has no room for it. */
+/* Extends the log; false where the disk is full. */
 static bool extend_wal(struct store *store) {
     struct reserve *r = &store->reserve;
     int64_t wanted = WAL_HEADER + r->wal_frames * (r->page_bytes + FRAME_HEADER) + r->cushion_bytes;
     if (r->wal_fd < 0) {
         char *path = mem_printf("%s-wal", store->sql.path);
-        r->wal_fd = open(path, O_RDWR | O_CLOEXEC); /* SQLite takes no locks on this file, so it may be closed again */
+        r->wal_fd = open(path, O_RDWR | O_CLOEXEC); /* SQLite takes no locks on this file, so closing it is safe */
         mem_free(path);
     }
     if (wanted <= r->wal_bytes || r->is_unsupported || r->wal_fd < 0)
@@ -75,7 +75,7 @@ static bool extend_wal(struct store *store) {
     return !is_full(errno);
 }
 
-/* The same for the database file, which a checkpoint writes to. */
+/* The same for the database file, to which checkpoints write. */
 static bool extend_database(struct store *store) {
     struct reserve *r = &store->reserve;
     int64_t pages = r->pages_used + r->cushion_bytes / SPARE_SHARE / r->page_bytes;
@@ -88,7 +88,7 @@ static bool extend_database(struct store *store) {
         r->page_count = pages;
         return true;
     }
-    /* SQLite does not hand the reason on. */
+    /* SQLite does not pass the reason on. */
     uint64_t room = 0;
     return !(is_full(errno) ||
              (file_free_bytes(r->dir, &room, NULL) == STATUS_OK && room < (uint64_t)r->cushion_bytes));
@@ -156,7 +156,7 @@ bool store_reserve_spend(struct store *store) {
 void store_reserve_renew(struct store *store) {
     char *path = layout_reserve(store->reserve.dir);
     uint64_t room = 0;
-    /* Not all that there is: others need it more. */
+    /* Only where more than that is free: others need the space too. */
     if (access(path, F_OK) != 0 && file_free_bytes(store->reserve.dir, &room, NULL) == STATUS_OK &&
         room / 8 >= FILE_BYTES_MIN) {
         uint64_t bytes = room / 8 < FILE_BYTES ? room / 8 : FILE_BYTES;

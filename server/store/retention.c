@@ -9,7 +9,8 @@
 #include "server/store/internal.h"
 
 enum status store_keep(struct store *store, int64_t scene_ms, int64_t job_ms, int64_t upload_ms, struct error *err) {
-    enum status status = store_begin_freeing(store, err); /* without it no daemon starts to free anything */
+    enum status status =
+        store_begin_freeing(store, err); /* a daemon that cannot do this never starts to free anything */
     if (status != STATUS_OK)
         return status;
     status = sql_run(&store->sql, err, "UPDATE retention SET scene_ms = ?, job_ms = ?, upload_ms = ?", "iii", scene_ms,

@@ -4,7 +4,7 @@
  *                     ▲  └─────> rejected
  *                     └────────────┘ (rejected: uploaded again; either: to be read otherwise)
  *
- * One in `checking` that has problems waits for room on the disk.
+ * A scene in `checking` that has problems is waiting for disk space.
  *
  * `receiving` exists only while the bytes arrive, and then only in memory: a row means that the
  * archive is complete and on disk. */
@@ -16,8 +16,8 @@
 #include "server/store/internal.h"
 #include "server/store/store.h"
 
-/* The owner whose name for the scene user ?2 sees: that user himself, else the first who shares it with him or, where he
- * sees all (?1), the first who sent it. */
+/* The owner whose name for the scene user ?2 sees: that user himself, else the first who shares it with him or, where
+ * he sees all (?1), the first who sent it. */
 #define SHOWN_OWNER                                                                                                    \
     "(SELECT user_id FROM scene_owners AS o WHERE scene_id = scenes.id AND (?1 OR user_id = ?2 OR EXISTS"              \
     " (SELECT 1 FROM jobs WHERE jobs.scene_id = o.scene_id AND owner_id = o.user_id AND shared = 1))"                  \

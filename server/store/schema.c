@@ -39,7 +39,7 @@ static const char step_1[] =
     "  hint TEXT NOT NULL DEFAULT '',"
     "  idempotency_key TEXT UNIQUE,"
     "  request_sha256 TEXT,"
-    "  CHECK (wanted = 0 OR state = 1)" /* only a running job has a request pending */
+    "  CHECK (wanted = 0 OR state = 1)" /* only a running job has a pending request */
     ") STRICT;"
     "CREATE INDEX jobs_by_turn ON jobs (state, priority DESC, id);"
     "CREATE INDEX jobs_by_scene ON jobs (scene_id, state);"
@@ -65,8 +65,7 @@ static const char step_1[] =
     ") STRICT, WITHOUT ROWID;"
     "CREATE TABLE probe (id INTEGER PRIMARY KEY CHECK (id = 1), at_ms INTEGER NOT NULL) STRICT;";
 
-/* Users. A scene is one for all who have uploaded its bytes: each of them owns it; user 0 is nobody,
- * from a time without tokens. */
+/* Users. Each user who has uploaded the bytes of a scene owns it; user 0 is nobody (rows older than tokens). */
 static const char step_2[] = "CREATE TABLE users ("
                              "  id INTEGER PRIMARY KEY AUTOINCREMENT,"
                              "  name TEXT NOT NULL UNIQUE,"
@@ -93,8 +92,8 @@ static const char step_2[] = "CREATE TABLE users ("
                              "CREATE INDEX jobs_by_owner ON jobs (owner_id, state);"
                              "CREATE INDEX jobs_shared ON jobs (scene_id) WHERE shared = 1;";
 
-/* Uploads in parts. `received` bytes are on disk; `hash` is the state of their SHA-256; `boot` names
- * the run of the machine in which what lies in the file beyond them can be counted, if any. */
+/* Resumable uploads. `received` bytes are on disk; `hash` is the state of their SHA-256; `boot` is the boot id under
+ * which bytes beyond them in the file are valid, if any. */
 static const char step_3[] = "CREATE TABLE uploads ("
                              "  id TEXT PRIMARY KEY,"
                              "  owner_id INTEGER NOT NULL,"
@@ -111,7 +110,7 @@ static const char step_3[] = "CREATE TABLE uploads ("
                              ") STRICT;"
                              "CREATE INDEX uploads_by_age ON uploads (created_ms, id);";
 
-/* Places in the queue, what a retry does anew, how often a job ran out of memory. */
+/* Order in the queue, the stage of a retry, the memory steps. */
 static const char step_4[] = "ALTER TABLE jobs ADD COLUMN turn INTEGER NOT NULL DEFAULT 0;"
                              "ALTER TABLE jobs ADD COLUMN restart_from TEXT NOT NULL DEFAULT '';"
                              "ALTER TABLE jobs ADD COLUMN memory_step INTEGER NOT NULL DEFAULT 0;"
@@ -120,12 +119,12 @@ static const char step_4[] = "ALTER TABLE jobs ADD COLUMN turn INTEGER NOT NULL 
                              "CREATE INDEX jobs_by_turn ON jobs (state, priority DESC, turn);"
                              "CREATE INDEX jobs_turn ON jobs (turn);";
 
-/* Fair turns. */
+/* Fair scheduling. */
 static const char step_5[] = "CREATE TABLE usage (owner_id INTEGER PRIMARY KEY, weight REAL NOT NULL) STRICT;"
                              "DROP INDEX jobs_by_turn;"
                              "CREATE INDEX jobs_by_turn ON jobs (state, owner_id, priority DESC, turn);";
 
-/* How long things are kept. */
+/* Retention. */
 static const char step_6[] = "ALTER TABLE scenes ADD COLUMN pinned INTEGER NOT NULL DEFAULT 0 CHECK (pinned IN (0, 1));"
                              "ALTER TABLE scenes ADD COLUMN expires_ms INTEGER NOT NULL DEFAULT 0;"
                              "ALTER TABLE jobs ADD COLUMN pinned INTEGER NOT NULL DEFAULT 0 CHECK (pinned IN (0, 1));"
@@ -138,8 +137,8 @@ static const char step_6[] = "ALTER TABLE scenes ADD COLUMN pinned INTEGER NOT N
                              ") STRICT;"
                              "INSERT INTO retention VALUES (1, 0, 0, 86400000);";
 
-/* Old events go: those of a job up to pruned_id have; events_gone when its end is long past and
- * only the last is left. `pruned` has the highest id that ever went so. */
+/* Pruned events: a job's events up to pruned_id are gone; events_gone when only the last is left, long after the
+ * job's end. `pruned` has the highest id ever pruned. */
 static const char step_7[] =
     "ALTER TABLE jobs ADD COLUMN pruned_id INTEGER NOT NULL DEFAULT 0;"
     "ALTER TABLE jobs ADD COLUMN events_gone INTEGER NOT NULL DEFAULT 0;"
@@ -147,7 +146,7 @@ static const char step_7[] =
     "CREATE TABLE pruned (id INTEGER PRIMARY KEY CHECK (id = 1), event_id INTEGER NOT NULL) STRICT;"
     "INSERT INTO pruned VALUES (1, 0);";
 
-/* Webhooks of jobs, and what is still to be told. */
+/* Webhooks of jobs, and their queued messages. */
 static const char step_8[] = "CREATE TABLE webhooks ("
                              "  job_id INTEGER PRIMARY KEY REFERENCES jobs (id) ON DELETE CASCADE,"
                              "  url TEXT NOT NULL,"
@@ -169,22 +168,22 @@ static const char step_9[] =
     "ALTER TABLE uploads ADD COLUMN pinned INTEGER NOT NULL DEFAULT 0 CHECK (pinned IN (0, 1));"
     "ALTER TABLE uploads ADD COLUMN expires_ms INTEGER NOT NULL DEFAULT 0;";
 
-/* What the folders of scenes and jobs take of the disk; -1: not known. */
+/* Disk space of the folders of scenes and jobs; -1: unknown. */
 static const char step_10[] = "ALTER TABLE scenes ADD COLUMN disk_bytes INTEGER NOT NULL DEFAULT -1;"
                               "ALTER TABLE jobs ADD COLUMN disk_bytes INTEGER NOT NULL DEFAULT -1;"
                               "DROP INDEX jobs_by_owner;"
                               "CREATE INDEX jobs_by_owner ON jobs (owner_id, state, disk_bytes);";
 
-/* A scene has a name for each of its owners. */
+/* Each owner has his own name for a scene. */
 static const char step_11[] = "ALTER TABLE scene_owners ADD COLUMN name TEXT NOT NULL DEFAULT '';"
                               "UPDATE scene_owners SET name = (SELECT name FROM scenes WHERE id = scene_id);"
                               "ALTER TABLE scenes DROP COLUMN name;";
 
-/* Lists of scenes go by when each owner sent them. */
+/* Lists of scenes are ordered by when each owner uploaded them. */
 static const char step_12[] = "DROP INDEX scenes_by_age;";
 
-/* The SHA-256 that this daemon computed of an output ("": none yet), and of which version of the file. Those that
- * are here already are hashed when they are first asked for. */
+/* The SHA-256 that the daemon computed of an output ("": not yet), and of which version of the file. Existing outputs
+ * are hashed when first requested. */
 static const char step_13[] =
     "ALTER TABLE outputs ADD COLUMN digest TEXT NOT NULL DEFAULT '';"
     "ALTER TABLE outputs ADD COLUMN digest_inode INTEGER NOT NULL DEFAULT 0;"
@@ -194,14 +193,14 @@ static const char step_13[] =
     "ALTER TABLE outputs ADD COLUMN digest_wanted INTEGER NOT NULL DEFAULT 0 CHECK (digest_wanted IN (0, 1));"
     "CREATE INDEX outputs_to_hash ON outputs (bytes) WHERE digest_wanted = 1;";
 
-/* An upload of which nothing has arrived holds its space for minutes, not for hours. */
+/* An upload of which nothing has arrived reserves its space for minutes, not hours. */
 static const char step_14[] = "ALTER TABLE retention ADD COLUMN empty_upload_ms INTEGER NOT NULL DEFAULT 600000;";
 
-/* What became of a job's webhook. */
+/* The outcome of a job's webhook. */
 static const char step_15[] =
-    "ALTER TABLE webhooks ADD COLUMN result TEXT NOT NULL DEFAULT '';" /* of the last call: delivered, failed or gave_up */
-    "ALTER TABLE webhooks ADD COLUMN attempts INTEGER NOT NULL DEFAULT 0;" /* of its message */
-    "ALTER TABLE webhooks ADD COLUMN status INTEGER NOT NULL DEFAULT 0;"   /* that was answered; 0: none */
+    "ALTER TABLE webhooks ADD COLUMN result TEXT NOT NULL DEFAULT '';" /* last message: delivered, failed or gave_up */
+    "ALTER TABLE webhooks ADD COLUMN attempts INTEGER NOT NULL DEFAULT 0;" /* of that message */
+    "ALTER TABLE webhooks ADD COLUMN status INTEGER NOT NULL DEFAULT 0;"   /* the HTTP status; 0: none */
     "ALTER TABLE webhooks ADD COLUMN error TEXT NOT NULL DEFAULT '';"
     "ALTER TABLE webhooks ADD COLUMN at_ms INTEGER NOT NULL DEFAULT 0;"
     "CREATE INDEX outbox_by_job ON outbox (job_id);";

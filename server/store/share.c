@@ -1,7 +1,6 @@
-/* share.c -- what users keep on the disk, and the limit of it; see store.h.
- *
- * What the folder of a scene or a job takes is entered when it changes, so that a sum over a user's rows is
- * all that a request costs. Until it is known, and while a job runs, what is known of its files counts. */
+/* share.c -- what users keep on the disk, and their limit; see store.h. The size of each folder is stored when it
+ * changes, so a request costs one sum over the user's rows. While a size is unknown, and while a job runs, the known
+ * files count. */
 #include <stdio.h>
 
 #include "server/store/internal.h"
@@ -9,8 +8,7 @@
 
 #define MIB 1048576.0
 
-/* The sum of all that the user keeps whom the SQL expression `user` names, but for scene ?1 and job ?2. 1: the job
- * runs. */
+/* The sum of what a user keeps (an SQL expression of his id), without scene ?1 and job ?2. State 1: running. */
 #define KEPT_BY(user)                                                                                                  \
     "((SELECT ifnull(sum(max(scenes.bytes, scenes.disk_bytes)), 0) FROM scenes"                                        \
     "    JOIN scene_owners ON scene_id = scenes.id WHERE scene_owners.user_id = " user " AND scenes.id <> ?1)"         \
@@ -56,7 +54,7 @@ enum status store_user_checks(struct store *store, int64_t user_id, size_t *coun
     return status;
 }
 
-/* STATUS_LIMIT where who keeps `kept` may not have `more`. */
+/* STATUS_LIMIT where `kept` and `more` together pass the limit. */
 static enum status compare(uint64_t kept, uint64_t more, uint64_t limit, struct error *err) {
     if (kept < limit && more <= limit - kept)
         return STATUS_OK;

@@ -8,8 +8,8 @@
 
 #include "common/mem.h"
 
-/* Out of memory ends the process here, too (mem.h): a text or blob that SQLite has no memory for looks
- * like an empty one, and a checkpoint that it cannot read for that reason like a damaged one. */
+/* Out of memory ends the process (mem.h), in SQLite too: otherwise a text that SQLite has no memory for would look
+ * empty, and a checkpoint damaged. */
 static sqlite3_mem_methods plain_memory;
 
 static void *allocate(int bytes) {
@@ -26,7 +26,7 @@ static void *reallocate(void *old, int bytes) {
     return pointer;
 }
 
-/* Before the library is used for the first time; later it refuses, and all stays as it is. */
+/* Must come before the library's first use; later calls are refused and change nothing. */
 static void set_allocator(void) {
     sqlite3_mem_methods ours;
     if (sqlite3_config(SQLITE_CONFIG_GETMALLOC, &plain_memory) != SQLITE_OK)
@@ -43,8 +43,8 @@ bool sql_is_full(int code, int number) {
     return code == SQLITE_FULL || (is_full && (code == SQLITE_IOERR || code == SQLITE_CANTOPEN));
 }
 
-/* Turns an SQLite result into ours. (sqlite3_system_errno does not have the errno of a statement that fails in
- * sqlite3_step; its VFS knows errno alone, too.) Callers set errno to 0 before. */
+/* Maps an SQLite result to ours. Callers set errno to 0 before the call: sqlite3_system_errno is not set when
+ * sqlite3_step fails, while SQLite's VFS leaves the errno. */
 static enum status fail(struct sql *sql, int code, const char *doing, struct error *err) {
     int os = errno;
     const char *why = sql->db ? sqlite3_errmsg(sql->db) : sqlite3_errstr(code);
@@ -93,8 +93,8 @@ static enum status prepare(struct sql *sql, const char *text, sqlite3_stmt **stm
     return STATUS_OK;
 }
 
-/* Texts and blobs are bound without a copy: they outlive the statement's run, and a query's
- * values outlive its loop, in every caller. */
+/* Texts and blobs are bound without a copy: in every caller they outlive the statement's run, and a query's values
+ * outlive its loop. */
 static int bind_all(sqlite3_stmt *stmt, const char *types, va_list args) {
     int code = SQLITE_OK;
     for (int i = 1; types[i - 1] && code == SQLITE_OK; i++) {
@@ -202,14 +202,14 @@ enum status sql_begin(struct sql *sql, struct error *err) { return sql_run(sql, 
 enum status sql_end(struct sql *sql, enum status status, struct error *err) {
     if (status == STATUS_OK)
         status = sql_run(sql, err, "COMMIT", "");
-    /* SQLite has rolled back by itself after some errors (a full disk, say). A rollback that
-     * fails cannot be helped: the journal undoes the rest when the file is opened next. */
+    /* After some errors (a full disk) SQLite has rolled back by itself. A rollback that fails is left to the journal,
+     * at the next open. */
     if (status != STATUS_OK && !sqlite3_get_autocommit(sql->db))
         sql_run(sql, NULL, "ROLLBACK", "");
     return status;
 }
 
-/* A pragma that SQLite does not know or cannot do answers with another value, not an error. */
+/* SQLite answers a pragma that it does not know or cannot obey with another value, not with an error. */
 static enum status expect(struct sql *sql, const char *pragma, const char *wanted, struct error *err) {
     sqlite3_stmt *stmt = NULL;
     errno = 0;
@@ -230,8 +230,7 @@ static enum status configure(struct sql *sql, enum sql_journal journal, int page
     char *size = mem_printf("PRAGMA page_size=%d", page_size);
     enum status status = page_size ? sql_script(sql, size, err) : STATUS_OK;
     mem_free(size);
-    /* The lock mode comes before the journal mode: WAL then needs no shared memory, and the
-     * first access keeps the lock. */
+    /* Lock mode before journal mode: WAL then needs no shared memory, and the first access keeps the lock. */
     if (status == STATUS_OK)
         status = expect(sql, "PRAGMA locking_mode=EXCLUSIVE", "exclusive", err);
     if (status == STATUS_OK)

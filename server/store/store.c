@@ -1,4 +1,4 @@
-/* store.c -- opening, migrating and closing state.db, and counts of all of it; see store.h. */
+/* store.c -- opens, migrates, closes and counts state.db; see store.h. */
 #include "server/store/store.h"
 
 #include <sys/stat.h>
@@ -11,7 +11,7 @@
 #define EVENTS_PER_JOB 20000
 #define TABLES_MAX 32 /* more than there are */
 
-/* Each step and its version number are one transaction: a crash leaves a whole version. */
+/* Each step and its version number are one transaction: a crash leaves a complete version. */
 static enum status migrate(struct store *store, struct error *err) {
     int64_t version;
     enum status status = sql_int(&store->sql, 0, &version, err, "PRAGMA user_version", "");
@@ -36,8 +36,8 @@ static enum status migrate(struct store *store, struct error *err) {
     return status;
 }
 
-/* Damage to what decides is found before anything is decided. Events and outputs, which grow with every
- * job that ever ran, tell of theirs when they are read: a restart must not take longer every day. */
+/* The tables that decisions are based on are checked before any decision. Damage in events and outputs, which grow
+ * with every job, is found when they are read: a restart must not take longer every day. */
 static enum status check_tables(struct store *store, struct error *err) {
     char *names[TABLES_MAX];
     size_t count = 0;
@@ -74,13 +74,13 @@ enum status store_open(struct store **out, const char *dir, struct error *err) {
         status = migrate(store, err);
     if (status == STATUS_OK)
         status = store_look_for_users(store, err);
-    /* What is freed is no more written than it must be: Debian's SQLite overwrites every freed page by default. */
+    /* Do not overwrite freed pages, as Debian's SQLite does by default: it costs writes. */
     if (status == STATUS_OK)
         status = sql_script(&store->sql, "PRAGMA secure_delete=FAST", err);
     if (status == STATUS_OK)
         status = reserve_open(store, dir, err);
     if (status == STATUS_OK)
-        status = file_sync_parent(path, err); /* a new file's name is on disk too */
+        status = file_sync_parent(path, err); /* so that a new file's name is on disk too */
     mem_free(path);
     if (status != STATUS_OK)
         store_close(store);
@@ -161,7 +161,7 @@ enum status store_count(struct store *store, struct store_counts *counts, struct
                          (int)JOB_QUEUED);
     if (status == STATUS_OK)
         status = sql_int(&store->sql, 0, &counts->outbox, err, "SELECT count(*) FROM outbox", "");
-    /* The highest id, not the rows that are left: it only grows, as a counter should. */
+    /* The highest id, not the number of rows left: a counter only grows. */
     if (status == STATUS_OK)
         status =
             sql_int(&store->sql, 0, &counts->events, err, "SELECT seq FROM sqlite_sequence WHERE name = 'events'", "");

@@ -17,7 +17,7 @@
 /* log2(2^a + 2^b) */
 static double add_weights(double a, double b) { return fmax(a, b) + log2(1.0 + exp2(-fabs(a - b))); }
 
-/* The store is locked. */
+/* Keeps a charge for later. The store is locked. */
 static void owe(struct store *store, int64_t owner_id, double weight) {
     for (size_t i = 0; i < store->unpaid_count; i++)
         if (store->unpaid[i].owner_id == owner_id) {

@@ -1,5 +1,5 @@
-/* uploads.c -- the rows of uploads in parts; see store.h. The bytes are in files; a row says how
- * many of them can be relied on. */
+/* uploads.c -- the rows of resumable uploads; see store.h. The bytes are in files; a row says how many of them are
+ * reliable. */
 #include <stdio.h>
 #include <string.h>
 
@@ -43,7 +43,7 @@ static enum status not_found(const char *id, struct error *err) {
     return error_set(err, STATUS_NOT_FOUND, "there is no upload %s", id);
 }
 
-/* Runs one statement in a transaction of its own; no row changed: not found. */
+/* Ends a transaction of one statement; where it changed no row: not found. */
 static enum status end_change(struct store *store, enum status status, const char *id, struct error *err) {
     if (status == STATUS_OK && sql_changes(&store->sql) == 0)
         status = not_found(id, err);
@@ -121,7 +121,7 @@ enum status store_upload_list(struct store *store, const struct caller *who, con
     bool row = status == STATUS_OK;
     while (row) {
         status = sql_step(&store->sql, stmt, &row, err);
-        if (row && *count == limit) { /* one more than asked for: there is another page */
+        if (row && *count == limit) { /* one row more than asked for: there is another page */
             snprintf(next_cursor, 128, "%lld-%s", (long long)rows[limit - 1].created_ms, rows[limit - 1].id);
             sqlite3_reset(stmt);
             break;

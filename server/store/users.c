@@ -1,5 +1,5 @@
-/* users.c -- see users.h. A token reads "unbake_NUMBER_SECRET": the number finds the row, and only
- * the hash of the secret is compared, in constant time. */
+/* users.c -- see users.h. A token is "unbake_NUMBER_SECRET": the number finds the row; the secret's hash is compared
+ * in constant time. */
 #include "server/store/users.h"
 
 #include <ctype.h>
@@ -30,7 +30,7 @@ bool role_parse(const char *name, enum role *role) {
     return false;
 }
 
-/* --- who sees what ------------------------------------------------------------------------- */
+/* --- access ------------------------------------------------------------------------------- */
 
 static enum access access_of(const struct caller *who, bool owns, bool is_shared) {
     if (who->role == ROLE_ADMIN)
@@ -75,7 +75,7 @@ enum status store_look_for_users(struct store *store, struct error *err) {
 static bool name_is_good(const char *name) {
     size_t length = strlen(name);
     if (length == 0 || length >= USER_NAME_SIZE || !isalpha((unsigned char)name[0]))
-        return false; /* a digit would look like a token's number */
+        return false; /* a name that starts with a digit could be taken for a token's number */
     for (size_t i = 0; i < length; i++)
         if (!isalnum((unsigned char)name[i]) && !strchr("._-@", name[i]))
             return false;
@@ -133,7 +133,7 @@ enum status store_token_add(struct store *store, const char *name, enum role rol
     return STATUS_OK;
 }
 
-/* Takes the token apart; false where it does not look like one. */
+/* Splits the token; false where it is malformed. */
 static bool parse_token(const char *token, int64_t *id, const char **secret) {
     size_t prefix = strlen(TOKEN_PREFIX);
     if (strncmp(token, TOKEN_PREFIX, prefix) != 0)

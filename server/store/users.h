@@ -31,30 +31,30 @@ bool role_parse(const char *name, enum role *role);
 #define USER_NAME_SIZE 65
 #define TOKEN_SIZE 80
 
-/* Who asks. */
+/* The caller of a request. */
 struct caller {
-    int64_t user_id;  /* 0: nobody: the daemon is open, and whoever asks is an admin */
-    int64_t token_id; /* 0: none was needed */
+    int64_t user_id;  /* 0: nobody: the daemon is open, and every caller is an admin */
+    int64_t token_id; /* 0: no token was needed */
     enum role role;
     char name[USER_NAME_SIZE]; /* "" for nobody */
 };
 
 enum access { ACCESS_NONE, ACCESS_READ, ACCESS_CHANGE };
 enum access caller_access_job(const struct caller *who, const struct job *job);
-/* STATUS_OK with ACCESS_NONE also where there is no such scene. */
+/* STATUS_OK with ACCESS_NONE also where no such scene exists. */
 enum status store_scene_access(struct store *store, const struct caller *who, const char *scene_id, enum access *access,
                                struct error *err);
 
-/* Whether there is or ever was a user: from then on, nobody comes in without a token. */
+/* Whether a user exists or ever did: from then on every caller needs a token. */
 bool store_has_users(struct store *store);
 
-/* Makes a token, and the user where the name is new: 1 to 64 letters, digits and . _ - @ */
+/* Makes a token, and the user if the name is new: 1 to 64 letters, digits and . _ - @ */
 enum status store_token_add(struct store *store, const char *name, enum role role, char token[TOKEN_SIZE], int64_t *id,
                             struct error *err);
-/* The caller that presents this token; STATUS_NOT_FOUND unless it is valid. What a wrong one has
- * in common with the right one does not show in the time that this takes. */
+/* The caller that presents this token; STATUS_NOT_FOUND unless it is valid. The time taken does not depend on how
+ * much of a wrong token is right. */
 enum status store_token_find(struct store *store, const char *token, struct caller *caller, struct error *err);
-/* Ends the token of that number, or all of the user of that name. */
+/* Revokes the token of that number, or all tokens of the user of that name. */
 enum status store_token_revoke(struct store *store, const char *number_or_name, size_t *count, struct error *err);
 bool store_token_is_valid(struct store *store, int64_t id);
 
@@ -63,7 +63,7 @@ struct token_row {
     enum role role;
     char name[USER_NAME_SIZE];
 };
-/* By number; *rows is the caller's (mem_free). */
+/* Ordered by number; *rows is the caller's (mem_free). */
 enum status store_token_list(struct store *store, struct token_row **rows, size_t *count, struct error *err);
 
 #endif

@@ -12,7 +12,7 @@
 
 #define RETRY_FIRST_MS 2000.0
 #define RETRY_MOST_MS 600000.0
-#define TRIES 30 /* over four hours */
+#define TRIES 30 /* spread over four hours */
 
 enum status store_webhook_set(struct store *store, int64_t job_id, const char *url, const char *secret,
                               struct error *err) {
@@ -64,7 +64,7 @@ enum status store_outbox_next(struct store *store, int64_t after, const int64_t 
     sqlite3_stmt *stmt;
     bool found = false;
     *row = (struct outbox_row){0};
-    /* A clock that was set back must not hold a message for longer than its longest pause. */
+    /* A clock that was set back must not delay a message by more than its longest pause. */
     int64_t now = store_now_ms(), never = now + (int64_t)(2.0 * RETRY_MOST_MS);
     struct buf skipped;
     buf_init(&skipped, 4096);
@@ -105,7 +105,7 @@ enum status store_outbox_wait(struct store *store, double *seconds, struct error
     return status;
 }
 
-/* For who looks at the job; gone with it. */
+/* Records the outcome in the job; removed with it. */
 static enum status note_outcome(struct store *store, int64_t id, const struct outbox_outcome *outcome, bool gave_up,
                                 struct error *err) {
     return sql_run(
@@ -148,7 +148,7 @@ enum status store_outbox_settle(struct store *store, int64_t id, const struct ou
     return status;
 }
 
-/* A message of the job's present state. */
+/* Queues a message about the job's current state. */
 static enum status post_present(struct store *store, int64_t job_id, struct error *err) {
     sqlite3_stmt *stmt;
     bool found = false;
