@@ -1,4 +1,4 @@
-/* about.c -- `settings` and `version`: what the server, or else this program, knows of itself. */
+/* about.c -- `settings` and `version`: facts about the server, or else about this program. */
 #include <archive.h>
 #include <string.h>
 
@@ -137,7 +137,7 @@ static void print_versions_json(struct client *c, const cJSON *server) {
     cJSON_Delete(object);
 }
 
-/* A server that does not answer is part of the answer, not a failure. */
+/* An unreachable server is part of the answer, not a failure. */
 int version_run(struct client *c, const struct options *o) {
     (void)o;
     struct reply reply;

@@ -1,4 +1,4 @@
-/* client.h -- what every command gets, and how every command ends. */
+/* client.h -- what every command gets, and how it reports and exits. */
 #ifndef UNBAKE_CLIENT_CLIENT_H
 #define UNBAKE_CLIENT_CLIENT_H
 
@@ -19,7 +19,7 @@ enum client_exit {
     CLIENT_NOT_FOUND = 3,    /* no such job, scene or output */
     CLIENT_REFUSED = 4,      /* the server refused and said why */
     CLIENT_UNREACHABLE = 5,  /* no answer from the server, after several tries */
-    CLIENT_CONFLICT = 6,     /* the present state of the job or scene forbids it */
+    CLIENT_CONFLICT = 6,     /* the current state of the job or scene forbids it */
     CLIENT_LOCAL = 7,        /* a file here cannot be read or written */
     CLIENT_INTERRUPTED = 130 /* Ctrl-C; a submitted job goes on */
 };
@@ -50,7 +50,7 @@ const struct command *command_table(size_t *count);
 /* The options that every command takes. */
 extern const struct client_option command_shared_options[];
 const struct command *command_find(const char *name);
-/* What main may return, in the order of the help; ends with a NULL meaning. */
+/* Exit statuses for the help; ends with a NULL meaning. */
 extern const struct command_exit {
     int status;
     const char *meaning;
@@ -59,22 +59,22 @@ extern const char *const command_job_states[]; /* ends with NULL */
 /* Writes the help of the program (command NULL) or of one command. */
 void command_help(const struct command *command, FILE *out);
 
-/* Tells what went wrong (one JSON object with --json), with hint and invalid parameters, on
- * stderr, and returns the exit status for it. reply may be NULL. */
+/* Reports an error on stderr (one JSON object with --json), with hint and invalid parameters; returns the exit
+ * status. reply may be NULL. */
 int client_fail(struct client *c, const struct reply *reply, const struct error *err);
 /* Prints "unbake: " and a sentence to stderr unless --quiet or --json. */
 void client_note(struct client *c, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
-/* A sentence to stdout, made harmless: words of the server's are in it. */
+/* Prints a sentence to stdout, with control characters removed: it contains text of the server's. */
 void client_say(struct client *c, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
-/* "name       value" on stdout, made harmless; nothing where the value is "". */
+/* Prints "name       value" to stdout, with control characters removed; nothing if the value is "". */
 void field_print(struct client *c, const char *name, const char *value);
 
 /* A line of JSON to stdout. */
 void client_print_json(struct client *c, const cJSON *value);
 
-/* The job that a word names: its number, or `last` for the newest. */
+/* The job's number from a word: the number itself, or `last` for the newest job. */
 enum status client_job_id(struct client *c, const char *word, int64_t *id, struct reply *reply, struct error *err);
 /* GET /v1/jobs/ID. */
 enum status client_job_get(struct client *c, int64_t id, struct reply *reply, struct error *err);
@@ -82,16 +82,16 @@ enum status client_job_get(struct client *c, int64_t id, struct reply *reply, st
 enum status client_list(struct client *c, const char *path, size_t limit, cJSON **items, struct reply *reply,
                         struct error *err);
 
-/* Members of a reply, with what stands for absent, null and another type: "", `fallback`. */
+/* Members of a reply; "" or `fallback` where absent, null or of another type. */
 const char *member_text(const cJSON *object, const char *key);
 double member_number(const cJSON *object, const char *key, double fallback);
-int64_t member_whole(const cJSON *object, const char *key, int64_t fallback); /* also beyond 2^53 */
+int64_t member_whole(const cJSON *object, const char *key, int64_t fallback); /* exact beyond 2^53 too */
 const cJSON *member_items(const cJSON *object, const char *key);              /* an array or NULL */
-const char *member_name(const cJSON *member);                                 /* "" where it is an item of an array */
+const char *member_name(const cJSON *member);                                 /* "" for an item of an array */
 
 /* Unix time of an RFC 3339 time in UTC ("2024-05-06T07:08:09.123Z"); NaN for anything else. */
 double time_parse(const char *text);
-/* Seconds from then to now; never negative; NaN where time_parse gives that. */
+/* Seconds from then to now, at least 0; NaN where time_parse returns NaN. */
 double time_since(const char *text);
 
 #endif

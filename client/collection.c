@@ -62,7 +62,7 @@ static void print_removed(struct client *c, const struct collection *what, const
     cJSON_Delete(value);
 }
 
-/* GET, PATCH with `body` or DELETE of one of them. */
+/* GET, PATCH with `body` or DELETE of one thing. */
 static int one(struct client *c, const struct collection *what, const char *id, enum verb verb, bool dry_run,
                const cJSON *body) {
     static const char *const methods[VERB_COUNT] = {[VERB_KEEP] = "PATCH", [VERB_REMOVE] = "DELETE"};
@@ -89,7 +89,7 @@ static int one(struct client *c, const struct collection *what, const char *id, 
     else if (!c->quiet) {
         retention_sentence(kept, reply.json);
         bool is_used =
-            cJSON_IsString(cJSON_GetObjectItemCaseSensitive(body, "expires_at")); /* its time does not count yet */
+            cJSON_IsString(cJSON_GetObjectItemCaseSensitive(body, "expires_at")); /* its time does not apply yet */
         client_say(c, "%s %.12s is %s", what->one, id,
                    *kept     ? kept
                    : is_used ? "in use, and kept at least as long"
@@ -100,7 +100,7 @@ static int one(struct client *c, const struct collection *what, const char *id, 
     return code;
 }
 
-/* What the words ask for. */
+/* Reads the verb and its words. */
 static enum status read_verb(const struct options *o, const struct collection *what, enum verb *verb,
                              struct error *err) {
     struct nearest nearest;
@@ -123,7 +123,7 @@ static enum status read_verb(const struct options *o, const struct collection *w
                         : error_hint(err, "list, show %s..., keep %s..., rm %s...", argument, argument, argument);
 }
 
-/* An option that the verb does not take was meant for another one. */
+/* Refuses options that the verb does not take. */
 static enum status check_options(const struct options *o, const struct collection *what, enum verb verb, bool keeps,
                                  struct error *err) {
     if (verb == VERB_KEEP && !keeps)

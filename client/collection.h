@@ -1,4 +1,4 @@
-/* collection.h -- what `scenes` and `uploads` have in common: list, show, keep, rm. */
+/* collection.h -- shared by `scenes` and `uploads`: list, show, keep, rm. */
 #ifndef UNBAKE_CLIENT_COLLECTION_H
 #define UNBAKE_CLIENT_COLLECTION_H
 
@@ -14,7 +14,7 @@ struct collection {
 
 extern const struct client_option collection_options[];
 
-/* The whole of such a command. */
+/* Runs such a command. */
 int collection_run(struct client *c, const struct options *o, const struct collection *what);
 
 #endif

@@ -34,7 +34,7 @@ static enum status read_all(const char *path, struct buf *text, struct error *er
     return file_read(path, text, err);
 }
 
-/* Whether `line` is of that server: *token is then what follows its URL. */
+/* Whether `line` belongs to that server; *token is then what follows its URL. */
 static bool is_of(const char *line, const char *server, const char **token) {
     size_t length = strlen(server);
     if (strncmp(line, server, length) != 0 || line[length] != ' ')
@@ -62,7 +62,7 @@ enum status credentials_find(const char *server, char **token, struct error *err
     return status;
 }
 
-/* Unlike file_replace's, this file is never, not even for a moment, readable by others. */
+/* Unlike file_replace, never makes the file readable by others, not even for a moment. */
 static enum status replace(const char *path, const struct buf *text, struct error *err) {
     char *temporary = mem_printf("%s.XXXXXX", path);
     enum status status = STATUS_OK;

@@ -1,4 +1,4 @@
-/* edit.c -- `edit` and `extend`: what changes a job besides its state. */
+/* edit.c -- `edit` and `extend`: change a job's attributes and limits. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -25,7 +25,7 @@ const struct client_option extend_options[] = {
     {0},
 };
 
-/* Sends the body to /v1/jobs/ID`suffix` and tells what the job is then. */
+/* Sends the body to /v1/jobs/ID`suffix` and prints the job's new state. */
 static int send_change(struct client *c, int64_t id, const char *method, const char *suffix, const cJSON *body) {
     struct reply reply;
     struct error err;
@@ -33,7 +33,7 @@ static int send_change(struct client *c, int64_t id, const char *method, const c
     char path[80], kept[40];
     reply_init(&reply);
     snprintf(path, sizeof path, "/v1/jobs/%lld%s", (long long)id, suffix);
-    /* Only the members that are named change: whatever else did meanwhile stays. */
+    /* If-Match: *: only the named members change, whatever else has changed meanwhile. */
     struct request_call call = {.path = path, .method = method, .body = body, .header = {"If-Match: *"}};
     enum status status = request_run(c->request, &call, &reply, &err);
     if (status != STATUS_OK)

@@ -25,7 +25,7 @@
 #include "common/sha256.h"
 
 #define PATIENCE_SEC 60.0
-#define VERSIONS_MAX 5 /* a file that changes more often while it is fetched is given up */
+#define VERSIONS_MAX 5 /* give up on a file that changes more often during the download */
 
 const struct client_option get_options[] = {
     {"output", 'o', OPTION_TEXT, "DIR", "where the files go; it is made if need be (job-JOB)"},
@@ -40,7 +40,7 @@ struct fetch {
     struct reply reply;
     struct error *err;
 
-    /* The file in hand. */
+    /* The current file: */
     char *name, *path, *part; /* owned */
     char sha256[SHA256_HEX_SIZE];
     uint64_t bytes;
@@ -48,8 +48,8 @@ struct fetch {
     uint64_t have; /* bytes of NAME.part, all of them in `hash` */
     struct sha256 hash;
     bool resumed;
-    double moved_at;          /* when bytes last came */
-    enum status write_status; /* a failure on this side, while bytes come in */
+    double moved_at;          /* when bytes last arrived */
+    enum status write_status; /* a local write error during the transfer */
     struct meter meter;
 };
 
@@ -102,7 +102,7 @@ static enum status look_up(struct fetch *f) {
     return STATUS_OK;
 }
 
-/* Every word must match something, before anything is fetched. */
+/* Every word must match an output, before anything is fetched. */
 static enum status check_words(struct fetch *f, const struct options *o) {
     for (size_t i = 1; i < o->word_count; i++) {
         struct nearest nearest;
@@ -170,14 +170,14 @@ static enum status open_part(struct fetch *f) {
 
 static bool on_bytes(void *user, const struct reply *reply, const char *bytes, size_t length) {
     struct fetch *f = user;
-    /* The first piece of a reply says whether the server goes on or begins anew. */
+    /* The first piece of a reply tells whether the server resumes or starts over. */
     if (f->moved_at < 0.0 && !(reply->code == 206 && reply->range_first == (int64_t)f->have)) {
         f->resumed = false;
         f->write_status = empty_part(f);
     }
     f->moved_at = clock_sec();
     if (f->write_status == STATUS_OK && f->have + length > f->bytes) {
-        f->have = f->bytes + 1; /* longer than listed: another version; the hash will not fit */
+        f->have = f->bytes + 1; /* longer than listed: another version; the hash will differ */
         return false;
     }
     if (f->write_status == STATUS_OK)
@@ -210,13 +210,13 @@ static enum status request_rest(struct fetch *f) {
     enum status status = request_run(f->client->request, &call, &f->reply, f->err);
     buf_release(&path);
     if (f->write_status != STATUS_OK) {
-        f->reply.code = 0; /* the failure is ours, not the server's */
+        f->reply.code = 0; /* a local failure, not the server's */
         return f->write_status;
     }
     return status;
 }
 
-/* Fetches until NAME.part is as long as the file, through breaks of the connection. */
+/* Fetches until NAME.part has the file's length, over broken connections. */
 static enum status fetch_rest(struct fetch *f) {
     double patience = f->client->retry_sec >= 0.0 ? f->client->retry_sec : PATIENCE_SEC;
     double last = clock_sec();
@@ -227,7 +227,7 @@ static enum status fetch_rest(struct fetch *f) {
             tries = 0;
         }
         if (status == STATUS_OK && f->have < f->bytes)
-            return STATUS_OK; /* a shorter version: the hash will not fit */
+            return STATUS_OK; /* a shorter version: the hash will differ */
         if (status != STATUS_OK && (status != STATUS_UNAVAILABLE || clock_sec() - last > patience))
             return status;
         if (status != STATUS_OK && !request_pause(f->client->request, tries, f->reply.retry_after_sec))
@@ -276,7 +276,7 @@ static enum status fetch_verified(struct fetch *f) {
     return error_set(f->err, STATUS_CONFLICT, "%s changes faster than it can be fetched", f->name);
 }
 
-/* One object for --json: what became of a file. */
+/* One object for --json: the outcome for a file. */
 static cJSON *result_of(const struct fetch *f, const char *action) {
     cJSON *result = cJSON_CreateObject();
     json_add_string(result, "name", f->name);
@@ -343,7 +343,7 @@ static enum status fetch_all(struct fetch *f, const struct options *o, cJSON *re
         return error_hint(f->err, "`unbake watch %lld` shows how far it is", (long long)f->job);
     }
     status = check_words(f, o);
-    cJSON *first = cJSON_Duplicate(f->outputs, true); /* the list may be asked for again meanwhile */
+    cJSON *first = cJSON_Duplicate(f->outputs, true); /* the list may be fetched again meanwhile */
     const cJSON *item;
     cJSON_ArrayForEach(item, first) {
         const char *name = member_text(item, "name");

@@ -1,4 +1,4 @@
-/* jobs.c -- `list`, `show`, and what is asked of jobs: cancel, pause, resume, retry, rm. */
+/* jobs.c -- `list`, `show`, and actions on jobs: cancel, pause, resume, retry, rm. */
 #include <math.h>
 #include <string.h>
 
@@ -38,7 +38,7 @@ static enum status check_state(const char *state, struct error *err) {
                         : error_hint(err, "queued, running, paused, succeeded, failed or cancelled");
 }
 
-/* The last progress that was reported falls short of the end. */
+/* A finished job counts as 100 %: its last report falls short of that. */
 static double percent_done(const cJSON *job) {
     bool succeeded = strcmp(member_text(job, "state"), JOB_STATE_SUCCEEDED) == 0;
     return succeeded ? 100.0 : floor(100.0 * member_number(job, "progress", 0.0));
@@ -147,7 +147,7 @@ static void print_outputs(struct client *c, const cJSON *outputs) {
     table_release(&t);
 }
 
-/* Where the job's states are told, and what became of that. */
+/* The webhook, and the outcome of its last message. */
 static void print_webhook(struct client *c, const cJSON *job) {
     const cJSON *d = cJSON_GetObjectItemCaseSensitive(job, "webhook_delivery");
     double status = member_number(d, "last_status", 0.0);
@@ -231,7 +231,7 @@ int show_run(struct client *c, const struct options *o) {
 
 /* --- actions ------------------------------------------------------------------------------- */
 
-/* DELETE of a job, or what that would do. */
+/* DELETE of a job; in a dry run, prints what that would do. */
 static int remove_job(struct client *c, const char *word, bool dry_run) {
     struct reply reply;
     struct error err;
@@ -289,8 +289,7 @@ static int act_on(struct client *c, const char *word, const char *action) {
     return code;
 }
 
-/* All of them, also after one failed; the first failure is the exit status. Removes them where
- * there is no action. */
+/* Acts on all jobs, also after a failure; the first failure is the exit status. Without an action, removes them. */
 static int act_on_all(struct client *c, const struct options *o, const char *action) {
     int first = CLIENT_OK;
     for (size_t i = 0; i < o->word_count; i++) {

@@ -1,4 +1,4 @@
-/* login.c -- `login` and `logout`: the token of a server, asked for once. */
+/* login.c -- `login` and `logout`: stores and removes a server's token. */
 #include <poll.h>
 #include <string.h>
 #include <termios.h>
@@ -10,7 +10,7 @@
 
 #define TOKEN_MAX 256
 
-/* Until stdin has a line, or an end; false when interrupted. */
+/* Waits until stdin has a line or ends; false when interrupted. */
 static bool wait_for_line(struct client *c) {
     struct pollfd wait = {.fd = STDIN_FILENO, .events = POLLIN};
     while (!request_interrupted(c->request))
@@ -19,7 +19,7 @@ static bool wait_for_line(struct client *c) {
     return false;
 }
 
-/* A line of stdin; from a terminal without showing it. "" at its end. False when interrupted. */
+/* Reads a line of stdin, from a terminal without echo. "" at its end. False when interrupted. */
 static bool read_token(struct client *c, char token[TOKEN_MAX]) {
     struct termios old, silent;
     bool is_terminal = tcgetattr(STDIN_FILENO, &old) == 0;
@@ -29,7 +29,7 @@ static bool read_token(struct client *c, char token[TOKEN_MAX]) {
         silent.c_lflag &= ~(tcflag_t)ECHO;
         tcsetattr(STDIN_FILENO, TCSAFLUSH, &silent);
     }
-    /* Signals only end the waiting (main.c blocks them): the terminal is always put right again. */
+    /* Signals only end the wait (main.c blocks them), so the terminal is always restored. */
     bool waited = wait_for_line(c), got = waited && fgets(token, TOKEN_MAX, stdin) != NULL;
     if (is_terminal) {
         tcsetattr(STDIN_FILENO, TCSAFLUSH, &old);
@@ -39,7 +39,7 @@ static bool read_token(struct client *c, char token[TOKEN_MAX]) {
     return waited;
 }
 
-/* Asks the server who has this token. */
+/* Asks the server whose token it is. */
 static enum status check(struct client *c, const char *token, struct reply *reply, struct error *err) {
     request_set_token(c->request, token);
     enum status status = request_get(c->request, "/v1/session", reply, err);

@@ -44,7 +44,7 @@ static int unknown_command(struct client *c, const char *name) {
     return client_fail(c, NULL, &err);
 }
 
-/* Whether --json stands among the words, also where they are at fault and were not all read. */
+/* Whether --json is among the words, even if they could not be parsed. */
 static bool asks_for_json(int argc, char *const *argv) {
     for (int i = 1; i < argc && strcmp(argv[i], "--") != 0; i++)
         if (strcmp(argv[i], "--json") == 0)
@@ -52,8 +52,7 @@ static bool asks_for_json(int argc, char *const *argv) {
     return false;
 }
 
-/* Options that all commands share may come first, too (`unbake --json list`): they are put behind the
- * command's name. */
+/* Shared options may precede the command (`unbake --json list`): they are moved behind its name. */
 static void put_command_first(int argc, char **argv) {
     int at = 1;
     while (at < argc && options_length(argv[at], command_shared_options) > 0)
@@ -78,7 +77,7 @@ static int check_words(struct client *c, const struct command *command, const ch
     return client_fail(c, NULL, &err);
 }
 
-/* Gives the request the token for its server, and what certificates to trust. */
+/* Sets the request's token for its server, and the certificates to trust. */
 static int present_token(struct client *c, const struct options *o) {
     struct error err;
     const char *given = getenv("UNBAKE_TOKEN"), *ca = getenv("UNBAKE_CA");
@@ -114,7 +113,7 @@ static int run(struct client *c, const struct command *command, const struct opt
     return code;
 }
 
-/* Finds the command, checks its words and runs it; what main returns. */
+/* Finds the command, checks its words and runs it; returns the exit status. */
 static int dispatch(struct client *c, int argc, char **argv) {
     struct options o;
     struct error err;
@@ -162,7 +161,7 @@ int main(int argc, char **argv) {
     terminal_init(&c.out, stdout);
     terminal_init(&c.err, stderr);
     int code = dispatch(&c, argc, argv);
-    /* A full disk or a closed pipe must not look like success; an earlier flush may have met it. */
+    /* A full disk or a closed pipe must not look like success; an earlier flush may have failed too. */
     if ((fflush(stdout) != 0 || ferror(stdout)) && code == CLIENT_OK) {
         error_set(&err, STATUS_IO, "cannot write all to standard output");
         code = client_fail(&c, NULL, &err);

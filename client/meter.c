@@ -5,8 +5,8 @@
 
 #include "common/clock.h"
 
-#define SMOOTHING_SEC 4.0 /* how far back the rate remembers */
-#define MEASURE_SEC 0.25  /* shorter spans say little */
+#define SMOOTHING_SEC 4.0 /* time constant of the smoothed rate */
+#define MEASURE_SEC 0.25  /* shorter intervals are too noisy */
 #define REDRAW_SEC 0.1
 #define BAR_COLUMNS 24
 

@@ -14,16 +14,16 @@ struct meter {
     double total;              /* bytes; 0: unknown */
     double done;
     double rate;                       /* bytes a second, smoothed; negative before the first figure */
-    double measured_at, measured_done; /* where the rate was last brought up to date */
+    double measured_at, measured_done; /* at the last update of the rate */
     double drawn_at;
 };
 
-/* `done` bytes are there already (a download that goes on) and do not count for the rate. */
+/* `done` bytes are there already (a resumed download) and do not count for the rate. */
 void meter_begin(struct meter *m, struct terminal *terminal, const char *label, double done, double total);
 void meter_update(struct meter *m, double done);
-void meter_end(struct meter *m); /* takes the line away */
+void meter_end(struct meter *m); /* clears the line */
 
-/* The two pieces, for those who bring their own clock: */
+/* The parts of it, for callers with their own clock: */
 void meter_measure(struct meter *m, double now, double done);
 void meter_text(const struct meter *m, struct buf *out, size_t columns, bool unicode);
 

@@ -59,7 +59,7 @@ static enum status check_value(const struct client_option *option, const char *t
     return STATUS_OK;
 }
 
-/* The option that begins with `argument`; *text is the value in the same word, if there is one. */
+/* The option that `argument` begins with; *text is a value in the same word, if any. */
 static const struct client_option *read_option(const char *argument, const struct client_option *own,
                                                const struct client_option *shared, const char **text) {
     const struct client_option *option;

@@ -1,7 +1,6 @@
-/* options.h -- a command line as a table of options says it should be.
- *
- * Options and other words may come in any order; `--name value`, `--name=value`, `-o value` and
- * `-ovalue` are the same; `--` ends the options. Nothing is copied: texts are borrowed from argv. */
+/* options.h -- parses a command line by a table of options. Options and other words may come in any order; `--name
+ * value`, `--name=value`, `-o value` and `-ovalue` are the same; `--` ends the options. Texts are borrowed from
+ * argv. */
 #ifndef UNBAKE_CLIENT_OPTIONS_H
 #define UNBAKE_CLIENT_OPTIONS_H
 
@@ -13,9 +12,9 @@
 enum option_kind {
     OPTION_FLAG,
     OPTION_TEXT,
-    OPTION_LIST,   /* a text that may be given again and again */
+    OPTION_LIST,   /* a text; may be given several times */
     OPTION_WHOLE,  /* a whole number of at most 9 digits, may be negative */
-    OPTION_SECONDS /* a number of seconds (or what the help says), 0 or more */
+    OPTION_SECONDS /* a number of seconds (or of another unit, by the help), 0 or more */
 };
 
 struct client_option {
@@ -34,17 +33,16 @@ struct options_given {
 struct options {
     struct options_given *given; /* [given_count], in the order of the command line; owned */
     size_t given_count;
-    const char **word; /* [word_count] what is no option; owned array of borrowed texts */
+    const char **word; /* [word_count] words that are not options; owned array of borrowed texts */
     size_t word_count;
 };
 
-/* Parses argv[count] by two tables (a command's own, then the ones that all commands share).
- * STATUS_INPUT, with the nearest valid name as the hint, when it does not fit them. */
+/* Parses argv[count] by two tables (the command's own, and the shared one). On a mismatch STATUS_INPUT, with the
+ * nearest valid name as hint. */
 enum status options_parse(struct options *o, int count, char *const *argv, const struct client_option *own,
                           const struct client_option *shared, struct error *err);
 void options_release(struct options *o);
-/* How many words the option that begins with `word` takes of a command line, by that table; 0 where it is
- * none of them. */
+/* Number of words that the option beginning with `word` takes; 0 if it is not in the table. */
 int options_length(const char *word, const struct client_option *table);
 
 bool options_flag(const struct options *o, const char *name);

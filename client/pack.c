@@ -19,7 +19,7 @@
 #include "common/mem.h"
 
 #define CHUNK 65536
-#define DEEPEST 32 /* folders within folders; more is a loop of links */
+#define DEEPEST 32 /* nested folders; a deeper path is a loop of links */
 
 struct pack_entry {
     char *name; /* inside the archive; owned */
@@ -29,17 +29,17 @@ struct pack_entry {
 struct pack {
     char *path; /* owned */
     bool is_folder;
-    struct pack_entry *entry; /* [count] sorted by name; the file itself where path is no folder */
+    struct pack_entry *entry; /* [count] sorted by name; the file itself if path is not a folder */
     size_t count, capacity;
     uint64_t content_bytes;
 
     /* The stream. */
-    struct archive *archive; /* NULL where path is no folder, and once the end is written */
+    struct archive *archive; /* NULL if path is not a folder, and after the end is written */
     struct buf ready;        /* written by libarchive, not yet read */
     size_t ready_taken;
-    size_t next;   /* entry that comes next */
+    size_t next;   /* index of the next entry */
     int fd;        /* of entry[next - 1], -1 between entries */
-    uint64_t left; /* of that file */
+    uint64_t left; /* bytes left of that file */
     char chunk[CHUNK];
 };
 
@@ -56,7 +56,7 @@ static int by_name(const void *a, const void *b) {
     return strcmp(((const struct pack_entry *)a)->name, ((const struct pack_entry *)b)->name);
 }
 
-/* Adds the files under `folder`, whose names in the archive begin with `prefix`. */
+/* Adds the files under `folder`; their names in the archive begin with `prefix`. */
 static enum status list_folder(struct pack *p, const char *folder, const char *prefix, int depth, struct error *err) {
     if (depth > DEEPEST)
         return error_set(err, STATUS_INPUT, "%s: folders are more than %d deep: do links lead back?", folder, DEEPEST);

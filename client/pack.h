@@ -16,23 +16,22 @@
 
 struct pack; /* opaque */
 
-/* Looks at `path`, a folder or a file. Nothing is read yet. */
+/* Opens `path`, a folder or a file; lists it, reads no content. */
 enum status pack_open(struct pack **pack, const char *path, struct error *err);
 void pack_close(struct pack *pack);
 
 bool pack_is_folder(const struct pack *pack);
 size_t pack_file_count(const struct pack *pack);
-/* Sum of the files' sizes: what is to be read, a little less than what is to be sent. */
+/* Sum of the files' sizes: bytes to read; slightly less than the bytes to send. */
 uint64_t pack_content_bytes(const struct pack *pack);
 
-/* Starts the stream (again) at its first byte. */
+/* Moves the stream (back) to its first byte. */
 enum status pack_rewind(struct pack *pack, struct error *err);
-/* Reads up to `room` bytes; *got is 0 at the end and only there. STATUS_CONFLICT when a file
- * became shorter since it was looked at. */
+/* Reads up to `room` bytes; *got is 0 only at the end. STATUS_CONFLICT when a file has become shorter. */
 enum status pack_read(struct pack *pack, void *bytes, size_t room, size_t *got, struct error *err);
 
-/* Reads the whole stream once for its length and SHA-256. `tick` (may be NULL) hears how far it
- * is; false from it ends the reading with STATUS_CANCELLED. */
+/* Reads the whole stream for its length and SHA-256. `tick` (may be NULL) receives the bytes read; returning false
+ * ends the reading with STATUS_CANCELLED. */
 enum status pack_measure(struct pack *pack, bool (*tick)(void *user, uint64_t done), void *user, uint64_t *length,
                          char sha256[SHA256_HEX_SIZE], struct error *err);
 

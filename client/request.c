@@ -39,8 +39,8 @@ struct request_try {
     const struct request_call *call;
     struct reply *reply;
     struct error *err;
-    enum status read_status; /* what ended the pulling of the body */
-    bool stopped;            /* the sink had enough */
+    enum status read_status; /* error while pulling the body */
+    bool stopped;            /* the sink ended the transfer */
     bool too_long;
 };
 
@@ -135,7 +135,7 @@ static size_t on_header(char *bytes, size_t size, size_t count, void *user) {
     char line[512];
     snprintf(line, sizeof line, "%.*s", (int)(length < sizeof line ? length : sizeof line - 1), bytes);
     line[strcspn(line, "\r\n")] = '\0';
-    if (strncmp(line, "HTTP/", 5) == 0) { /* also after a 100 Continue: what came before is void */
+    if (strncmp(line, "HTTP/", 5) == 0) { /* a new head, possibly after 100 Continue: drop the old one */
         const char *code = strchr(line, ' ');
         reply->code = code ? strtol(code, NULL, 10) : 0;
         reply->content_type[0] = '\0';
@@ -187,7 +187,7 @@ static bool is_loopback(const char *server) {
 
 bool request_is_loopback(const struct http_request *r) { return is_loopback(r->server); }
 
-/* Sets up the handle; the returned list of headers and the texts must live until the end. */
+/* Configures the handle; the returned list of headers and the texts must outlive the transfer. */
 static struct curl_slist *set_up(struct request_try *a, const char *url, const char *body) {
     const struct request_call *call = a->call;
     CURL *easy = a->request->easy;
@@ -235,7 +235,7 @@ static struct curl_slist *set_up(struct request_try *a, const char *url, const c
     return headers;
 }
 
-/* Drives the transfer to its end; false when interrupted. */
+/* Runs the transfer to its end; false when interrupted. */
 static bool drive(struct request_try *a, CURLcode *result) {
     struct http_request *r = a->request;
     int running = 1;
@@ -264,7 +264,7 @@ static bool drive(struct request_try *a, CURLcode *result) {
 static enum status transport_failed(struct request_try *a, CURLcode code, const char *detail) {
     struct error *err = a->err;
     const char *why = *detail ? detail : curl_easy_strerror(code);
-    long number = 0; /* of the operating system: "Connection refused" says more than curl does */
+    long number = 0; /* errno: "Connection refused" says more than curl's text */
     if (code == CURLE_COULDNT_CONNECT && curl_easy_getinfo(a->request->easy, CURLINFO_OS_ERRNO, &number) == CURLE_OK &&
         number > 0)
         why = strerror((int)number);
@@ -282,7 +282,7 @@ static enum status transport_failed(struct request_try *a, CURLcode code, const 
     return error_hint(err, "is unbaked running there? --server URL or UNBAKE_SERVER names another");
 }
 
-/* One try. *unsent: the server cannot have got the request. */
+/* One try. *unsent: the server cannot have received the request. */
 static enum status transfer(struct request_try *a, const char *url, const char *body, bool *unsent) {
     struct http_request *r = a->request;
     char detail[CURL_ERROR_SIZE] = "";
@@ -300,7 +300,7 @@ static enum status transfer(struct request_try *a, const char *url, const char *
         return a->read_status;
     if (a->too_long)
         return error_set(a->err, STATUS_LIMIT, "%s sent more than %zu bytes", url, BODY_MAX);
-    /* A server that refuses an upload early may close before all is sent: its reply counts. */
+    /* A server that refuses an upload early may close before everything is sent: its reply counts. */
     if (code == CURLE_OK || a->stopped || (code == CURLE_SEND_ERROR && a->reply->code >= 400))
         return STATUS_OK;
     *unsent = code == CURLE_COULDNT_CONNECT || code == CURLE_COULDNT_RESOLVE_HOST;
@@ -315,7 +315,7 @@ static enum status try_once(struct request_try *a, const char *url, const char *
     if (status == STATUS_OK)
         status = transfer(a, url, body, unsent);
     if (status != STATUS_OK)
-        a->reply->code = 0; /* a 100 Continue is no reply, half a reply is none either */
+        a->reply->code = 0; /* neither 100 Continue nor half a reply is a reply */
     return status;
 }
 

@@ -21,31 +21,31 @@
 struct http_request; /* a server and the connection to it; opaque */
 
 struct http_request *request_new(const char *server_url, double retry_sec, int signal_fd);
-/* Sent with every request from now on; NULL: none. Never shown anywhere. */
+/* Sent with every request from now on; NULL: none. Never printed. */
 void request_set_token(struct http_request *r, const char *token);
-/* A file of certificates to trust in place of the system's. */
+/* A file of certificates to trust instead of the system's. */
 void request_set_ca(struct http_request *r, const char *path);
 bool request_is_loopback(const struct http_request *r); /* the server's address */
 void request_free(struct http_request *r);
-const char *request_server(const struct http_request *r); /* the URL, without a slash at its end */
+const char *request_server(const struct http_request *r); /* the URL, without a trailing slash */
 const char *request_library_version(void);                /* libcurl's */
 
 /* True once SIGINT or SIGTERM has come. */
 bool request_interrupted(struct http_request *r);
-/* Waits before a further try (0, 1, ...): 0.1 s, doubled each time, at most 5 s, or what the
- * server asked for (`asked_sec`, negative: nothing). False when interrupted. */
+/* Pauses before another try (0, 1, ...): 0.1 s, doubled each time, at most 5 s; or `asked_sec`, by the server's
+ * request (negative: none). False when interrupted. */
 bool request_pause(struct http_request *r, int tries, double asked_sec);
 
-/* What came back. */
+/* A reply. */
 struct reply {
     long code;       /* HTTP status; 0: no reply at all */
-    struct buf body; /* but for what went to a sink */
-    cJSON *json;     /* the body where it is JSON, also a problem; else NULL */
+    struct buf body; /* except what went to a sink */
+    cJSON *json;     /* the body if it is JSON, including problems; else NULL */
     char content_type[128];
-    double retry_after_sec; /* negative: not said */
-    int64_t range_first;    /* of Content-Range; -1: not said */
-    char location[256];     /* "": not said */
-    int64_t upload_offset;  /* -1: not said */
+    double retry_after_sec; /* negative: absent */
+    int64_t range_first;    /* of Content-Range; -1: absent */
+    char location[256];     /* "": absent */
+    int64_t upload_offset;  /* -1: absent */
 };
 void reply_init(struct reply *reply);
 void reply_release(struct reply *reply);
@@ -56,27 +56,27 @@ struct request_call {
     const char *header[4]; /* more headers, "Name: value"; unused ones NULL */
 
     const cJSON *body; /* sent as JSON; NULL: none */
-    /* Or a body that is pulled: `read` as pack_read, `rewind` before every try. */
+    /* Or a body that is pulled: `read` as pack_read; `rewind` is called before every try. */
     enum status (*read)(void *user, void *bytes, size_t room, size_t *got, struct error *err);
     enum status (*rewind)(void *user, struct error *err);
     uint64_t read_length;
-    const char *content_type; /* of that body; NULL: application/octet-stream */
+    const char *content_type; /* of a pulled body; NULL: application/octet-stream */
 
-    /* Gets the body of a 200 or 206 piece by piece; false ends the request, successfully. */
+    /* Receives the body of a 200 or 206 piece by piece; returning false ends the request successfully. */
     bool (*sink)(void *user, const struct reply *reply, const char *bytes, size_t length);
-    /* Called a few times a second while the request runs, with the bytes sent so far. */
+    /* Called a few times a second during the request, with the bytes sent so far. */
     void (*tick)(void *user, double sent);
     void *user;
 
-    double silence_sec; /* nothing moves so long: the connection is dead; 0: 300 s */
-    bool once;          /* the caller sees to further tries */
-    bool same_twice;    /* a second try does no harm (GET always is so) */
+    double silence_sec; /* the connection is dead after this long without traffic; 0: 300 s */
+    bool once;          /* no retries here; the caller does them */
+    bool same_twice;    /* a repeated request does no harm (always true of GET) */
 };
 
-/* Runs a request. Status codes of 400 and above become an error with the problem's detail and
- * hint: 404 STATUS_NOT_FOUND, 409 and 412 STATUS_CONFLICT, 502 to 504 STATUS_UNAVAILABLE, 507
- * STATUS_NO_SPACE, 413 and 429 STATUS_LIMIT, other 5xx STATUS_INTERNAL, else STATUS_INPUT.
- * reply->code tells them from errors of our own (0). *reply is emptied first. */
+/* Runs a request. Status codes of 400 and above become an error with the problem's detail and hint: 404
+ * STATUS_NOT_FOUND, 409 and 412 STATUS_CONFLICT, 502 to 504 STATUS_UNAVAILABLE, 507 STATUS_NO_SPACE, 413 and 429
+ * STATUS_LIMIT, other 5xx STATUS_INTERNAL, else STATUS_INPUT. reply->code is 0 for local errors. *reply is emptied
+ * first. */
 enum status request_run(struct http_request *r, const struct request_call *call, struct reply *reply,
                         struct error *err);
 

@@ -1,4 +1,4 @@
-/* retention.h -- how long the server keeps things and what they take, as options and columns. */
+/* retention.h -- options and columns on how long the server keeps things and their disk usage. */
 #ifndef UNBAKE_CLIENT_RETENTION_H
 #define UNBAKE_CLIENT_RETENTION_H
 
@@ -10,14 +10,14 @@
         "keep-days", 0, OPTION_SECONDS, "N", "remove it N days from now; 0: as the server's rules say"                 \
     }
 
-/* Adds what those options ask for to the body of a PATCH. */
+/* Adds what those options request to the body of a PATCH. */
 enum status retention_describe(const struct options *o, cJSON *body, struct error *err);
 
-/* "pinned", the time that is left ("3d 4h"), or "" where a job, scene or upload is kept for ever. */
+/* "pinned", the time left ("3d 4h"), or "" where a job, scene or upload does not expire. */
 void retention_text(char out[16], const cJSON *thing);
 /* The same in full: "never: pinned", or the time; borrowed. */
 const char *retention_time(const cJSON *thing);
-/* What a job or scene takes of the server's disk ("1.5 GiB"), or "" where that is not known. */
+/* Disk usage of a job or scene on the server ("1.5 GiB"), or "" if unknown. */
 void retention_disk(char out[16], const cJSON *thing);
 /* "kept for good", "removed in 3d04h", or "". */
 void retention_sentence(char out[40], const cJSON *thing);

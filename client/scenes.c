@@ -1,4 +1,4 @@
-/* scenes.c -- `scenes`: what was uploaded. */
+/* scenes.c -- `scenes`: the uploaded rooms. */
 #include <string.h>
 
 #include "client/collection.h"

@@ -24,7 +24,7 @@ void sse_restart(struct sse *s) {
     memcpy(s->pending_id, s->last_id, sizeof s->pending_id);
 }
 
-/* The blank line that ends an event. One without data is not given out, as the standard says. */
+/* A blank line ends an event. An event without data is dropped, as the standard says. */
 static bool dispatch(struct sse *s) {
     memcpy(s->last_id, s->pending_id, sizeof s->last_id);
     bool go_on = true;
@@ -44,7 +44,7 @@ static bool field(struct sse *s, const char *name, const char *value) {
         snprintf(s->type, sizeof s->type, "%s", value);
     else if (strcmp(name, "id") == 0 && strlen(value) < sizeof s->pending_id)
         snprintf(s->pending_id, sizeof s->pending_id, "%s", value);
-    return true; /* others are ignored, as the standard says; so is "retry": pauses grow by themselves */
+    return true; /* unknown fields are ignored, as the standard says; "retry" too: pauses grow by themselves */
 }
 
 static bool end_of_line(struct sse *s) {

@@ -13,25 +13,25 @@
 #define SSE_EVENT_MAX ((size_t)4 << 20)
 #define SSE_ID_MAX 128
 
-/* Gets each event; type is "message" where the stream names none. False stops the stream. */
+/* Receives each event; type is "message" where the stream names none. Returning false stops the stream. */
 typedef bool sse_each(void *user, const char *type, const char *data, const char *id);
 
 struct sse {
     struct buf line, data;
     char type[64];
     char pending_id[SSE_ID_MAX];
-    char last_id[SSE_ID_MAX]; /* of the last event given out: what Last-Event-ID must say */
-    bool after_cr;            /* an LF that follows belongs to the line that ended */
-    bool begun;               /* a byte-order mark can no longer come */
+    char last_id[SSE_ID_MAX]; /* of the last event delivered; for Last-Event-ID */
+    bool after_cr;            /* a following LF belongs to the line that has ended */
+    bool begun;               /* no byte-order mark can follow */
     sse_each *each;
     void *user;
 };
 
 void sse_init(struct sse *s, sse_each *each, void *user);
 void sse_release(struct sse *s);
-/* Forgets a half-received event (the connection broke); last_id stays. */
+/* Drops a half-received event after a broken connection; last_id stays. */
 void sse_restart(struct sse *s);
-/* False when `each` said stop or an event was too large. */
+/* False when `each` returned false or an event was too large. */
 bool sse_feed(struct sse *s, const char *bytes, size_t length);
 
 #endif

@@ -1,8 +1,6 @@
-/* terminal.h -- what a person sees: lines drawn in place, colour, numbers in short form.
- *
- * A terminal is "live" when its stream is a screen that can redraw a line; on a pipe, a file or
- * TERM=dumb nothing is drawn in place and no escape sequence is written. Colour also needs
- * NO_COLOR to be unset or empty (no-color.org). */
+/* terminal.h -- output for people: lines redrawn in place, colour, short forms of numbers. A terminal is "live" when
+ * its stream can redraw a line; on a pipe, a file or TERM=dumb nothing is redrawn and no escape sequence is written.
+ * Colour also needs NO_COLOR to be unset or empty (no-color.org). */
 #ifndef UNBAKE_CLIENT_TERMINAL_H
 #define UNBAKE_CLIENT_TERMINAL_H
 
@@ -18,26 +16,26 @@ enum colour { COLOUR_NONE, COLOUR_RED, COLOUR_GREEN, COLOUR_YELLOW, COLOUR_DIM }
 struct terminal {
     FILE *out;
     bool live, colour, unicode;
-    bool open; /* a line drawn in place is on the screen */
+    bool open; /* a redrawn line is on the screen */
 };
 
 void terminal_init(struct terminal *t, FILE *out);
-size_t terminal_width(const struct terminal *t); /* columns; 80 where nobody knows */
+size_t terminal_width(const struct terminal *t); /* columns; 80 if unknown */
 
-/* Draws `text`, cut to the width, over the line drawn before. Nothing where not live. */
+/* Draws `text`, cut to the width, over the previous drawn line. Does nothing unless live. */
 void terminal_draw(struct terminal *t, const char *text);
-/* Takes the line drawn in place away, so that ordinary output can follow. */
+/* Clears the drawn line, so that ordinary output can follow. */
 void terminal_clear(struct terminal *t);
-/* Keeps it, and goes to the next line. */
+/* Keeps the drawn line, and goes to the next. */
 void terminal_keep(struct terminal *t);
 /* The escape sequences around coloured text; "" where there is no colour. */
 const char *terminal_colour(const struct terminal *t, enum colour colour);
 
-/* Appends text from elsewhere (a file's name, a log line) as utf8_show has it, so that it can neither drive
- * the terminal nor change how what stands beside it reads. */
+/* Appends text of foreign origin (a file name, a log line) through utf8_show, so that it can neither control the
+ * terminal nor change how the text beside it reads. */
 void terminal_clean(struct buf *out, const char *text);
 
-/* How many columns UTF-8 text takes, one a character; escape sequences take none. */
+/* Columns that UTF-8 text takes, one a character; escape sequences take none. */
 size_t text_columns(const char *text);
 /* Cuts *b to at most `columns` columns, at a character's boundary, keeping escape sequences. */
 void text_cut(struct buf *b, size_t columns);

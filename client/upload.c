@@ -15,16 +15,16 @@
 #include "common/protocol.h"
 
 #define PATIENCE_SEC 600.0
-#define SILENCE_SEC 60.0 /* nothing moves for so long: the connection is dead */
+#define SILENCE_SEC 60.0 /* the connection is dead after this long without traffic */
 #define VERSION_FIELD "Tus-Resumable: " TUS_VERSION
 
 struct upload_sending {
     const struct client_upload *u;
-    char *path;       /* of the upload; NULL: not found or made yet; owned */
-    uint64_t offset;  /* what the server has */
-    uint64_t pack_at; /* where the stream is read next */
-    double moved_at;  /* when bytes last went through */
-    bool was_lost;    /* the user was told */
+    char *path;       /* of the upload; NULL: not found or created yet; owned */
+    uint64_t offset;  /* bytes that the server has */
+    uint64_t pack_at; /* the stream's next byte */
+    double moved_at;  /* when bytes were last sent */
+    bool was_lost;    /* the user was told that the connection is lost */
     struct meter meter;
 };
 
@@ -79,7 +79,7 @@ static enum status create(struct upload_sending *s, struct reply *reply, struct 
     return status;
 }
 
-/* Takes the offset that a reply tells. */
+/* Takes the offset from a reply. */
 static enum status take_offset(struct upload_sending *s, const struct reply *reply, struct error *err) {
     if (reply->upload_offset < 0 || (uint64_t)reply->upload_offset > s->u->length)
         return error_set(err, STATUS_UNAVAILABLE, "the server sent no valid Upload-Offset");
@@ -105,7 +105,7 @@ static enum status read_pack(void *user, void *bytes, size_t room, size_t *got, 
     return status;
 }
 
-/* Brings the stream to where the upload stands. */
+/* Moves the stream to the upload's offset. */
 static enum status seek_pack(void *user, struct error *err) {
     struct upload_sending *s = user;
     enum status status = STATUS_OK;
@@ -160,7 +160,7 @@ static enum status send_rest(struct upload_sending *s, struct reply *reply, stru
 
 /* --- the loop ------------------------------------------------------------------------------ */
 
-/* One round; STATUS_OK also where more rounds are needed. */
+/* One round; STATUS_OK also if more rounds are needed. */
 static enum status advance(struct upload_sending *s, struct reply *reply, struct error *err) {
     enum status status = STATUS_OK;
     if (!s->path) {
@@ -182,7 +182,7 @@ static enum status advance(struct upload_sending *s, struct reply *reply, struct
     return status == STATUS_OK && s->offset < s->u->length ? send_rest(s, reply, err) : status;
 }
 
-/* Whether a failure may pass. Forgets an upload that is gone. */
+/* Whether a failure may be temporary. Forgets an upload that is gone. */
 static bool is_passing(struct upload_sending *s, const struct reply *reply, enum status status) {
     if (status == STATUS_NOT_FOUND && reply->code == 404 && s->path) {
         mem_free(s->path);

@@ -1,4 +1,4 @@
-/* uploads.c -- `uploads` and `collect`: what is under way to the server, and what it removes. */
+/* uploads.c -- `uploads` and `collect`: unfinished uploads, and what the server removes. */
 #include "client/collection.h"
 #include "client/commands.h"
 #include "client/retention.h"

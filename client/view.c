@@ -15,7 +15,7 @@ static void copy(char *to, size_t size, const cJSON *data, const char *key) {
 }
 
 static void take_state(struct client_view *v, const cJSON *data) {
-    /* An event of a change leaves out a reason and a request that are absent. */
+    /* An event that changes the state omits an absent reason or request. */
     v->wanted[0] = v->reason[0] = '\0';
     copy(v->state, sizeof v->state, data, "state");
     copy(v->wanted, sizeof v->wanted, data, "wanted");
@@ -96,7 +96,7 @@ static void put_numbers(const struct client_view *v, double age_sec, struct buf 
         terminal_clean(out, v->metric[i].series);
         buf_printf(out, " %s", figure);
     }
-    if (v->eta_sec > age_sec) { /* one that has run out tells nothing */
+    if (v->eta_sec > age_sec) { /* an expired estimate is not shown */
         char left[16];
         format_duration(left, v->eta_sec - age_sec);
         buf_printf(out, "  ETA %s", left);

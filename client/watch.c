@@ -39,9 +39,9 @@ struct watch {
     struct client_view view;
     struct sse sse;
     bool only_log;      /* `logs` */
-    bool only_past;     /* ends with what is stored by now: `logs` without --follow */
-    bool printed;       /* a line of the log */
-    bool connected;     /* something came over the present connection */
+    bool only_past;     /* ends after the stored events: `logs` without --follow */
+    bool printed;       /* a line of the log was printed */
+    bool connected;     /* something arrived over the current connection */
     double heard_at;    /* when the last event came */
     double progress_at; /* when the last progress came */
     double shown_at;
@@ -66,8 +66,7 @@ static void show_line(struct watch *w) {
     buf_release(&line);
 }
 
-/* On a terminal: as often as eyes want. Else: what is new at once, and numbers now and then
- * while there are new ones. */
+/* On a terminal, redraws at a fixed rate. Otherwise prints changes at once, and numbers now and then. */
 static void show(struct watch *w, bool urgent) {
     struct client *c = w->client;
     if (c->json || c->quiet || w->only_log || !w->view.state[0] || view_is_over(&w->view))
@@ -112,7 +111,7 @@ static void print_log(struct watch *w, const cJSON *data) {
     buf_release(&line);
 }
 
-/* {"id": 12, "event": "metric", "data": {...}}, as the daemon's own NDJSON has it. */
+/* {"id": 12, "event": "metric", "data": {...}}, the daemon's NDJSON format. */
 static void print_event(struct client *c, const char *type, const cJSON *data, const char *id) {
     cJSON *event = cJSON_CreateObject();
     json_add_int(event, "id", strtoll(id, NULL, 10));
@@ -128,7 +127,7 @@ static bool on_event(void *user, const char *type, const char *data, const char 
     w->connected = true;
     w->heard_at = clock_sec();
     if (json_parse(data, strlen(data), "event", &value, NULL) != STATUS_OK)
-        return true; /* one broken event is no reason to stop watching */
+        return true; /* one malformed event does not end the watching */
     view_event(&w->view, type, value);
     if (strcmp(type, EVENT_PROGRESS) == 0)
         w->progress_at = w->heard_at;
@@ -173,7 +172,7 @@ static enum status follow_once(struct watch *w, struct reply *reply, struct erro
     return request_run(w->client->request, &call, reply, err);
 }
 
-/* Follows the stream until the job, or else the past, is over. */
+/* Follows the stream until the job (or only_past: the stored events) has ended. */
 static enum status follow(struct watch *w, struct reply *reply, struct error *err) {
     struct client *c = w->client;
     bool ever = false, told = false;
@@ -257,8 +256,7 @@ static int interrupted(struct client *c, int64_t job) {
     return client_fail(c, NULL, &err);
 }
 
-/* From the job's first event on if `all`, else from now on; takes the fields of *w but for
- * only_log and only_past. */
+/* `all`: from the job's first event on, else from now on. Uses only_log and only_past of *w. */
 static int watch_events(struct watch *w, struct client *c, int64_t job, bool all) {
     struct reply reply;
     struct error err;
@@ -288,8 +286,7 @@ static int watch_events(struct watch *w, struct client *c, int64_t job, bool all
 
 int watch_job(struct client *c, int64_t job, bool all) { return watch_events(&(struct watch){0}, c, job, all); }
 
-/* What is to be done when the job has ended; `code` is how it did, and stays so unless the command
- * cannot be run. */
+/* Runs a command after the job's end. Returns `code`, the job's own exit status, unless the command cannot be run. */
 static int run_command(struct client *c, int64_t job, const char *command, int code) {
     struct reply reply;
     struct error err;
@@ -310,7 +307,7 @@ static int run_command(struct client *c, int64_t job, const char *command, int c
     reply_release(&reply);
     fflush(NULL);
     pid_t pid = fork();
-    if (pid == 0) { /* main blocks signals for itself; the command is to get them */
+    if (pid == 0) { /* main blocks signals; the command needs them */
         sigemptyset(&none);
         sigprocmask(SIG_SETMASK, &none, NULL);
         execl("/bin/sh", "sh", "-c", command, (char *)NULL);
@@ -342,8 +339,7 @@ int watch_run(struct client *c, const struct options *o) {
 
 /* --- logs ---------------------------------------------------------------------------------- */
 
-/* What the job's processes wrote to their standard error: mostly nothing, and the last words of
- * those that crashed. */
+/* The standard error of the job's processes: usually empty; the last words of those that crashed. */
 static enum status print_stderr(struct client *c, int64_t job, struct reply *reply, struct error *err) {
     char path[80];
     snprintf(path, sizeof path, "/v1/jobs/%lld/log?bytes=1048576", (long long)job);

@@ -465,7 +465,7 @@ enum status settings_parse_assignment(const char *text, cJSON *object, struct er
     else if (t && t->type == SETTING_BOOL && (!strcmp(value, "true") || !strcmp(value, "false")))
         json_add_bool(object, name, value[0] == 't');
     else
-        json_add_string(object, name, value); /* the daemon says what is wrong with it */
+        json_add_string(object, name, value); /* the daemon reports the fault */
     return STATUS_OK;
 }
 

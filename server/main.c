@@ -62,13 +62,13 @@ struct daemon {
     struct listener *listener;
     struct admin *admin;
     struct collector *collector;
-    char address[CONFIG_ADDRESS_SIZE]; /* that it listens on */
-    unsigned long watched_rounds;      /* of the scheduler, when the watchdog was last fed */
+    char address[CONFIG_ADDRESS_SIZE]; /* the address it listens on */
+    unsigned long watched_rounds;      /* the scheduler's rounds when the watchdog was last fed */
     struct api_library libraries[LIBRARY_COUNT];
     struct proxies proxies;
 };
 
-/* An address that others can reach needs tokens. */
+/* An address that others can reach requires tokens. */
 static enum status check_access(const struct daemon *d, bool is_loopback, struct error *err) {
     const struct config *c = d->config;
     if (is_loopback)
@@ -103,7 +103,7 @@ static void on_revoked(void *user) {
     hub_recheck(d->api->hub);
 }
 
-/* The smaller of both limits; 0: none. A disk that does not tell how large it is sets none. */
+/* The smaller of both limits; 0: none. A disk whose size is unknown sets none. */
 static uint64_t user_max_bytes(const struct config *c) {
     struct statvfs disk;
     uint64_t limit = (uint64_t)c->user_max_mib << 20, share = 0;
@@ -163,7 +163,7 @@ static struct api_config api_options(const struct config *c, const struct proxie
     };
 }
 
-/* *address is where `listen` says, in the caller's memory; *is_loopback: nobody else can reach it. */
+/* *address lies in the caller's memory; *is_loopback: only this machine can reach it. */
 static void listener_options(const struct config *c, struct listener_config *network, char address[CONFIG_ADDRESS_SIZE],
                              bool *is_loopback) {
     *network = (struct listener_config){
@@ -207,18 +207,17 @@ static enum status build(struct daemon *d, struct error *err) {
     return status;
 }
 
-/* Tells systemd that the daemon lives, if it does: the scheduler has gone on since the last look,
- * and the store answers. */
+/* Feeds systemd's watchdog if the scheduler has made progress and the store responds. */
 static void feed_watchdog(struct daemon *d) {
     unsigned long rounds = scheduler_rounds(d->scheduler);
-    store_token_is_valid(d->store, 0); /* hangs where the store does */
+    store_token_is_valid(d->store, 0); /* blocks if the store hangs */
     if (rounds != d->watched_rounds)
         notify("WATCHDOG=1");
     d->watched_rounds = rounds;
     scheduler_wake(d->scheduler);
 }
 
-/* The next of the signals in `asked`, while the watchdog is fed. */
+/* Waits for a signal in `asked`, feeding the watchdog meanwhile. */
 static int next_signal(struct daemon *d, const sigset_t *asked) {
     double pause_sec = notify_watchdog_sec() / 3;
     struct timespec pause = {.tv_sec = (time_t)pause_sec, .tv_nsec = (long)(1e9 * (pause_sec - floor(pause_sec)))};
@@ -261,7 +260,7 @@ static void *wait_for_signal(void *user) {
     return NULL;
 }
 
-/* Every connection needs a descriptor, and so does every file that is served. */
+/* Every connection needs a descriptor, and so does every file that is sent. */
 static void raise_descriptor_limit(void) {
     struct rlimit limit;
     if (getrlimit(RLIMIT_NOFILE, &limit) != 0)
@@ -270,7 +269,7 @@ static void raise_descriptor_limit(void) {
     setrlimit(RLIMIT_NOFILE, &limit);
 }
 
-/* SIGTERM, SIGINT and SIGHUP go to one thread that waits for them; all others inherit the block. */
+/* SIGTERM, SIGINT and SIGHUP go to one thread that waits for them; all others inherit the mask. */
 static void prepare_signals(void) {
     sigset_t asked = handled_signals();
     pthread_sigmask(SIG_BLOCK, &asked, NULL);
@@ -284,7 +283,7 @@ static void log_start(const struct daemon *d) {
     mem_free(text);
 }
 
-/* Says where it listens: in the log, on stdout and, where asked for, in a file. */
+/* Announces the address in the log, on stdout and, if requested, in a file. */
 static enum status announce(const struct daemon *d, const char *port_file, struct error *err) {
     char text[16];
     uint16_t port = listener_port(d->listener);
@@ -307,7 +306,7 @@ static enum status serve(struct daemon *d, const char *port_file, struct error *
         return error_set_errno(err, failed, "cannot start the thread that waits for signals");
     notify("READY=1");
     status = scheduler_run(d->scheduler, err);
-    /* Where it ended by itself, the thread still waits. */
+    /* the loop ended by itself: wake the waiting thread */
     pthread_kill(waiter, SIGTERM);
     pthread_join(waiter, NULL);
     return status;
@@ -373,7 +372,7 @@ int daemon_command(int argc, char **argv) {
 
 int main(int argc, char **argv) {
     const struct server_command *command = argc > 1 ? commands_find(argv[1]) : NULL;
-    int words = command ? 1 : 0; /* that name the command */
+    int words = command ? 1 : 0; /* words that name the command */
     if (!command)
         command = commands_table(&(size_t){0});
     int code = command->run(argc - words, argv + words);

@@ -22,7 +22,7 @@
 #include "server/data/layout.h"
 
 #define LINE_MAX_BYTES ((size_t)1 << 20)
-#define PATIENCE_SEC 5 /* of the daemon, for a request; a reply may take as long as it takes */
+#define PATIENCE_SEC 5 /* for the daemon to take a request; a reply may take any time */
 
 struct admin {
     const char *data_dir; /* borrowed */
@@ -34,7 +34,7 @@ struct admin {
     bool is_bound, has_thread;
 };
 
-/* --- what is done -------------------------------------------------------------------------- */
+/* --- commands -------------------------------------------------------------------------------- */
 
 static enum status token_add(struct store *store, const cJSON *request, cJSON *reply, struct error *err) {
     const char *name, *role_text;
@@ -86,7 +86,7 @@ static enum status token_revoke(struct store *store, const cJSON *request, cJSON
     return STATUS_OK;
 }
 
-/* The copy has no name any more when its descriptor is handed over: nothing is left behind. */
+/* The copy is unlinked before its descriptor is handed over: nothing is left behind. */
 static enum status backup(const char *data_dir, struct store *store, int *fd, struct error *err) {
     char *dir = layout_trash(data_dir), *path = layout_trash_file(data_dir, "backup-" LAYOUT_RANDOM);
     enum status status = file_make_dirs(dir, err);
@@ -128,8 +128,8 @@ enum status admin_do(const char *data_dir, struct store *store, const cJSON *req
 
 /* --- the socket ---------------------------------------------------------------------------- */
 
-/* Binds (or connects) fd to DIR/admin.sock: through the folder's descriptor, since a socket's
- * address holds 108 bytes and a folder's name may be longer. */
+/* Binds (or connects) fd to DIR/admin.sock, through the folder's descriptor: a socket's address has 108 bytes, and a
+ * path may be longer. */
 static int with_address(const char *dir, int fd, int (*call)(int, const struct sockaddr *, socklen_t)) {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     int dir_fd = open(dir, O_PATH | O_DIRECTORY | O_CLOEXEC);
@@ -143,7 +143,7 @@ static int with_address(const char *dir, int fd, int (*call)(int, const struct s
     return result;
 }
 
-/* Writes a line, and a descriptor with its first byte (fd -1: none). */
+/* Writes a line, with a descriptor attached to its first byte (fd -1: none). */
 static bool send_line(int to, const cJSON *value, int fd) {
     char *text = json_text(value), *line = mem_printf("%s\n", text);
     union {
@@ -177,7 +177,7 @@ static bool send_line(int to, const cJSON *value, int fd) {
     return part.iov_len == 0;
 }
 
-/* Reads a line and what descriptor comes with it; false when there is no whole one. */
+/* Reads a line and any descriptor that comes with it; false when there is no complete line. */
 static bool receive_line(int from, struct buf *line, int *fd) {
     *fd = -1;
     while (line->length == 0 || line->data[line->length - 1] != '\n') {
@@ -201,7 +201,7 @@ static bool receive_line(int from, struct buf *line, int *fd) {
     return true;
 }
 
-/* --- the daemon's side --------------------------------------------------------------------- */
+/* --- the daemon's side ---------------------------------------------------------------------- */
 
 static void answer(struct admin *a, int client) {
     struct buf line;
@@ -271,9 +271,9 @@ enum status admin_start(struct admin **out, const char *data_dir, struct store *
     }
     char *path = layout_socket(data_dir);
     enum status status = STATUS_OK;
-    unlink(path); /* of an earlier life: this process holds the folder's lock */
+    unlink(path); /* of an earlier run: this process holds the folder's lock */
     a->listen_fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    /* The mode of a socket that is not yet bound becomes that of the file. */
+    /* the file gets the mode of the unbound socket */
     a->is_bound =
         a->listen_fd >= 0 && fchmod(a->listen_fd, 0600) == 0 && with_address(data_dir, a->listen_fd, bind) == 0;
     if (!a->is_bound || listen(a->listen_fd, 16) != 0)
@@ -310,7 +310,7 @@ void admin_stop(struct admin *a) {
     mem_free(a);
 }
 
-/* --- the command's side -------------------------------------------------------------------- */
+/* --- the command's side --------------------------------------------------------------------- */
 
 static enum status ask_daemon(int socket_fd, const cJSON *request, cJSON **reply, int *fd, struct error *err) {
     struct buf line;
@@ -335,12 +335,12 @@ static enum status ask_daemon(int socket_fd, const cJSON *request, cJSON **reply
     return status;
 }
 
-/* Root acts as the folder's owner, lest the daemon find files that it cannot open. */
+/* Root acts as the folder's owner; otherwise the daemon could not open the files made. */
 static enum status become_owner(const char *dir, struct error *err) {
     struct stat info;
     if (geteuid() != 0)
         return STATUS_OK;
-    if (stat(dir, &info) != 0) { /* whose it is to be, only the daemon knows */
+    if (stat(dir, &info) != 0) { /* the owner of a new folder is unknown */
         error_set_errno(err, errno, "cannot look at the data folder %s", dir);
         return error_hint(err, "start the daemon once, or make the folder for its user");
     }

@@ -22,13 +22,13 @@ struct admin; /* the daemon's side: one thread; opaque */
 /* `revoked` is called, on that thread, after tokens were revoked. */
 enum status admin_start(struct admin **admin, const char *data_dir, struct store *store, void (*revoked)(void *user),
                         void *user, struct error *err);
-void admin_stop(struct admin *admin); /* NULL is fine */
+void admin_stop(struct admin *admin); /* NULL is allowed */
 
-/* The command's side: asks the daemon of that folder or, without one, does it. *reply is the
- * caller's (cJSON_Delete); *fd a file that came with it, or -1. */
+/* The command's side: asks the daemon of that folder or, if none runs, does the work. *reply is the caller's
+ * (cJSON_Delete); *fd is a file that came with it, or -1. */
 enum status admin_call(const char *data_dir, const cJSON *request, cJSON **reply, int *fd, struct error *err);
 
-/* What both do. */
+/* Does the work, for both sides. */
 enum status admin_do(const char *data_dir, struct store *store, const cJSON *request, cJSON *reply, int *fd,
                      struct error *err);
 

@@ -5,8 +5,8 @@
  * or replaced after the copy. The files that are there already are not copied again: a later round takes moments.
  * What the last copy does not name is left out.
  *
- * Files of scenes and outputs are never changed in place, only removed or replaced by rename, so that they may be shared
- * with the data folder (copy.h). Checkpoints are: those of jobs that run are left out, such a job begins anew;
+ * Files of scenes and outputs are never changed in place, only removed or replaced by rename, so that they may be
+ * shared with the data folder (copy.h). Checkpoints are: those of jobs that run are left out, such a job begins anew;
  * the others are copied, or share blocks. */
 #include <errno.h>
 #include <fcntl.h>
@@ -51,8 +51,8 @@ static enum status write_out(int fd, int out, const char *path, uint64_t *bytes,
     return status;
 }
 
-/* A copy of the database, which appears only when it is whole and on the disk, and where nothing is yet: an earlier
- * backup may be all that is left. */
+/* Makes a copy of the database, which appears complete and durable, and only under a new name: an earlier backup may
+ * be all that is left. */
 static enum status keep_database(int fd, const char *path, uint64_t *bytes, struct error *err) {
     char *part = mem_printf("%s.part-XXXXXX", path);
     int out = mkostemp(part, O_CLOEXEC); /* 0600 */
@@ -72,7 +72,7 @@ static enum status keep_database(int fd, const char *path, uint64_t *bytes, stru
     return status;
 }
 
-/* The copy as an open file. */
+/* A copy of the database, as an open file. */
 static enum status ask_for_copy(const char *data_dir, int *fd, struct error *err) {
     cJSON *request = cJSON_CreateObject(), *reply = NULL;
     json_add_string(request, "command", "backup");
@@ -87,7 +87,7 @@ static enum status ask_for_copy(const char *data_dir, int *fd, struct error *err
 static enum status check_new(const char *path, struct error *err) {
     struct stat info;
     if (lstat(path, &info) != 0)
-        return STATUS_OK; /* a path that leads nowhere is told when it is opened */
+        return STATUS_OK; /* a missing path is reported when it is opened */
     error_set(err, STATUS_CONFLICT, "%s is there already, and a backup overwrites nothing", path);
     return error_hint(err, "name another, as %s-$(date +%%F)", path);
 }
@@ -113,7 +113,7 @@ struct making {
     struct copy copy;
     struct contents contents;
     size_t damaged; /* in the last round: outputs and archives that are missing or not as announced */
-    bool is_last;   /* they are told */
+    bool is_last;   /* report them */
 };
 
 static enum status copy_database(struct making *m, struct error *err) {
@@ -143,7 +143,7 @@ static void tell_damage(struct making *m, const char *path, const char *what) {
         fprintf(stderr, "unbaked: %s %s\n", path, what);
 }
 
-/* An output of a job that has ended must be as it was announced; of others it may be newer. */
+/* An output of a job that has ended must be as announced; one of another job may be newer. */
 static enum status copy_output(struct making *m, const struct contents_job *job, const struct contents_output *output,
                                struct error *err) {
     char *folder = layout_job(NULL, job->id), *path = layout_output(folder, output->name), *copy = NULL;
@@ -214,8 +214,8 @@ static bool is_named(const struct contents *c, bool is_scene, const char *name) 
     return false;
 }
 
-/* Removes what a round copied that the last copy of the database does not name. Checkpoints of jobs that have begun to run
- * meanwhile may be half old, half new. */
+/* Removes files that the last copy of the database does not name, and checkpoints of jobs that have started
+ * meanwhile, which may be half old, half new. */
 static enum status leave_out(const struct making *m, struct error *err) {
     enum status status = STATUS_OK;
     for (int is_scene = 0; is_scene < 2; is_scene++) {
@@ -247,7 +247,7 @@ static enum status leave_out(const struct making *m, struct error *err) {
     return status;
 }
 
-/* Adds the lines of all files below `path`, a folder of the backup ("": itself). */
+/* Appends the lines of all files below `path`, a folder of the backup ("": all of it). */
 static enum status list_sums(const char *folder, const char *path, struct buf *sums, struct error *err) {
     char **names, *whole = *path ? file_join(folder, path) : mem_strdup(folder), hex[SHA256_HEX_SIZE];
     size_t count;
@@ -289,7 +289,7 @@ static enum status finish(const struct making *m, const char *path, struct error
 }
 
 static enum status open_folders(struct making *m, struct error *err) {
-    if (!mkdtemp(m->folder)) /* 0700: tokens' hashes and everybody's rooms */
+    if (!mkdtemp(m->folder)) /* 0700: it holds hashes of tokens, and everybody's rooms */
         return error_set_errno(err, errno, "cannot make the folder %s", m->folder);
     m->copy.to = open(m->folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     m->copy.from = open(m->data_dir, O_RDONLY | O_DIRECTORY | O_CLOEXEC);

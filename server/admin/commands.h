@@ -1,4 +1,4 @@
-/* commands.h -- the commands for whoever runs a daemon: tokens, backups, what is wrong here. */
+/* commands.h -- commands for whoever runs a daemon: tokens, backups, diagnosis. */
 #ifndef UNBAKE_ADMIN_COMMANDS_H
 #define UNBAKE_ADMIN_COMMANDS_H
 
@@ -12,14 +12,14 @@ int restore_command(int argc, char **argv); /* restore.c */
 int check_config_command(int argc, char **argv);
 int doctor_command(int argc, char **argv); /* doctor.c */
 
-/* -1 to go on, or what the command returns. `file` as for invocation_read. */
+/* Reads options and configuration. -1: go on; else the command's exit status. `file` as for invocation_read. */
 int command_begin(const char *file, struct invocation *in, int argc, char **argv, const struct flag *flags,
                   size_t words_min, size_t words_max);
-/* Tells the error on stderr; the exit status. */
+/* Prints the error to stderr; returns the exit status. */
 int command_failed(const struct error *err);
 
-/* A backup with outputs: a folder with state.db, scenes/ and jobs/, and this list of its files, as sha256sum(1)
- * writes it. */
+/* A backup with outputs is a folder with state.db, scenes/, jobs/ and this list of its files, in sha256sum(1)'s
+ * format. */
 #define BACKUP_SUMS "SHA256SUMS"
 
 #endif

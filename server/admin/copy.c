@@ -31,7 +31,7 @@ bool copy_path_is_plain(const char *path) {
 
 static bool give(const struct copy *c, int fd) { return c->owner == (uid_t)-1 || fchown(fd, c->owner, c->group) == 0; }
 
-/* The folder of `path` below the folder `root`, made where `makes`; *base is the last part. -1 with errno. */
+/* Opens the folder of `path` below the folder `root`, creating it if `makes`; *base is the last part. -1 with errno. */
 static int open_parent(const struct copy *c, int root, const char *path, bool makes, const char **base) {
     int fd = fcntl(root, F_DUPFD_CLOEXEC, 0);
     for (const char *slash; fd >= 0 && (slash = strchr(path, '/')) != NULL; path = slash + 1) {
@@ -65,7 +65,7 @@ static bool copy_bytes(int in, int out) {
     return is_whole;
 }
 
-/* A new file `base` in the folder `to` with what `in` holds. False with errno. */
+/* Writes the content of `in` to a new file `base` in the folder `to`. False with errno. */
 static bool fill(struct copy *c, int in, const struct stat *info, int to, const char *base) {
     char self[40];
     snprintf(self, sizeof self, "/proc/self/fd/%d", in);
@@ -161,7 +161,7 @@ enum status copy_tree(struct copy *c, const char *path, struct error *err) {
         struct stat info;
         char *inner = file_join(path, names[i]);
         if (!utf8_is_name(names[i]) || fstatat(fd, names[i], &info, AT_SYMLINK_NOFOLLOW) != 0)
-            ; /* gone, or nothing that we have made */
+            ; /* gone, or not made by us */
         else if (S_ISDIR(info.st_mode))
             status = copy_tree(c, inner, err);
         else

@@ -13,8 +13,8 @@
 
 struct copy {
     int from, to;  /* open folders */
-    bool may_link; /* the files are never changed in place: a hard link will do */
-    uid_t owner;   /* of what is made; (uid_t)-1: whoever makes it */
+    bool may_link; /* files are never changed in place, so hard links are allowed */
+    uid_t owner;   /* of new files; (uid_t)-1: the process's */
     gid_t group;
     uint64_t file_count, byte_count, shared_count; /* shared: by reflink or hard link */
 };
@@ -22,11 +22,12 @@ struct copy {
 /* Whether the path is plain: parts that are names (utf8_is_name), none of them "", "." or "..". */
 bool copy_path_is_plain(const char *path);
 
-/* Copies the plain file `path`, with its mode and time, unless a copy of the same size and time is there; makes
- * folders on the way. Shares the blocks (FICLONE) where the file system can, else links where that may be, else copies
- * the bytes. *exists: the file was there. */
+/* Copies the regular file `path`, with mode and time, unless a copy of the same size and time exists; creates
+ * folders on the way. Shares the blocks (FICLONE) if possible, else makes a hard link if allowed, else copies the
+ * bytes. *exists: there was a source. */
 enum status copy_file(struct copy *c, const char *path, bool *exists, struct error *err);
-/* All plain files below the folder `path`; what goes meanwhile, or is no name, is left out. */
+/* Copies all regular files below the folder `path`; skips files that disappear meanwhile and names that are not
+ * valid. */
 enum status copy_tree(struct copy *c, const char *path, struct error *err);
 
 #endif

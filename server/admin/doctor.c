@@ -34,7 +34,7 @@ enum verdict { GOOD, WARN, BAD };
 
 struct doctor {
     const struct config *config;
-    bool is_loopback; /* what the daemon listens on */
+    bool is_loopback; /* the daemon listens on loopback */
     int bad_count;
 };
 
@@ -64,7 +64,7 @@ static void check_libraries(struct doctor *d) {
 static void check_limits(struct doctor *d) {
     const struct config *c = d->config;
     struct rlimit files;
-    int64_t wanted = 2 * c->max_connections + 100; /* a connection and the file that it is sent */
+    int64_t wanted = 2 * c->max_connections + 100; /* one for a connection and one for the file it is sent */
     if (getrlimit(RLIMIT_NOFILE, &files) != 0)
         tell(d, WARN, "limits", "the limit of open files cannot be read: %s", strerror(errno));
     else if (files.rlim_max < (rlim_t)wanted)
@@ -87,7 +87,7 @@ static void check_processors(struct doctor *d) {
                            : "have room");
 }
 
-/* Tries the sandbox in a child, where it does no harm. */
+/* Tries the sandbox in a child process. */
 static void check_sandbox(struct doctor *d) {
     const struct config *c = d->config;
     struct sandbox_result result = {.text = ""};
@@ -100,7 +100,7 @@ static void check_sandbox(struct doctor *d) {
     if (child == 0) {
         struct sandbox sandbox = {.write_dir = "/tmp"};
         sandbox_enter(&sandbox, &result);
-        /* What it says, held against what it does. */
+        /* Compare what it claims with what it does. */
         int etc = open("/etc/passwd", O_RDONLY | O_CLOEXEC);
         int net = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
         result.files = result.files && etc < 0;
@@ -161,7 +161,8 @@ static void check_disk(struct doctor *d) {
         tell(d, WARN, "data", "%s is not there; the daemon makes it where it may", dir);
         return;
     }
-    if (geteuid() == 0 && info.st_uid != 0 && seteuid(info.st_uid) != 0) { /* the daemon is its owner */
+    if (geteuid() == 0 && info.st_uid != 0 &&
+        seteuid(info.st_uid) != 0) { /* act as the folder's owner, as the daemon does */
         tell(d, BAD, "data", "cannot act as the owner of %s: %s", dir, strerror(errno));
         return;
     }

@@ -1,5 +1,5 @@
-/* restore.c -- `unbaked restore`: a data folder out of a backup with outputs. Every file is held against the digest that
- * the backup has for it; the database is put in place last, so that a daemon finds a whole data folder or none. */
+/* restore.c -- `unbaked restore`: a data folder out of a backup with outputs. Every file is held against the digest
+ * that the backup has for it; the database is put in place last, so that a daemon finds a whole data folder or none. */
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
@@ -32,7 +32,7 @@ struct restoring {
     size_t damaged;
 };
 
-/* The folder is made, or must be empty. Root gives what it makes to the folder's owner. */
+/* Creates the folder, or checks that it is empty. As root, new files go to the folder's owner. */
 static enum status prepare(struct restoring *r, struct error *err) {
     char **names;
     size_t count;
@@ -79,7 +79,7 @@ static void tell_damage(struct restoring *r, const char *path, const char *what)
     fprintf(stderr, "unbaked: %s/%s %s\n", r->backup, path, what);
 }
 
-/* Copies one file and holds the copy against the digest. */
+/* Copies one file and checks the copy's digest. */
 static enum status restore_file(struct restoring *r, const char *path, const char *wanted, struct error *err) {
     bool exists;
     char hex[SHA256_HEX_SIZE], *copy = file_join(r->data, path);
@@ -97,7 +97,7 @@ static enum status restore_file(struct restoring *r, const char *path, const cha
     return status;
 }
 
-/* Takes "DIGEST  PATH" apart, in place. */
+/* Splits "DIGEST  PATH", in place. */
 static enum status read_line(const struct restoring *r, char *line, size_t number, char **digest, char **path,
                              struct error *err) {
     *digest = line;
@@ -111,7 +111,7 @@ static enum status read_line(const struct restoring *r, char *line, size_t numbe
                      BACKUP_SUMS, number);
 }
 
-/* All files but the database, whose digest is copied to `database`. */
+/* Restores all files except the database, whose digest is copied to `database`. */
 static enum status restore_files(struct restoring *r, char *sums, char database[SHA256_HEX_SIZE], struct error *err) {
     enum status status = STATUS_OK;
     char *digest, *path;
@@ -148,7 +148,7 @@ static enum status restore_database(struct restoring *r, const char *digest, str
     return status;
 }
 
-/* What was put there goes again: a daemon must not find a part. */
+/* Removes what was restored: a daemon must not find a part. */
 static void clear(const struct restoring *r) {
     char *parts[] = {layout_state(r->data), layout_scenes(r->data), layout_jobs(r->data), layout_lock(r->data)};
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {

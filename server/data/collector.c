@@ -48,7 +48,7 @@ static enum status remove_expired(const struct collector_config *c, const struct
     return status;
 }
 
-/* False where it stays; else what it took of the disk, or takes. */
+/* Removes one thing (or, in a dry run, only measures it). false: it stays; else *bytes is its disk usage. */
 static bool collect(const struct collector_config *c, const struct expired *e, int64_t now, bool dry_run,
                     uint64_t *files, uint64_t *bytes) {
     struct error err;
@@ -83,14 +83,14 @@ enum status collector_run(const struct collector_config *config, bool dry_run,
             mem_free(list[i].name);
         }
         mem_free(list);
-        /* What goes may let others go: a scene, once its last job's row is gone. */
+        /* Removals may make others possible: a scene, once its last job's row is gone. */
     } while (status == STATUS_OK && !dry_run && removed > 0);
     return status;
 }
 
-/* --- what has no row ---------------------------------------------------------------------- */
+/* --- files without a row -------------------------------------------------------------------- */
 
-/* `inner` is relative to the data folder. */
+/* Removes what has no row from the folder `inner`, which is relative to the data folder. */
 static enum status sweep(struct store *store, struct folder *folder, const char *inner, enum store_files kind,
                          struct error *err) {
     char *path = file_join(folder->dir, inner), **names = NULL;

@@ -1,5 +1,5 @@
-/* collector.h -- removes what has expired (store/retention.h) and what an earlier life left without a row, and sees to
- * what is left to be done about uploads, once in a while. */
+/* collector.h -- periodically removes what has expired (store/retention.h) and maintains unfinished uploads; at
+ * start, removes files without a row. */
 #ifndef UNBAKE_DATA_COLLECTOR_H
 #define UNBAKE_DATA_COLLECTOR_H
 
@@ -13,17 +13,17 @@
 struct collector_config { /* pointers are borrowed */
     struct store *store;
     struct folder *folder;
-    /* Called with `uploads`: puts uploads that were cut off in order; removes one whose row is gone. */
+    /* Called with `uploads`: repairs interrupted uploads; removes those whose row is gone. */
     void (*maintain_uploads)(void *uploads);
     enum status (*forget_upload)(void *uploads, const char *id, struct error *err);
     void *uploads;
 };
 
-/* Removes the files and folders that the store has no row for. At the start, before others add to them. */
+/* Removes the files and folders that the store has no row for. Call at start, before others add to them. */
 enum status collector_sweep(struct store *store, struct folder *folder, struct error *err);
 
-/* Removes what has expired by now, or (dry_run) only finds it. `found`, unless it is NULL, is called for each with what it
- * takes of the disk. What cannot be removed is logged and left for the next time. */
+/* Removes what has expired by now; a dry run only finds it. `found`, unless NULL, is called for each, with its disk
+ * usage. What cannot be removed is logged and left for the next run. */
 enum status collector_run(const struct collector_config *config, bool dry_run,
                           void (*found)(void *user, const struct expired *e, uint64_t files, uint64_t bytes),
                           void *user, struct error *err);
@@ -31,9 +31,9 @@ const char *collector_kind_name(const struct expired *e); /* "upload", "job" or 
 
 struct collector; /* its thread; opaque */
 
-/* Starts the thread, which collects at once and then every interval_sec; *c is to be stopped. */
+/* Starts the thread, which collects at once and then every interval_sec. End it with collector_stop. */
 enum status collector_start(struct collector **c, const struct collector_config *config, double interval_sec,
                             struct error *err);
-void collector_stop(struct collector *c); /* NULL is fine */
+void collector_stop(struct collector *c); /* NULL is allowed */
 
 #endif

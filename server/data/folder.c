@@ -51,10 +51,10 @@ enum status folder_check_room(const struct folder *f, uint64_t keep, uint64_t by
 
 /* --- the lock ------------------------------------------------------------------------------ */
 
-#define TRIES 20 /* of 50 ms */
+#define TRIES 20 /* 50 ms each */
 
-/* A daemon that was just killed may have a child that was about to become a worker and has not yet
- * seen that it must end: until then it has the lock, too. */
+/* Takes the lock, with retries: a child that a killed daemon forked just before its end inherits the lock, and holds
+ * it until it notices. */
 static bool take(int fd) {
     for (int i = 0; flock(fd, LOCK_EX | LOCK_NB) != 0; i++) {
         if (errno != EWOULDBLOCK || i == TRIES)
@@ -92,7 +92,7 @@ enum status folder_lock(const char *dir, int *fd, struct error *err) {
     return status;
 }
 
-/* Whether it was open, and is not any more. Links are left alone: what they name is elsewhere. */
+/* Whether it was open to others, and is closed now. Links are left alone: their targets are elsewhere. */
 static bool close_one(const char *path, bool follow) {
     struct stat info;
     if ((follow ? stat(path, &info) : lstat(path, &info)) != 0 || S_ISLNK(info.st_mode) || (info.st_mode & 077) == 0)

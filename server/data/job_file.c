@@ -11,7 +11,8 @@
 #include "common/mem.h"
 #include "server/data/layout.h"
 
-/* `path` is relative to the data folder and begins with jobs/, which may be a link: an administrator made it. */
+/* Opens `path`, which is relative to the data folder and begins with jobs/. That folder itself may be a link: only
+ * an administrator can have made it. */
 static enum status open_in_jobs(const char *data_dir, const char *path, int *out, struct error *err) {
     char *root = layout_jobs(data_dir);
     int fd = open(root, O_RDONLY | O_DIRECTORY | O_CLOEXEC);

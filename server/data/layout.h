@@ -10,8 +10,8 @@
  *   DATA/uploads/ID      an upload that is not a scene yet
  *   DATA/trash/          what is being removed (trash.h), and files that no restart needs
  *
- * Each function returns a path, which is the caller's (mem_free). Where `data_dir` is NULL, the path is relative to DATA.
- * `work_dir` is the folder that a worker is started in: a scene's, a job's or a message's. */
+ * Each function returns a path, which is the caller's (mem_free). Where `data_dir` is NULL, the path is relative to
+ * DATA. `work_dir` is the folder that a worker is started in: a scene's, a job's or a message's. */
 #ifndef UNBAKE_DATA_LAYOUT_H
 #define UNBAKE_DATA_LAYOUT_H
 
@@ -19,13 +19,13 @@
 
 #define LAYOUT_STATE "state.db"
 #define LAYOUT_SOCKET "admin.sock"
-#define LAYOUT_RANDOM "XXXXXX" /* as an id: for mkostemp */
+#define LAYOUT_RANDOM "XXXXXX" /* for mkostemp, in place of an id */
 
 char *layout_state(const char *data_dir);
 char *layout_reserve(const char *data_dir);
 char *layout_lock(const char *data_dir);
 char *layout_socket(const char *data_dir);
-char *layout_probe(const char *data_dir); /* a file by which `unbaked doctor` tries to write; for mkostemp */
+char *layout_probe(const char *data_dir); /* a test file of `unbaked doctor`; for mkostemp */
 
 char *layout_scenes(const char *data_dir);
 char *layout_scene(const char *data_dir, const char *scene_id);

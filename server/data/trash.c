@@ -1,5 +1,5 @@
-/* trash.c -- see trash.h. What is to go is called trash/gone-TIME-NUMBER; others keep what they make for a moment in
- * trash/, too, under other names. */
+/* trash.c -- see trash.h. Removed things are named trash/gone-TIME-NUMBER; other names in trash/ are temporary files
+ * of other parts. */
 #include "server/data/trash.h"
 
 #include <errno.h>
@@ -23,7 +23,7 @@ struct trash {
     long long started_ns;
     atomic_ullong number;
     pthread_t thread;
-    pthread_mutex_t mutex; /* guards what follows; never held while the disk works */
+    pthread_mutex_t mutex; /* guards what follows; not held during disk operations */
     pthread_cond_t changed;
     bool has_work, is_working, stopping;
 };
@@ -54,7 +54,7 @@ static void empty(struct trash *t) {
         t->emptied(t->user);
 }
 
-/* What others made for a moment, in an earlier life: little. */
+/* Removes temporary files of an earlier run. */
 static enum status drop_temporary(const char *data_dir, struct error *err) {
     char **names;
     size_t count;

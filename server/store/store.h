@@ -95,7 +95,7 @@ enum status store_scene_get(struct store *store, const char *id, struct scene_ro
  * STATUS_CONFLICT when there are several. */
 enum status store_scene_find(struct store *store, const struct caller *who, const char *prefix, struct scene_row *row,
                              struct error *err);
-/* Scenes that `who` (NULL: all) may read, newest first, from the cursor on, which is "created_ms,id" ("": the first
+/* Scenes that `who` (NULL: all) may read, newest first, from the cursor on ("": the first
  * page). Fills rows[limit]. */
 enum status store_scene_list(struct store *store, const struct caller *who, const char *cursor, size_t limit,
                              struct scene_row *rows, size_t *count, char next_cursor[128], struct error *err);

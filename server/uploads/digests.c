@@ -14,7 +14,7 @@
 #include "server/data/job_file.h"
 
 #define CHUNK_BYTES ((size_t)256 << 10)
-#define RETRY_SEC 10 /* after the store could not be read, or could not take a digest */
+#define RETRY_SEC 10 /* after the store could not be read or written */
 
 struct digests {
     struct store *store;
@@ -24,8 +24,8 @@ struct digests {
     atomic_ullong hashed_bytes;
     pthread_mutex_t mutex; /* guards what follows */
     pthread_cond_t changed;
-    bool has_work; /* since it was last looked for */
-    bool is_idle;  /* nothing was found, or nothing can be done for a while */
+    bool has_work; /* a digest may have been requested since the last search */
+    bool is_idle;  /* nothing was found, or nothing can be done for now */
 };
 
 /* --- one file ---------------------------------------------------------------------------- */
@@ -82,13 +82,13 @@ enum status digests_hash(int fd, const atomic_bool *stopping, struct file_versio
         status = hash(fd, before.bytes, stopping, hex, err);
     if (status == STATUS_OK)
         status = look(fd, version, err);
-    /* The change time moves when a rename takes the name away, too; the content did not. */
+    /* Compare without the change time: a rename over the name changes that, not the content. */
     if (status == STATUS_OK && (version->bytes != before.bytes || version->modified_ns != before.modified_ns))
         status = error_set(err, STATUS_UNAVAILABLE, "the file changed while it was read");
     return status;
 }
 
-/* Not the numbers themselves: an inode is nobody's business. */
+/* A hash: the numbers themselves (the inode) are not for the public. */
 static void make_tag(int64_t job_id, const char *name, const struct file_version *v, char tag[33]) {
     char hex[SHA256_HEX_SIZE];
     char *text = mem_printf("%lld %s %llu %llu %lld %lld", (long long)job_id, name, (unsigned long long)v->inode,
@@ -111,7 +111,7 @@ enum status digests_look(struct digests *d, int64_t job_id, const struct output_
     } else if (v.bytes <= DIGESTS_AT_ONCE) {
         status = digests_hash(fd, NULL, &v, file->hex, err);
     } else {
-        struct error why; /* on a full disk, say: then it is as it was */
+        struct error why; /* a full disk, for example: the digest stays requested */
         if (store_output_want_digest(d->store, job_id, row->name, &why) != STATUS_OK)
             log_debug("job %lld: %s is not hashed: %s", (long long)job_id, row->name, why.message);
     }
@@ -122,7 +122,7 @@ enum status digests_look(struct digests *d, int64_t job_id, const struct output_
 
 /* --- the thread -------------------------------------------------------------------------- */
 
-/* Hashes an output as it is now; *is_had says whether there is a digest. False when the daemon stops. */
+/* Hashes an output's current version; *is_had: there is a digest. false when the daemon stops. */
 static bool compute(struct digests *d, int64_t job_id, const struct output_row *row, struct file_version *version,
                     char hex[SHA256_HEX_SIZE], bool *is_had) {
     struct error err;
@@ -140,7 +140,7 @@ static bool compute(struct digests *d, int64_t job_id, const struct output_row *
     return status != STATUS_CANCELLED;
 }
 
-/* Waits until there is something new to do, or (retries) for a while; false when the daemon stops. */
+/* Waits for a new request, or (retries) for a while; false when the daemon stops. */
 static bool wait_for_work(struct digests *d, bool retries) {
     struct timespec until;
     clock_gettime(CLOCK_MONOTONIC, &until);
@@ -157,7 +157,7 @@ static bool wait_for_work(struct digests *d, bool retries) {
     return !atomic_load(&d->stopping);
 }
 
-/* Hashes one output and enters what came of it, as often as that takes; false when the daemon stops. */
+/* Hashes one output and enters the result, repeatedly if needed; false when the daemon stops. */
 static bool work_on(struct digests *d, int64_t job_id, const struct output_row *row) {
     struct file_version version;
     char hex[SHA256_HEX_SIZE];

@@ -18,31 +18,31 @@
 #include "common/sha256.h"
 #include "server/store/store.h"
 
-#define DIGESTS_AT_ONCE ((uint64_t)1 << 20) /* bytes; some 5 ms at worst, from memory */
+#define DIGESTS_AT_ONCE ((uint64_t)1 << 20) /* bytes; at most some 5 ms, from memory */
 
 struct digests; /* opaque; thread-safe */
 
-/* Starts the thread. `store` and `data_dir` are borrowed; the caller sees to it that digests_wake is called when a
- * digest is wanted. */
+/* Starts the thread. `store` and `data_dir` are borrowed; the caller must have digests_wake called when a digest is
+ * requested. */
 enum status digests_new(struct digests **d, struct store *store, const char *data_dir, struct error *err);
-void digests_free(struct digests *d); /* what is not done yet is done after the next start; NULL is fine */
+void digests_free(struct digests *d); /* unfinished work continues after the next start; NULL is allowed */
 void digests_wake(void *digests);
-uint64_t digests_hashed_bytes(const struct digests *d); /* by the thread, since it started */
-/* Until every wanted digest is there, or was found not to be had. For tests. */
+uint64_t digests_hashed_bytes(const struct digests *d); /* by the thread, since its start */
+/* Waits until every requested digest is entered or found impossible. For tests. */
 void digests_wait(struct digests *d);
 
-/* What the open file is. */
+/* Identity of an open file. */
 struct digests_file {
     uint64_t bytes;
-    char tag[33];              /* of its version: 32 hex digits */
-    char hex[SHA256_HEX_SIZE]; /* "": not known yet, and wanted from now on */
+    char tag[33];              /* identifies its version: 32 hex digits */
+    char hex[SHA256_HEX_SIZE]; /* "": not known yet; it has been requested */
 };
-/* Looks at an output's open file, whose offset is not moved. STATUS_UNAVAILABLE when it changed while it was read. */
+/* Identifies an output's open file, without moving its offset. STATUS_UNAVAILABLE when it changed during the call. */
 enum status digests_look(struct digests *d, int64_t job_id, const struct output_row *row, int fd,
                          struct digests_file *file, struct error *err);
 
-/* Hashes the open file; ends early where *stopping, if that is not NULL, says so: STATUS_CANCELLED. *version is what it
- * was before and after. STATUS_UNAVAILABLE when it changed meanwhile. */
+/* Hashes the open file. Once *stopping (may be NULL) is true it returns STATUS_CANCELLED. *version is the version
+ * hashed; STATUS_UNAVAILABLE when it changed meanwhile. */
 enum status digests_hash(int fd, const atomic_bool *stopping, struct file_version *version, char hex[SHA256_HEX_SIZE],
                          struct error *err);
 

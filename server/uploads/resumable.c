@@ -1,4 +1,4 @@
-/* resumable.c -- see resumable.h. What is in use, and its locks, are upload_session.h's. */
+/* resumable.c -- see resumable.h. Sessions and their locks are described in upload_session.h. */
 #include "server/uploads/resumable.h"
 
 #include <errno.h>
@@ -19,8 +19,8 @@
 #include "server/uploads/upload.h"
 #include "server/uploads/upload_session.h"
 
-#define UNFINISHED_MAX 10000  /* uploads, of all users */
-#define SPARE_BYTES (1 << 20) /* of a file that need not be given back: file systems round up */
+#define UNFINISHED_MAX 10000  /* of all users */
+#define SPARE_BYTES (1 << 20) /* difference that need not be freed: file systems round up */
 
 /* --- from an upload to a scene ----------------------------------------------------------- */
 
@@ -45,7 +45,7 @@ static enum status place(struct resumables *r, const struct upload_row *row, con
     enum status status = STATUS_OK;
     if (access(path, F_OK) == 0 || errno != ENOENT)
         status = upload_place(folder->dir, path, scene_id, err);
-    else /* there, but is that on disk? */
+    else /* it is there, but possibly not on disk */
         status = upload_sync_place(folder->dir, scene_id, err);
     if (status == STATUS_OK)
         status = store_scene_add(r->config.store, scene_id, row->name, row->length, row->owner_id, &existed, err);
@@ -56,7 +56,7 @@ static enum status place(struct resumables *r, const struct upload_row *row, con
     return status == STATUS_OK ? store_upload_finish(r->config.store, row->id, scene_id, err) : status;
 }
 
-/* It is not what was announced. */
+/* The content does not have the announced digest. */
 static enum status reject(struct resumables *r, const struct upload_row *row, const char *scene_id, struct error *err) {
     enum status status = resumable_remove(r, row->id, err);
     if (status != STATUS_OK)
@@ -65,7 +65,7 @@ static enum status reject(struct resumables *r, const struct upload_row *row, co
     return error_hint(err, "it was removed: send the content again");
 }
 
-/* The upload `id` is whole and counted: makes its scene, once. */
+/* Makes a complete upload into its scene, once. */
 static enum status finish(struct resumables *r, const char *id, struct error *err) {
     struct upload_row row;
     struct sha256 hash;
@@ -84,7 +84,7 @@ static enum status finish(struct resumables *r, const char *id, struct error *er
     return status;
 }
 
-/* Commits; finishes what is whole. */
+/* Commits; finishes the upload if it is complete. */
 static enum status settle(struct upload_session *s, struct error *err) {
     enum status status = upload_session_commit(s, err);
     if (status != STATUS_OK || !upload_session_is_whole(s))
@@ -110,7 +110,7 @@ struct resumables *resumables_new(const struct resumables_config *config) {
     return r;
 }
 
-/* Whether the file has blocks beyond its end. */
+/* Whether blocks are allocated beyond the file's end. */
 static bool holds_space(const struct resumables *r, const char *id) {
     char *path = upload_session_path(r, id);
     struct stat info;
@@ -123,13 +123,13 @@ static void give_space_back(struct resumables *r, const char *id) {
     struct upload_session *s;
     struct error err;
     if (upload_session_get(r, id, &s, &err) != STATUS_OK)
-        return; /* finished or removed just now */
+        return; /* finished or removed meanwhile */
     if (upload_session_shrink(s, &err) != STATUS_OK)
         log_warning("upload %s: %s", id, err.message);
     upload_session_put(s);
 }
 
-/* What has not grown for idle_ms needs no room. */
+/* Frees the reserved space of uploads that have not grown for idle_ms. */
 static enum status give_idle_space_back(struct resumables *r, struct error *err) {
     int64_t since_ms = clock_unix_ms() - r->config.idle_ms;
     char cursor[128] = "";
@@ -154,7 +154,7 @@ void resumables_maintain(struct resumables *r) {
     pthread_mutex_lock(&r->mutex);
     unsigned long round = ++r->round;
     pthread_mutex_unlock(&r->mutex);
-    while ((s = upload_session_next(r, round)) != NULL) { /* nobody uses it: it is there because it is dirty */
+    while ((s = upload_session_next(r, round)) != NULL) { /* a session without users exists only because it is dirty */
         struct error err;
         if (settle(s, &err) != STATUS_OK)
             log_warning("upload %s: %s", s->id, err.message);
@@ -208,7 +208,7 @@ static enum status new_id(char id[UPLOAD_ID_SIZE], struct error *err) {
 
 enum status resumable_create(struct resumables *r, struct upload_row *row, size_t user_max, struct error *err) {
     struct sha256 hash;
-    memset(&hash, 0, sizeof hash); /* all of it is stored */
+    memset(&hash, 0, sizeof hash); /* everything is stored */
     sha256_init(&hash);
     enum status status = new_id(row->id, err);
     if (status != STATUS_OK)
@@ -247,7 +247,7 @@ enum status resumable_status(struct resumables *r, const char *id, struct upload
         status = settle(s, err);
         upload_session_put(s);
     } else if (status == STATUS_CONFLICT) {
-        status = STATUS_OK; /* finished just now */
+        status = STATUS_OK; /* finished meanwhile */
     }
     return status == STATUS_OK ? store_upload_get(r->config.store, id, row, NULL, 0, err) : status;
 }

@@ -26,26 +26,26 @@
 #include "server/store/store.h"
 #include "server/uploads/resumables_config.h"
 
-struct resumables; /* the uploads that are being written or looked at; opaque */
+struct resumables; /* the uploads that are in use; opaque */
 
 struct resumables *resumables_new(const struct resumables_config *config);
-void resumables_free(struct resumables *r); /* what is in files but not yet counted is counted */
-/* Puts in order what an earlier life left: finishes what is whole. Before the folders are swept. */
+void resumables_free(struct resumables *r); /* counts first what is in files but not yet in the store */
+/* Repairs what an earlier run left: finishes complete uploads. Call before files without rows are removed. */
 enum status resumables_recover(struct resumables *r, struct error *err);
-/* Counts what was written by requests that were cut off; gives back the space that idle uploads hold beyond what has
- * arrived. From time to time. */
+/* Counts what interrupted requests wrote; frees space that idle uploads reserve beyond what has arrived. Call from
+ * time to time. */
 void resumables_maintain(struct resumables *r);
 
-/* Takes owner_id, name, metadata, sha256 and length of *row; fills the rest but for times. Reserves the
- * space: STATUS_NO_SPACE. user_max: uploads that one user may have under way; 0: no limit. */
+/* Creates an upload from owner_id, name, metadata, sha256 and length of *row; fills the rest except times. Reserves
+ * the space: STATUS_NO_SPACE. user_max: unfinished uploads of one user; 0: no limit. */
 enum status resumable_create(struct resumables *r, struct upload_row *row, size_t user_max, struct error *err);
 
-/* The row as it is now, everything received on disk and counted, and finished if it is whole. */
+/* The row after everything received was counted and, if the upload is complete, finished. */
 enum status resumable_status(struct resumables *r, const char *id, struct upload_row *row, struct error *err);
 
-/* Removes the upload with what it holds, also while somebody writes to it. */
+/* Removes the upload and its file, even while somebody writes to it. */
 enum status resumable_remove(struct resumables *r, const char *id, struct error *err);
-/* The same for one whose row is gone already. */
+/* The same where the row is gone already. */
 enum status resumable_forget(struct resumables *r, const char *id, struct error *err);
 
 #endif

@@ -1,4 +1,4 @@
-/* resumables_config.h -- what uploads in parts need of the daemon. */
+/* resumables_config.h -- what resumable uploads need from the daemon. */
 #ifndef UNBAKE_UPLOADS_RESUMABLES_CONFIG_H
 #define UNBAKE_UPLOADS_RESUMABLES_CONFIG_H
 
@@ -10,8 +10,8 @@ struct store;  /* store/store.h */
 struct resumables_config {
     struct store *store; /* borrowed, and so is: */
     struct folder *folder;
-    int64_t idle_ms;                 /* after which an upload that does not grow gives its space back */
-    void (*scene_added)(void *user); /* an upload has become a scene, which is to be checked */
+    int64_t idle_ms;                 /* an upload that has not grown for this long loses its reserved space */
+    void (*scene_added)(void *user); /* an upload has become a scene, which must be checked */
     void *user;
 };
 

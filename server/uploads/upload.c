@@ -12,8 +12,7 @@
 #include "common/mem.h"
 #include "server/data/layout.h"
 
-/* Every so many bytes: start writing them out, so that the sync at the end is short, and look
- * whether others have filled the disk meanwhile. */
+/* After each step, start write-back, so that the final sync is short, and check whether others have filled the disk. */
 #define STEP_BYTES ((uint64_t)32 << 20)
 
 struct upload {
@@ -21,8 +20,8 @@ struct upload {
     char *path; /* NULL once published */
     struct sha256 hash;
     uint64_t bytes;
-    uint64_t step_start; /* where the present step began */
-    bool is_reserved;    /* the space for all of it is ours already */
+    uint64_t step_start; /* where the current step began */
+    bool is_reserved;    /* all of its space is allocated */
 };
 
 uint64_t upload_bytes(const struct upload *u) { return u->bytes; }
@@ -72,7 +71,7 @@ enum status upload_write(struct upload *u, const void *data, size_t length, bool
     u->bytes += length;
     if (u->bytes - u->step_start < STEP_BYTES)
         return STATUS_OK;
-    /* Only a hint to the kernel; the sync at the end is what counts. */
+    /* Only a hint to the kernel; the final sync is what counts. */
     (void)sync_file_range(u->fd, (off_t)u->step_start, (off_t)(u->bytes - u->step_start), SYNC_FILE_RANGE_WRITE);
     u->step_start = u->bytes;
     *must_check_room = !u->is_reserved;

@@ -1,8 +1,8 @@
-/* upload.h -- a bundle that arrives in one piece: written and hashed as it comes.
+/* upload.h -- a bundle that arrives in one request: written and hashed on the way.
  *
  * 1. It lies in DATA/uploads/ under a random name until it is complete and synced; only then is it renamed to
- *    DATA/scenes/ID/archive. What is freed before that leaves nothing behind.
- * 2. Space is reserved at the start where the length is known. */
+ *    DATA/scenes/ID/archive. Freeing it earlier removes it.
+ * 2. Where the length is known, the space is reserved at the start. */
 #ifndef UNBAKE_UPLOADS_UPLOAD_H
 #define UNBAKE_UPLOADS_UPLOAD_H
 
@@ -15,21 +15,20 @@
 
 struct upload; /* opaque */
 
-/* Makes the file; `length`: bytes that will come, 0: not known. STATUS_NO_SPACE where they cannot be reserved. */
+/* Creates the file; `length` in bytes, 0: unknown. STATUS_NO_SPACE if they cannot be reserved. */
 enum status upload_new(struct upload **u, const char *data_dir, uint64_t length, struct error *err);
-/* The next bytes. *must_check_room: space could not be reserved and much has come since the last time; the caller looks
- * whether others have filled the disk meanwhile. */
+/* *must_check_room: the space is not reserved and a step has been written; the caller checks the free space. */
 enum status upload_write(struct upload *u, const void *data, size_t length, bool *must_check_room, struct error *err);
-void upload_digest(struct upload *u, char hex[SHA256_HEX_SIZE]); /* of what has come */
+void upload_digest(struct upload *u, char hex[SHA256_HEX_SIZE]); /* of what has arrived */
 enum status upload_sync(struct upload *u, struct error *err);
-/* Moves the synced file to where the archive of scene `id` belongs, durably. */
+/* Moves the synced file durably to the archive's place of scene `id`. */
 enum status upload_publish(struct upload *u, const char *data_dir, const char *id, struct error *err);
 /* The same for the file `path`, which is complete and synced. */
 enum status upload_place(const char *data_dir, const char *path, const char *id, struct error *err);
-/* That the archive of scene `id` has its place is on disk: after an upload_place that failed half-way. */
+/* Makes the archive's place durable after an upload_place that failed half-way. */
 enum status upload_sync_place(const char *data_dir, const char *id, struct error *err);
 
 uint64_t upload_bytes(const struct upload *u);
-void upload_free(struct upload *u); /* NULL is fine */
+void upload_free(struct upload *u); /* NULL is allowed */
 
 #endif

@@ -28,14 +28,14 @@ static enum status open_file(struct upload_session *s, struct error *err) {
     enum status status = STATUS_OK;
     char *path = upload_session_path(s->resumables, s->id);
     s->fd = open(path, O_RDWR | O_CLOEXEC | O_NOFOLLOW);
-    /* Whole, it may be on its way to be a scene: see place in resumable.c. */
+    /* a complete file may have moved to the scenes: see place in resumable.c */
     if (s->fd < 0 && (errno != ENOENT || s->received < s->length))
         status = error_set_errno(err, errno, "cannot open %s", path);
     mem_free(path);
     return status;
 }
 
-/* Hashes what lies in the file from s->received to its end: written, but never counted. */
+/* Hashes what lies in the file beyond s->received: written, but never counted. */
 static enum status count_tail(struct upload_session *s, struct error *err) {
     char *chunk = mem_alloc(CHUNK_BYTES);
     enum status status = STATUS_OK;
@@ -56,8 +56,7 @@ static enum status count_tail(struct upload_session *s, struct error *err) {
     return status;
 }
 
-/* What lies beyond the counted bytes may be anything: the machine was started anew since, or its disk
- * has failed. */
+/* Truncates to the counted bytes: what follows is undefined after a reboot or a disk error. */
 static enum status cut_tail(struct upload_session *s, struct error *err) {
     if (ftruncate(s->fd, (off_t)s->received) != 0)
         return error_set_errno(err, errno, "cannot cut upload %s", s->id);
@@ -202,20 +201,20 @@ enum status upload_session_shrink(struct upload_session *s, struct error *err) {
 
 void upload_session_close(struct upload_session *s) {
     pthread_mutex_lock(&s->mutex);
-    s->is_loaded = false; /* the next to come reads its row */
+    s->is_loaded = false; /* the next user reads the row again */
     s->writer = NULL;
     pthread_mutex_unlock(&s->mutex);
 }
 
 /* --- counting ------------------------------------------------------------------------------ */
 
-/* What was received since the last commit may be lost: where a sync has failed, the kernel can have
- * dropped it, and the next sync would say that all is well. It is to be sent again. s->syncing is held. */
+/* Drops what was received since the last commit: after a failed sync the kernel may have dropped it, while the next
+ * sync would succeed. The client must send it again. s->syncing is held. */
 static void forget_tail(struct upload_session *s) {
     struct error err;
     pthread_mutex_lock(&s->mutex);
     s->received = s->counted;
-    s->is_loaded = false; /* the next to come reads row and hash again */
+    s->is_loaded = false; /* the next user reads row and hash again */
     s->writer = NULL;
     s->needs_truncation = ftruncate(s->fd, (off_t)s->counted) != 0 &&
                           store_upload_begin(s->resumables->config.store, s->id, "", &err) != STATUS_OK;

@@ -9,14 +9,14 @@
 #include "common/mem.h"
 #include "server/uploads/upload_session.h"
 
-#define COMMIT_BYTES ((uint64_t)64 << 20) /* counted at least so often; a kill costs hashing them again */
-#define HINT_BYTES ((uint64_t)8 << 20)    /* writing out begins so often, so that a commit is short */
+#define COMMIT_BYTES ((uint64_t)64 << 20) /* counted at least this often; after a kill this much is hashed again */
+#define HINT_BYTES ((uint64_t)8 << 20)    /* write-back is started this often, so that commits are short */
 
 struct upload_writer {
     struct upload_session *session;
     bool is_checked;
-    uint64_t at;        /* where it writes next */
-    struct sha256 hash; /* where is_checked: up to `at` */
+    uint64_t at;        /* next offset to write */
+    struct sha256 hash; /* with is_checked: up to `at` */
 };
 
 static enum status lost(struct error *err) {
@@ -24,11 +24,11 @@ static enum status lost(struct error *err) {
     return error_hint(err, "HEAD gives the offset; continue from there");
 }
 
-/* --- who writes ---------------------------------------------------------------------------- */
+/* --- who writes ------------------------------------------------------------------------------ */
 
 /* The session's mutex is held. */
 static enum status check_offset(const struct upload_session *s, uint64_t offset, struct error *err) {
-    if (!s->is_loaded) /* s->hash is still that of what was forgotten */
+    if (!s->is_loaded) /* s->hash would still include dropped bytes */
         return lost(err);
     if (s->received != offset)
         return error_set(err, STATUS_CONFLICT, "the upload's offset is %llu, not %llu", (unsigned long long)s->received,
@@ -99,7 +99,7 @@ static enum status write_at(int fd, const char *data, uint64_t length, uint64_t 
     return STATUS_OK;
 }
 
-/* Now and then: the kernel begins to write out what has come up to `at`. Only a hint to it. */
+/* Starts write-back of what has arrived up to `at`; only a hint to the kernel. */
 static void hint(struct upload_session *s, uint64_t at) {
     if (at >= s->hinted && at - s->hinted < HINT_BYTES)
         return;

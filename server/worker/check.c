@@ -43,7 +43,7 @@ enum status task_check(const struct order *order, struct progress *progress, str
     cJSON *problems = cJSON_CreateArray();
     struct scene scene;
     struct reading reading;
-    /* What an earlier check left that was killed, or of an earlier opinion on the content. */
+    /* Removes what an earlier, killed check left, or one with another reading. */
     enum status status = reading_parse(order->reading, &reading, err);
     if (status == STATUS_OK)
         status = file_remove_tree(files, err);

@@ -17,7 +17,7 @@
 #include "server/store/sql.h"
 #include "common/hash64.h"
 
-/* The largest page there is: a tile is then a chain of 16, not of 256. */
+/* SQLite's largest page: a tile is a chain of 16 pages, not of 256. */
 #define PAGE_SIZE 65536
 
 struct checkpoint_tile {
@@ -34,7 +34,7 @@ struct stored_array {
 struct checkpoint {
     struct sql sql;
     char *fingerprint;
-    bool complete; /* there is a commit, described by what follows */
+    bool complete; /* there is a commit, described below */
     int format;    /* of the file */
     char *program; /* version that wrote it */
     char note[512];
@@ -59,7 +59,7 @@ static void arrays_release(struct stored_array *array, size_t count) {
     mem_free(array);
 }
 
-/* Binds every hash, in order, to the rest of what a load relies on. */
+/* A digest of all hashes, in order, and of everything else a load relies on. */
 static uint64_t digest_of(const struct stored_array *array, size_t count, long iteration, const char *fingerprint) {
     uint64_t digest = hash64(fingerprint, strlen(fingerprint), (uint64_t)iteration);
     for (size_t i = 0; i < count; i++) {
@@ -129,7 +129,7 @@ static enum status read_arrays(struct checkpoint *c, struct error *err) {
     return status;
 }
 
-/* Reads every tile and checks its place, size and hash. */
+/* Reads every tile and checks its position, size and hash. */
 static enum status read_tiles(struct checkpoint *c, struct error *err) {
     sqlite3_stmt *stmt;
     enum status status = sql_query(&c->sql, &stmt, err, "SELECT id, array, number, hash, data FROM tiles", "");
@@ -163,7 +163,7 @@ static enum status read_tiles(struct checkpoint *c, struct error *err) {
     return status;
 }
 
-/* Reads and verifies the commit that is there. note[0] is set when it is of no use here. */
+/* Reads and verifies the commit. note[0] is set when it cannot be used. */
 static enum status read_commit(struct checkpoint *c, char note[512], struct error *err) {
     int64_t version, table_count;
     enum status status = sql_int(&c->sql, 0, &version, err, "PRAGMA user_version", "");
@@ -225,9 +225,8 @@ static enum status remove_file(const char *path, struct error *err) {
     return status;
 }
 
-/* Where SQLite cannot make a file it tries whether it can at least read it, and then tells why that
- * failed. Both files are made here, so that a full disk is told as one; empty, they are an empty database
- * and no journal. */
+/* Where SQLite cannot create a file it tries to open it read-only and reports that error. Both files are created
+ * here, so that a full disk is reported as such; empty files are an empty database and no journal. */
 static enum status open_file(struct checkpoint *c, const char *path, struct error *err) {
     static const char *const suffixes[] = {"", "-journal"};
     enum status status = STATUS_OK;
@@ -254,7 +253,7 @@ enum status checkpoint_open(struct checkpoint **out, const char *path, const cha
     enum status status = open_file(c, path, &first);
     if (status == STATUS_OK)
         status = read_commit(c, note, &first);
-    /* Damage in the schema's text makes our statements wrong: STATUS_INTERNAL. */
+    /* A damaged schema makes our statements invalid: STATUS_INTERNAL. */
     if (status == STATUS_CORRUPT || status == STATUS_INTERNAL)
         snprintf(note, 512, "the checkpoint cannot be used: %.400s", first.message);
     else if (status != STATUS_OK && err)
@@ -296,8 +295,7 @@ static bool same_arrays(const struct checkpoint *c, const struct state_array *ar
     return same;
 }
 
-/* The index that describes `array`, with the rows and hashes of the newest commit where it holds
- * the same arrays. */
+/* The index for `array`, with the rows and hashes of the newest commit if it holds the same arrays. */
 static struct stored_array *next_index(const struct checkpoint *c, const struct state_array *array, size_t count,
                                        bool same) {
     struct stored_array *next = mem_calloc(count ? count : 1, sizeof *next);
@@ -315,7 +313,7 @@ static struct stored_array *next_index(const struct checkpoint *c, const struct 
     return next;
 }
 
-/* Inserts the tiles of one array that have changed; *row is the next free row number. */
+/* Inserts the changed tiles of one array; *row is the next free row number. */
 static enum status insert_tiles(struct checkpoint *c, const struct state_array *array, size_t number,
                                 struct stored_array *next, int64_t *row, struct checkpoint_cost *cost,
                                 struct error *err) {
@@ -337,7 +335,7 @@ static enum status insert_tiles(struct checkpoint *c, const struct state_array *
     return status;
 }
 
-/* Deletes the rows of the newest commit that `next` does not use any more. */
+/* Deletes rows of the newest commit that `next` no longer uses. */
 static enum status delete_replaced(struct checkpoint *c, const struct stored_array *next, bool same,
                                    struct error *err) {
     enum status status = STATUS_OK;
@@ -419,11 +417,11 @@ static enum status load_tile(struct checkpoint *c, const struct checkpoint_tile 
         status = STATUS_CORRUPT;
     }
     sqlite3_reset(stmt);
-    /* It was whole when the file was opened: the device is at fault, or its memory. */
+    /* It was intact when the file was opened: the device or the memory is faulty. */
     return status == STATUS_OK ? status : error_set(err, STATUS_IO, "%s: a tile read twice differs", c->sql.path);
 }
 
-/* The stored array of that name; NULL: none. */
+/* The stored array with that name; NULL: none. */
 static const struct stored_array *stored_named(const struct checkpoint *c, const char *name) {
     for (size_t i = 0; i < c->array_count; i++)
         if (strcmp(c->array[i].name, name) == 0)
@@ -447,7 +445,7 @@ static enum status check_surface(struct checkpoint *c, const struct stored_array
     return status != STATUS_OK || same ? status : damaged(c, "this program lays textures out in another way", err);
 }
 
-/* Whether all that is wanted is there as it is wanted. */
+/* Checks that all wanted arrays are there, with the wanted sizes. */
 static enum status check_arrays(struct checkpoint *c, const struct state_array *array, size_t count,
                                 struct error *err) {
     enum status status = STATUS_OK;
@@ -464,7 +462,7 @@ static enum status check_arrays(struct checkpoint *c, const struct state_array *
     return status;
 }
 
-/* Says what of an older format nobody asks for. */
+/* Notes which arrays of an older format are no longer used. */
 static void note_dropped(struct checkpoint *c, const struct state_array *array, size_t count) {
     const size_t size = sizeof c->note;
     size_t used = 0;

@@ -31,16 +31,16 @@
 
 struct checkpoint; /* opaque */
 
-/* Opens or creates the file. `fingerprint` names what the state depends on (scene, settings): a
- * checkpoint of another one is removed. note[0] is 0, or a sentence for the user on why an
- * existing checkpoint is not used. STATUS_UNAVAILABLE when another process has it. */
+/* Opens or creates the file. `fingerprint` identifies what the state depends on (scene, settings): a checkpoint with
+ * another one is removed. note[0] is 0, or a sentence for the user on why an existing checkpoint is not used.
+ * STATUS_UNAVAILABLE when another process has it. */
 enum status checkpoint_open(struct checkpoint **checkpoint, const char *path, const char *fingerprint, char note[512],
                             struct error *err);
 void checkpoint_close(struct checkpoint *checkpoint);
 
 struct checkpoint_cost {
     size_t tile_count, written_tile_count;
-    uint64_t written_bytes; /* of tiles */
+    uint64_t written_bytes; /* in tiles */
     double seconds;
 };
 
@@ -48,16 +48,15 @@ struct checkpoint_cost {
 enum status checkpoint_save(struct checkpoint *checkpoint, long iteration, const struct state_array *array,
                             size_t count, struct checkpoint_cost *cost, struct error *err);
 
-/* Fills the arrays; *found is false, and nothing is touched, when there is no checkpoint. Of one of an older format
- * those that it cannot have keep what they hold.
- * STATUS_CORRUPT, and nothing is touched, when it lacks others, when sizes differ, or STATE_SURFACE does. */
+/* Fills the arrays. Without a checkpoint *found is false and nothing changes. With one of an older format, arrays
+ * that it cannot have keep their content. STATUS_CORRUPT, and nothing changes, when other arrays are missing, sizes
+ * differ, or STATE_SURFACE does. */
 enum status checkpoint_load(struct checkpoint *checkpoint, struct state_array *array, size_t count, bool *found,
                             long *iteration, struct error *err);
-/* A sentence for the user on what the last load dropped, and of which format that was; "" where there is nothing to
- * say. Borrowed. */
+/* A sentence for the user on what the last load dropped, and from which format; "" if nothing. Borrowed. */
 const char *checkpoint_note(const struct checkpoint *checkpoint);
 
-/* Forgets what is stored: for a state that its reader cannot use. */
+/* Removes the stored state, because its reader cannot use it. */
 enum status checkpoint_clear(struct checkpoint *checkpoint, struct error *err);
 
 #endif

@@ -8,23 +8,23 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* What a process keeps. */
+/* What a process may still do. */
 struct sandbox {
     const char *write_dir; /* NULL: none */
     const char *read_dir;  /* NULL: none */
-    uint16_t connect_port; /* of the server that it calls; 0: no network */
+    uint16_t connect_port; /* of the server that it connects to; 0: no network */
     uint64_t memory_bytes; /* 0: no limit */
 };
 
-/* Landlock: which files may be read and written (Linux 5.13), which TCP port may be called (6.7), and that
- * no signal and no abstract Unix socket leads out (6.12). What a kernel is too old for is left out. */
+/* Landlock: which files may be read and written (Linux 5.13), which TCP port may be connected to (6.7); no signals
+ * to other processes and no abstract Unix sockets (6.12). Skips what the kernel is too old for. */
 bool confine_files(const struct sandbox *sandbox);
 
-/* seccomp: the system calls of the list in confine_calls.c, with the arguments given there; all others fail
- * with ENOSYS. With `network` also those that resolve a name and talk to a server. */
+/* seccomp: allows the system calls in confine_calls.c, with the arguments given there; all others fail with ENOSYS.
+ * `network` adds those needed to resolve a name and talk to a server. */
 bool confine_calls(bool network);
 
-/* On top of confine_calls(true): no further socket and no further connection. */
+/* After confine_calls(true): no more sockets and no more connections. */
 bool confine_to_connection(void);
 
 #endif

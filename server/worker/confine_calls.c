@@ -56,7 +56,7 @@ static const int plain[] = {
     SCMP_SYS(nanosleep),
     SCMP_SYS(time),
     SCMP_SYS(times),
-    /* signals that come */
+    /* handling signals */
     SCMP_SYS(pause),
     SCMP_SYS(restart_syscall),
     SCMP_SYS(rt_sigaction),
@@ -66,7 +66,7 @@ static const int plain[] = {
     SCMP_SYS(rt_sigsuspend),
     SCMP_SYS(rt_sigtimedwait),
     SCMP_SYS(sigaltstack),
-    /* who and where it is */
+    /* identity and location */
     SCMP_SYS(getcwd),
     SCMP_SYS(getegid),
     SCMP_SYS(geteuid),
@@ -107,7 +107,7 @@ static const int plain[] = {
     SCMP_SYS(syncfs),
     SCMP_SYS(write),
     SCMP_SYS(writev),
-    /* names: what may be opened, made, renamed and removed is Landlock's */
+    /* names: Landlock decides what may be opened, created, renamed and removed */
     SCMP_SYS(access),
     SCMP_SYS(faccessat),
     SCMP_SYS(faccessat2),
@@ -126,14 +126,14 @@ static const int plain[] = {
     SCMP_SYS(statx),
     SCMP_SYS(unlink),
     SCMP_SYS(unlinkat),
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) /* make their calls in ways of their own */
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) /* the sanitizers' own calls */
     SCMP_SYS(getdents),
     SCMP_SYS(mincore),
     SCMP_SYS(open),
     SCMP_SYS(pipe),
     SCMP_SYS(pipe2),
 #endif
-#ifdef __SANITIZE_ADDRESS__ /* its check for leaks traces its own threads from a process that shares their memory */
+#ifdef __SANITIZE_ADDRESS__ /* LeakSanitizer traces its threads from a process that shares their memory */
     SCMP_SYS(prctl),
     SCMP_SYS(ptrace),
     SCMP_SYS(wait4),
@@ -146,10 +146,10 @@ static const int
             {
                 SCMP_SYS(getpeername), SCMP_SYS(getsockname), SCMP_SYS(getsockopt), SCMP_SYS(connect),
                 SCMP_SYS(recvfrom),    SCMP_SYS(recvmmsg),    SCMP_SYS(recvmsg),    SCMP_SYS(shutdown),
-                SCMP_SYS(seccomp), /* for confine_to_connection: it can only take away */
+                SCMP_SYS(seccomp), /* for confine_to_connection; it can only restrict further */
 };
 
-/* Whether a call of libseccomp did it. A system without memory is not one that cannot. */
+/* Checks a result of libseccomp. Out of memory ends the process; it does not mean that seccomp is missing. */
 static bool done(int result) {
     if (result == -ENOMEM)
         mem_exhausted("libseccomp");
@@ -159,7 +159,7 @@ static bool done(int result) {
 #define ALLOW(filter, call, count, ...)                                                                                \
     done(seccomp_rule_add(filter, SCMP_ACT_ALLOW, SCMP_SYS(call), count, __VA_ARGS__))
 
-/* A number below 0 is a call that this architecture does not have. */
+/* A negative number is a call that this architecture lacks. */
 static bool allow_all(scmp_filter_ctx filter, const int *calls, size_t count) {
     bool ok = true;
     for (size_t i = 0; ok && i < count; i++)
@@ -167,8 +167,8 @@ static bool allow_all(scmp_filter_ctx filter, const int *calls, size_t count) {
     return ok;
 }
 
-/* A thread of this process, as pthread_create makes one; never a process, which could outlive this one, and no
- * namespace. What else a thread may ask for has no effect on others. */
+/* Threads as pthread_create makes them; no processes, which could outlive this one, and no namespaces. Other clone
+ * flags have no effect on others. */
 static bool allow_threads(scmp_filter_ctx filter) {
     static const scmp_datum_t needed = CLONE_VM | CLONE_SIGHAND | CLONE_THREAD,
                               harmless = CLONE_FS | CLONE_FILES | CLONE_SYSVSEM | CLONE_SETTLS | CLONE_PARENT_SETTID |
@@ -178,8 +178,8 @@ static bool allow_threads(scmp_filter_ctx filter) {
            (!IS_ASAN || ALLOW(filter, clone, 1, SCMP_A0(SCMP_CMP_EQ, leak_check, 0)));
 }
 
-/* Signals only to itself (abort), limits only to be read, and of itself. A name for a thread; not who is killed
- * when the daemon dies (PR_SET_PDEATHSIG). */
+/* Signals to itself only (abort); limits are read-only, and its own. Naming a thread is allowed, changing
+ * PR_SET_PDEATHSIG is not. */
 static bool allow_on_itself(scmp_filter_ctx filter) {
     scmp_datum_t self = (scmp_datum_t)getpid();
     return ALLOW(filter, kill, 1, SCMP_A0(SCMP_CMP_EQ, self, 0)) &&
@@ -188,8 +188,8 @@ static bool allow_on_itself(scmp_filter_ctx filter) {
            (IS_ASAN || ALLOW(filter, prctl, 1, SCMP_A0(SCMP_CMP_EQ, PR_SET_NAME, 0)));
 }
 
-/* Of fcntl and ioctl nothing that has signals sent (F_SETOWN, F_SETSIG, O_ASYNC, leases; FIOASYNC, SIOCSPGRP).
- * Landlock before Linux 6.2 lets a file be cut that may only be read. */
+/* No fcntl or ioctl that makes the kernel send signals (F_SETOWN, F_SETSIG, O_ASYNC, leases; FIOASYNC, SIOCSPGRP).
+ * No truncation by name: before Linux 6.2 Landlock does not guard it. */
 static bool allow_on_descriptors(scmp_filter_ctx filter) {
     static const int commands[] = {F_DUPFD, F_DUPFD_CLOEXEC, F_GETFD, F_SETFD, F_GETFL, F_GETLK, F_SETLK, F_SETLKW};
     bool ok = ALLOW(filter, ioctl, 1, SCMP_A1(SCMP_CMP_EQ, TCGETS, 0)) && /* isatty */
@@ -201,9 +201,8 @@ static bool allow_on_descriptors(scmp_filter_ctx filter) {
     return ok;
 }
 
-/* TCP and UDP over IP: neither Unix sockets, behind which other services are (the daemon's admin.sock too), nor
- * netlink, raw packets, or protocols whose connections Landlock does not see. MSG_FASTOPEN connects without
- * connect(). */
+/* TCP and UDP over IP only: no Unix sockets (other services, the daemon's admin.sock), netlink, raw packets, or
+ * protocols that Landlock does not check. MSG_FASTOPEN would connect without connect(). */
 static bool allow_sockets(scmp_filter_ctx filter) {
     static const struct {
         scmp_datum_t type, protocol;
@@ -221,7 +220,7 @@ static bool allow_sockets(scmp_filter_ctx filter) {
     return ok;
 }
 
-/* Timeouts, and what the C library's resolver cannot do without. */
+/* Timeouts, and what the C library's resolver needs. */
 static bool allow_socket_options(scmp_filter_ctx filter) {
     static const struct {
         scmp_datum_t level, name;
@@ -263,7 +262,7 @@ bool confine_to_connection(void) {
     bool ok = true;
     for (size_t i = 0; ok && i < sizeof refused / sizeof *refused; i++)
         ok = done(seccomp_rule_add(filter, SCMP_ACT_ERRNO(ENOSYS), refused[i], 0));
-    /* Nor a datagram to anywhere: an address is what names another receiver. */
+    /* No datagrams to other addresses either. */
     ok = ok && done(seccomp_rule_add(filter, SCMP_ACT_ERRNO(ENOSYS), SCMP_SYS(sendto), 1, SCMP_A4(SCMP_CMP_NE, 0, 0)));
     return load(filter, ok);
 }

@@ -8,18 +8,18 @@
 
 #include "server/worker/confine.h"
 
-/* By version of the interface; linux/landlock.h of Debian 12 ends with version 2. */
+/* ABI versions; linux/landlock.h of Debian 12 ends with version 2. */
 #define VERSION_REFER 2    /* Linux 5.19 */
 #define VERSION_TRUNCATE 3 /* 6.2 */
 #define VERSION_NETWORK 4  /* 6.7 */
 #define VERSION_IOCTL 5    /* 6.10 */
 #define VERSION_SCOPE 6    /* 6.12 */
 
-/* Everything of version 1: bits 0 (execute) to 12 (make a symbolic link). */
+/* All rights of version 1: bits 0 (execute) to 12 (create a symbolic link). */
 #define ACCESS_1 ((1ULL << 13) - 1)
 #define ACCESS_REFER (1ULL << 13)
 #define ACCESS_TRUNCATE (1ULL << 14)
-#define ACCESS_IOCTL (1ULL << 15) /* of devices */
+#define ACCESS_IOCTL (1ULL << 15) /* ioctl on devices */
 #define CONNECT_TCP (1ULL << 1)
 #define BIND_TCP (1ULL << 0)
 #define SCOPE_ABSTRACT_SOCKET (1ULL << 0)
@@ -31,10 +31,10 @@
     (READ_ACCESS | LANDLOCK_ACCESS_FS_WRITE_FILE | LANDLOCK_ACCESS_FS_REMOVE_DIR | LANDLOCK_ACCESS_FS_REMOVE_FILE |    \
      LANDLOCK_ACCESS_FS_MAKE_DIR | LANDLOCK_ACCESS_FS_MAKE_REG)
 
-#define DNS_PORT 53 /* a long reply comes by TCP */
+#define DNS_PORT 53 /* long replies come by TCP */
 
-/* struct landlock_ruleset_attr as of version 6. An older kernel takes it as long as what it does not
- * know is 0. */
+/* struct landlock_ruleset_attr as of version 6. An older kernel accepts it if the members that it does not know are
+ * 0. */
 struct ruleset_attributes {
     uint64_t files, network, scoped;
 };
@@ -45,9 +45,9 @@ struct port_attributes {
 
 static bool allow(int ruleset, const char *path, uint64_t access) {
     struct landlock_path_beneath_attr rule = {.allowed_access = access};
-    rule.parent_fd = open(path, O_PATH | O_CLOEXEC); /* follows links: the rule is of what they name now */
+    rule.parent_fd = open(path, O_PATH | O_CLOEXEC); /* follows links: the rule applies to their present target */
     if (rule.parent_fd < 0)
-        return errno == ENOENT; /* what is not there needs no rule */
+        return errno == ENOENT; /* a missing path needs no rule */
     long result = syscall(SYS_landlock_add_rule, ruleset, LANDLOCK_RULE_PATH_BENEATH, &rule, 0);
     close(rule.parent_fd);
     return result == 0;
@@ -68,7 +68,7 @@ static bool allow_all(int ruleset, const char *const *paths, size_t count, uint6
 #define COUNT(list) (sizeof list / sizeof *list)
 
 static bool allow_system(int ruleset) {
-    /* What the loader, the threading library and the C library look at while they run. */
+    /* Used by the loader and by the threading and C libraries at run time. */
     static const char *const folders[] = {"/usr",         "/lib",           "/lib64",        "/proc/self",
                                           "/sys/devices", "/sys/fs/cgroup", "/sys/kernel/mm"};
     static const char *const files[] = {"/etc/ld.so.cache", "/etc/localtime", "/proc/cpuinfo", "/proc/meminfo",
@@ -77,7 +77,7 @@ static bool allow_system(int ruleset) {
            allow_all(ruleset, files, COUNT(files), LANDLOCK_ACCESS_FS_READ_FILE);
 }
 
-/* What finding a server, and trusting it, takes. */
+/* For resolving a server's name and verifying its certificate. */
 static bool allow_network(int ruleset, long version, uint16_t port) {
     static const char *const files[] = {"/etc/resolv.conf", "/etc/hosts",     "/etc/nsswitch.conf",
                                         "/etc/gai.conf",    "/etc/host.conf", "/etc/services"};
@@ -109,7 +109,7 @@ bool confine_files(const struct sandbox *sandbox) {
         ok = ok && allow(ruleset, sandbox->read_dir, READ_ACCESS);
     if (sandbox->connect_port)
         ok = ok && allow_network(ruleset, version, sandbox->connect_port);
-#ifdef COVERAGE_DIR /* make coverage: each process leaves its counts there when it ends */
+#ifdef COVERAGE_DIR /* make coverage: each process writes its counts there */
     ok = ok && allow(ruleset, COVERAGE_DIR, WRITE_ACCESS | later);
 #endif
     ok = ok && syscall(SYS_landlock_restrict_self, ruleset, 0) == 0;

@@ -23,7 +23,7 @@
 #include "server/worker/progress.h"
 #include "server/worker/tasks.h"
 
-#define PATIENCE_SEC 10 /* for each step; the daemon's is for all */
+#define PATIENCE_SEC 10 /* for each step; the daemon limits the whole */
 
 static bool is_public_v4(uint32_t a) {
     static const struct {
@@ -47,7 +47,7 @@ static bool is_public_v6(const uint8_t a[16]) {
         return is_public_v4(last);
     bool is_documentation = a[0] == 0x20 && a[1] == 0x01 && a[2] == 0x0d && a[3] == 0xb8;
     bool is_tunnel = (a[0] == 0x20 && a[1] == 0x02) || (a[0] == 0x20 && a[1] == 0x01 && a[2] == 0 && a[3] == 0);
-    return a[0] >> 5 == 1 && !is_documentation && !is_tunnel; /* 2000::/3 is what is given out */
+    return a[0] >> 5 == 1 && !is_documentation && !is_tunnel; /* 2000::/3 is the allocated global unicast space */
 }
 
 bool deliver_is_public(const struct sockaddr *address) {
@@ -58,7 +58,7 @@ bool deliver_is_public(const struct sockaddr *address) {
     return false;
 }
 
-/* The key of a secret: its bytes, which are `key`'s or the secret's own. */
+/* The signing key of a secret; it lies in `key` or in the secret itself. */
 static size_t key_of(const char *secret, unsigned char key[WEBHOOK_KEY_MOST], const void **bytes) {
     size_t prefix = strlen(WEBHOOK_SECRET_PREFIX), size;
     const char *base64 = secret + prefix;
@@ -92,7 +92,7 @@ int deliver_status(const char *line) {
     return (code[0] - '0') * 100 + (code[1] - '0') * 10 + (code[2] - '0');
 }
 
-/* A connection to the first of the host's addresses that takes one; -1 with the reason. */
+/* Connects to the first address of the host that accepts; -1 with the reason. */
 static int call(const struct url *url, bool may_be_private, struct error *err) {
     struct addrinfo hints = {.ai_socktype = SOCK_STREAM, .ai_flags = AI_NUMERICSERV}, *found;
     struct timeval patience = {.tv_sec = PATIENCE_SEC};
@@ -126,8 +126,8 @@ static int call(const struct url *url, bool may_be_private, struct error *err) {
     return fd;
 }
 
-/* Reads some of the reply; 0 or less at its end. A record of TLS 1.3 may bring no data but tickets for later
- * sessions, with GNUTLS_E_AGAIN, as a time that is up does, too. */
+/* Reads a part of the reply; 0 or less at its end. With TLS 1.3 a record may hold only session tickets:
+ * GNUTLS_E_AGAIN, which a timeout also gives. */
 static ssize_t receive(int fd, gnutls_session_t tls, char *to, size_t length) {
     double until = clock_sec() + PATIENCE_SEC;
     ssize_t n;
@@ -139,7 +139,7 @@ static ssize_t receive(int fd, gnutls_session_t tls, char *to, size_t length) {
     return n;
 }
 
-/* Sends the request and reads the first line of the reply, past a plain socket or TLS. */
+/* Sends the request and reads the status line of the reply, over a plain socket or TLS. */
 static enum status talk(int fd, gnutls_session_t tls, const struct buf *request, int *code, struct error *err) {
     char line[64] = "";
     size_t sent = 0, got = 0;
@@ -223,7 +223,7 @@ enum status task_deliver(const struct order *order, struct progress *progress, s
     else
         status = url.is_tls ? talk_tls(fd, url.host, &request, &code, err) : talk(fd, NULL, &request, &code, err);
     if (code > 0)
-        progress_metric(progress, "status", 0, code); /* for the daemon, which does not speak to strangers */
+        progress_metric(progress, "status", 0, code); /* for the daemon, which does not talk to the receiver itself */
     if (status == STATUS_OK && (code < 200 || code > 299))
         status = error_set(err, STATUS_UNAVAILABLE, "%s answered %d", url.host, code);
     if (fd >= 0)

@@ -5,24 +5,24 @@
  *    is called: a name that changes in between gains nothing. Private addresses are refused
  *    unless the daemon's configuration lets them be.
  * 2. Redirects are not followed. What comes back is read up to its status, which must be 2xx.
- * 3. A message is signed as standardwebhooks.com has it: HMAC-SHA256 over "ID.TIMESTAMP.BODY". The key is what is base64
- *    behind whsec_ in the secret. A secret of another form is the key as it stands: the library verifies such messages
- *    with whsec_ and the base64 of that text. */
+ * 3. A message is signed as standardwebhooks.com has it: HMAC-SHA256 over "ID.TIMESTAMP.BODY". The key is what is
+ *    base64 behind whsec_ in the secret. A secret of another form is the key as it stands: the library verifies such
+ *    messages with whsec_ and the base64 of that text. */
 #ifndef UNBAKE_WORKER_DELIVER_H
 #define UNBAKE_WORKER_DELIVER_H
 
 #include <stdbool.h>
 #include <sys/socket.h>
 
-/* False for loopback, private, link-local, multicast, reserved and otherwise special addresses, also
- * where they hide in IPv6. */
+/* False for loopback, private, link-local, multicast, reserved and other special addresses, also when embedded in
+ * IPv6. */
 bool deliver_is_public(const struct sockaddr *address);
 
 /* "v1,BASE64" for a secret as its owner gave it. */
 void deliver_sign(const char *secret, const char *id, long long timestamp, const char *body, char signature[64]);
 
-/* The status, from 100 to 999, that is told by the first line of a reply of HTTP/1.0 or 1.1; 0 where it is none.
- * The line may go on, or end where it was cut off. */
+/* The status, 100 to 999, in the status line of an HTTP/1.0 or 1.1 reply; 0 if there is none. The line may continue,
+ * or be cut off after the status. */
 int deliver_status(const char *line);
 
 #endif

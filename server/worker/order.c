@@ -79,7 +79,7 @@ enum status order_read(struct order *o, const char *dir, struct error *err) {
         status = read_reconstruct(o, err);
     if (status == STATUS_OK && strcmp(o->kind, "deliver") == 0)
         status = read_deliver(o, err);
-    /* The daemon wrote the file: what is wrong with it is our defect, not the user's. */
+    /* The daemon wrote the file: a fault in it is a bug, not the user's. */
     if (status == STATUS_INPUT && err)
         status = err->status = STATUS_INTERNAL;
     return status;

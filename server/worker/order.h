@@ -24,11 +24,11 @@ struct order {
     int thread_count;
     uint64_t memory_bytes; /* 0: no limit */
     bool sandbox;
-    const cJSON *reading; /* how the scene is to be read (common/reading.h); NULL: as its files say */
+    const cJSON *reading; /* how to read the scene (common/reading.h); NULL: as its files say */
     /* kind "reconstruct" */
     const char *scene;     /* folder of the unpacked bundle */
     const char *name;      /* of the job, for the report's title; may be "" */
-    const char *reduced;   /* what was made smaller after it ran out of memory; may be "" */
+    const char *reduced;   /* what was reduced after running out of memory; may be "" */
     const cJSON *settings; /* object */
     int64_t job_id;
     int attempt;
@@ -38,8 +38,8 @@ struct order {
     bool allow_private;
 };
 
-/* Reads DIR/job.json; `dir` is borrowed. STATUS_INTERNAL where it is not as above: the daemon wrote it.
- * *order needs order_release in any case. */
+/* Reads DIR/job.json; `dir` is borrowed. STATUS_INTERNAL if it is malformed: the daemon wrote it. *order needs
+ * order_release in any case. */
 enum status order_read(struct order *order, const char *dir, struct error *err);
 void order_release(struct order *order);
 

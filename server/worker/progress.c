@@ -7,20 +7,20 @@
 
 #include "common/mem.h"
 
-/* One line, in as many writes as the pipe asks for: only one thread writes. Takes object. */
+/* Writes one line, in as many writes as the pipe needs: only one thread writes. Takes object. */
 static void send_line(struct progress *p, cJSON *object) {
     char *text = json_text(object);
     cJSON_Delete(object);
     size_t length = strlen(text);
     if (p->fd >= 0 && length < PROGRESS_LINE_MAX) {
-        text[length] = '\n'; /* in the place of the NUL */
+        text[length] = '\n'; /* replaces the NUL */
         size_t done = 0;
         while (done < length + 1) {
             ssize_t wrote = write(p->fd, text + done, length + 1 - done);
             if (wrote < 0 && errno == EINTR)
                 continue;
             if (wrote < 0) {
-                p->fd = -1; /* nobody listens any more */
+                p->fd = -1; /* the reader is gone */
                 break;
             }
             done += (size_t)wrote;
@@ -35,8 +35,8 @@ static cJSON *line(const char *type) {
     return object;
 }
 
-/* A copy of `text` cut to `limit` bytes, not inside a UTF-8 sequence, so that a line never gets
- * too long (JSON may write a byte as six). The caller's. */
+/* A copy of `text` of at most `limit` bytes, not cut inside a UTF-8 sequence: JSON may need six bytes for one, and
+ * lines are limited. The caller's. */
 static char *cut(const char *text, size_t limit) {
     size_t length = strlen(text);
     if (length > limit) {
@@ -49,7 +49,7 @@ static char *cut(const char *text, size_t limit) {
 
 static void add_cut(cJSON *object, const char *key, const char *text) {
     char *copy = cut(text, 8000);
-    if (strlen(copy) < strlen(text)) { /* what is left out is said */
+    if (strlen(copy) < strlen(text)) { /* mark the omission */
         char *marked = mem_printf("%s [cut]", copy);
         mem_free(copy);
         copy = marked;

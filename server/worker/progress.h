@@ -21,22 +21,22 @@
 #include "common/json.h"
 
 #define PROGRESS_LINE_MAX 65536
-#define PROGRESS_FD 3 /* where the worker finds its pipe */
+#define PROGRESS_FD 3 /* the worker's end of the pipe */
 
 /* Exit statuses of a worker. */
 enum progress_exit {
     PROGRESS_EXIT_OK = 0,
     PROGRESS_EXIT_FAILED = 1,    /* its "end" line says why */
-    PROGRESS_EXIT_INPUT = 65,    /* the input is at fault: trying again will not help */
+    PROGRESS_EXIT_INPUT = 65,    /* the input is at fault: a retry would not help */
     PROGRESS_EXIT_MEMORY = 71,   /* MEM_EXIT_STATUS */
     PROGRESS_EXIT_NO_SPACE = 74, /* the disk is full: pause the job */
-    PROGRESS_EXIT_STOPPED = 85   /* asked to stop; a checkpoint is there */
+    PROGRESS_EXIT_STOPPED = 85   /* asked to stop; a checkpoint was saved */
 };
 
-/* Writing, in the worker. A daemon that is gone is no reason to stop: errors are ignored. */
+/* The worker's side. Errors are ignored: a daemon that is gone is noticed elsewhere. */
 struct progress {
-    int fd;           /* -1: nowhere */
-    char remark[512]; /* what a user should know of a success; "": nothing */
+    int fd;           /* -1: no pipe */
+    char remark[512]; /* a remark for the user on a success; "": none */
 };
 void progress_stage(struct progress *p, const char *stage);
 void progress_step(struct progress *p, const char *stage, double done, double total, double eta_sec);
@@ -48,7 +48,7 @@ void progress_checkpoint(struct progress *p, long iteration, uint64_t bytes, dou
 /* hint may be NULL. */
 void progress_problem(struct progress *p, const char *file, const char *reason, const char *hint);
 void progress_scene(struct progress *p, cJSON *facts); /* takes facts */
-/* Of a success the message is the remark. */
+/* After a success the message is the remark. */
 void progress_end(struct progress *p, enum status status, const char *message, const char *hint);
 
 #endif

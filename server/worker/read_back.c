@@ -9,9 +9,9 @@
 #include "common/mem.h"
 #include "server/ingest/mesh_file.h"
 
-#define JSON_LIMIT ((size_t)1 << 30) /* bytes; none of ours is near */
+#define JSON_LIMIT ((size_t)1 << 30) /* bytes; our files are far smaller */
 
-/* What a mesh has whatever the order of its triangles and vertices, and however it is turned about the origin. */
+/* Invariants of a mesh under reordering of triangles and vertices and rotation about the origin. */
 struct sums {
     size_t triangle_count;
     double area;       /* m^2 */
@@ -40,7 +40,7 @@ static struct sums sums_of(const struct mesh *mesh) {
     return sums;
 }
 
-/* Within what single precision loses when a mesh is turned. */
+/* Within the rounding of single precision after a rotation. */
 static bool near(double found, double wanted) { return fabs(found - wanted) <= 1e-5 * fabs(wanted); }
 
 static enum status compare(const char *name, const struct mesh *found_mesh, const struct mesh *mesh,
@@ -83,7 +83,7 @@ enum status read_back(const char *path, const char *name, const struct mesh *mes
         status = read_json(path, &own);
     if (status == STATUS_OK)
         return STATUS_OK;
-    /* What a reader refuses in a file of ours is our fault, not that of the input. */
+    /* A reader's refusal of our own file is our fault, not the input's. */
     if (status == STATUS_INPUT || status == STATUS_LIMIT)
         return error_set(err, STATUS_CORRUPT, "read back: %s", own.message);
     if (err)

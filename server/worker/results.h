@@ -1,14 +1,14 @@
-/* results.h -- a reconstruction as the export wants it. */
+/* results.h -- a reconstruction as input of the export. */
 #ifndef UNBAKE_WORKER_RESULTS_H
 #define UNBAKE_WORKER_RESULTS_H
 
 #include "server/export/outputs.h"
 #include "server/reconstruct/reconstruct.h"
 
-/* What stands from the first iteration on; no comparisons. Borrows all of `r`, and the title. */
+/* The current state, from the first iteration on; without comparisons. Borrows all of `r`, and the title. */
 struct export_input results_so_far(const struct reconstruction *r, const char *title);
 
-/* All, once the reconstruction has ended. input->comparison is the caller's (mem_free). */
+/* Everything, once the reconstruction has ended. input->comparison is the caller's (mem_free). */
 void results_make(struct export_input *input, const struct reconstruction *r, const char *title);
 
 #endif

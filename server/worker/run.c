@@ -41,7 +41,7 @@
 #define CHECKPOINT_STRETCH 5.0
 #define PREVIEW_SHARE 0.05
 #define PROGRESS_INTERVAL_SEC 0.25
-#define METRIC_INTERVAL_SEC 1.0 /* of one series */
+#define METRIC_INTERVAL_SEC 1.0 /* minimum between values of a series */
 #define HANG_UP_INTERVAL_SEC 1.0
 #define SERIES_MAX 16
 
@@ -52,21 +52,21 @@ struct worker_run {
     char *out_dir;
     bool stop;
     bool preview_asked;      /* by SIGUSR1 */
-    const struct mesh *mesh; /* that outputs are of */
+    const struct mesh *mesh; /* the mesh of the outputs */
     struct working_time worked;
     double next_checkpoint, next_preview, next_progress, next_hang_up_test; /* monotonic, s */
     double preview_interval_sec;
     size_t series_count;
     struct {
         char name[32];
-        double next;  /* when the next value may be told */
-        bool is_held; /* the newest value has not been told: it is when the stage ends, so that */
-        long step;    /* a curve always has its last point */
+        double next;  /* when the next value may be sent */
+        bool is_held; /* the newest value was not sent: it is sent */
+        long step;    /* when the stage ends, so a curve has its last point */
         double value;
     } series[SERIES_MAX];
 };
 
-/* --- what the engine asks ------------------------------------------------------------------- */
+/* --- called by the engine -------------------------------------------------------------------- */
 
 static void signals_of_ours(sigset_t *set) {
     sigemptyset(set);
@@ -74,7 +74,7 @@ static void signals_of_ours(sigset_t *set) {
     sigaddset(set, SIGUSR1);
 }
 
-/* Whether nobody reads the pipe any more: the daemon has died without taking us with it. */
+/* Whether the pipe has no reader: the daemon has died without killing this process. */
 static bool hung_up(struct worker_run *run) {
     double now = clock_sec();
     if (run->progress->fd < 0 || now < run->next_hang_up_test)
@@ -111,7 +111,7 @@ static bool preview_due(void *user) {
     return run->preview_asked || clock_sec() >= run->next_preview;
 }
 
-/* --- what it tells --------------------------------------------------------------------------- */
+/* --- messages -------------------------------------------------------------------------------- */
 
 static void tell_held_metrics(struct worker_run *run) {
     for (size_t i = 0; i < run->series_count; i++) {
@@ -125,7 +125,7 @@ static void tell_stage(void *user, const char *stage) {
     struct worker_run *run = user;
     tell_held_metrics(run);
     progress_stage(run->progress, stage);
-    run->next_progress = 0.0; /* the stage's own time left, at once */
+    run->next_progress = 0.0; /* send the new stage's remaining time at once */
 }
 
 static void tell_progress(void *user, const char *stage, double done, double total, double eta_sec) {
@@ -189,8 +189,7 @@ static enum status save_checkpoint(void *user, long iteration, const struct stat
     return STATUS_OK;
 }
 
-/* A checkpoint that does not fit (what its format or the surface says) is as good as none: its work is lost, the job is
- * not. */
+/* A checkpoint with an unsuitable format or surface is ignored: its work is lost, the job is not. */
 static enum status load_checkpoint(void *user, struct state_array *array, size_t count, bool *found,
                                    struct error *err) {
     struct worker_run *run = user;
@@ -207,9 +206,9 @@ static enum status load_checkpoint(void *user, struct state_array *array, size_t
     return checkpoint_clear(run->checkpoint, err);
 }
 
-/* What the state depends on. Settings are what the user gave: defaults belong to the program.
- * How long the work goes on is not part of it (a job may be extended), nor how much an iteration
- * takes on (which is less after running out of memory). */
+/* Identifies what the state depends on. Uses the settings as given: defaults belong to the program's version.
+ * Excludes how long the work goes on (a job may be extended) and how much an iteration does (reduced after running
+ * out of memory). */
 static char *fingerprint_of(const struct order *order) {
     char hex[SHA256_HEX_SIZE];
     static const char *const apart[] = {"iterations",           "time_limit_sec", "refine_looks",
@@ -305,7 +304,7 @@ static enum status load_scene(struct worker_run *run, const struct settings *set
     enum status status = reading_parse(run->order->reading, &reading, err);
     if (status != STATUS_OK)
         return status;
-    if (strcmp(transforms, BUNDLE_TRANSFORMS) != 0) { /* this job's, in place of the scene's */
+    if (strcmp(transforms, BUNDLE_TRANSFORMS) != 0) { /* the job's own file, in place of the scene's */
         mem_free(reading.transforms);
         reading.transforms = mem_strdup(transforms);
     }
@@ -313,7 +312,7 @@ static enum status load_scene(struct worker_run *run, const struct settings *set
     tell_stage(run, "load");
     status = bundle_load(run->order->scene, &reading, &limits, pool, scene, problems, err);
     reading_release(&reading);
-    /* Only with another transforms file than the one that the scene's check has read. */
+    /* Only with another transforms file than the scene's check has read. */
     const cJSON *problem;
     cJSON_ArrayForEach(problem, problems) {
         char *text = json_text(problem);
@@ -374,7 +373,7 @@ static enum status reconstruct(struct worker_run *run, const struct settings *se
         return status;
     double now = clock_sec();
     run->next_checkpoint = now + run->order->checkpoint_interval_sec;
-    run->next_preview = now; /* the first one shows that something happens */
+    run->next_preview = now; /* an early preview shows that something happens */
     if (run->order->reduced[0])
         progress_log(run->progress, "warning", run->order->reduced);
     status = stop_requested(run) ? error_set(err, STATUS_CANCELLED, "stopped after stage load")

@@ -9,7 +9,7 @@
 
 static bool limit_memory(uint64_t bytes) {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-    (void)bytes; /* the sanitizers' shadow memory is larger than any limit */
+    (void)bytes; /* the sanitizers' shadow memory exceeds any limit */
     return false;
 #else
     struct rlimit limit = {.rlim_cur = bytes, .rlim_max = bytes};

@@ -21,11 +21,11 @@ struct sandbox_result {
     char text[256]; /* a sentence for the job's log */
 };
 
-/* For the calling thread and what it starts from now on: call it before the first thread. */
+/* Applies to the calling thread and what it starts later: call it before the first thread. */
 void sandbox_enter(const struct sandbox *sandbox, struct sandbox_result *result);
 
-/* After sandbox_enter with a connect_port: from now on the process has the connections that it has, and makes
- * no other. False where the system cannot. */
+/* After sandbox_enter with a connect_port: the process keeps its open connections and can make no others. False
+ * where the system cannot enforce that. */
 bool sandbox_keep_connection(void);
 
 #endif

@@ -1,4 +1,4 @@
-/* tasks.h -- the kinds of work that a worker can be told to do. */
+/* tasks.h -- the kinds of work that a worker does. */
 #ifndef UNBAKE_WORKER_TASKS_H
 #define UNBAKE_WORKER_TASKS_H
 
@@ -9,8 +9,8 @@
 /* Unpacks DIR/archive to DIR/files and reads all of it; reports every problem. */
 enum status task_check(const struct order *order, struct progress *progress, struct error *err);
 
-/* Reconstructs, from the newest checkpoint on; leaves the outputs in DIR/out. STATUS_CANCELLED
- * when asked to stop (a checkpoint was saved). */
+/* Reconstructs from the newest checkpoint on; leaves the outputs in DIR/out. STATUS_CANCELLED when asked to stop (a
+ * checkpoint was saved). */
 enum status task_reconstruct(const struct order *order, struct progress *progress, struct error *err);
 
 /* Calls a webhook; see deliver.h. */

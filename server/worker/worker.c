@@ -1,5 +1,5 @@
-/* worker.c -- the child's entry: read the order, take the folder, give up rights, work, say how
- * it ended; see worker.h. */
+/* worker.c -- the child's entry: reads the order, locks the folder, enters the sandbox, works, reports its end; see
+ * worker.h. */
 #include "server/worker/worker.h"
 
 #include <errno.h>
@@ -19,9 +19,9 @@
 #include "server/worker/sandbox.h"
 #include "server/worker/tasks.h"
 
-#define LOCK_TRIES 100 /* of 0.1 s: a worker that was just killed may still be dying */
+#define LOCK_TRIES 100 /* 0.1 s each: a killed worker may not have exited yet */
 
-/* The folder's lock is held until the process ends: its descriptor is never closed. */
+/* Locks the folder until the process ends: the descriptor is never closed. */
 static enum status take_folder(const char *dir, struct error *err) {
     int fd = open(dir, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     if (fd < 0)
@@ -45,7 +45,7 @@ static void confine(const struct order *order, struct progress *progress) {
     struct sandbox_result result;
     struct url url;
     struct sandbox sandbox = {.write_dir = order->dir, .read_dir = order->scene, .memory_bytes = order->memory_bytes};
-    if (strcmp(order->kind, "deliver") == 0) { /* one that is no URL is told when it is to be called */
+    if (strcmp(order->kind, "deliver") == 0) { /* a malformed URL is reported when it is called */
         sandbox.write_dir = NULL;
         if (url_parse(order->url, &url, NULL) == STATUS_OK)
             sandbox.connect_port = (uint16_t)strtoul(url.port, NULL, 10);
@@ -84,8 +84,7 @@ static int exit_status(enum status status) {
     }
 }
 
-/* A library that ends the process, as libarchive does, does so for want of memory: it is said as we say
- * it (mem.h). */
+/* A library that calls exit, as libarchive does, has run out of memory: exit as mem.h does. */
 static void on_exit_of_library(int status, void *is_over) {
     (void)status;
     if (!*(const bool *)is_over)

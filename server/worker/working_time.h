@@ -13,9 +13,9 @@ struct working_time {
     double wall_sec, thread_sec, process_sec; /* at the last call */
 };
 
-/* Begins now, with so many threads at work. */
+/* Starts the clock, for work on that many threads. */
 void working_time_init(struct working_time *w, int thread_count);
-/* Since then; to be called by the thread that called working_time_init. */
+/* Working time since then; call it on the thread that called working_time_init. */
 double working_time_sec(struct working_time *w);
 
 #endif
