@@ -83,7 +83,7 @@ void attempt_empty(struct attempt *a) {
     *a = (struct attempt){.worker = {.pid_fd = -1, .pipe_fd = -1}};
 }
 
-/* Whether the job was told to take a scene whose mesh and photographs do not fit. */
+/* Whether the job accepts a scene whose mesh and photographs do not fit. */
 static bool ignores_fit(const char *settings) {
     cJSON *given = cJSON_Parse(settings);
     const char *word = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(given, "fit"));
@@ -92,8 +92,8 @@ static bool ignores_fit(const char *settings) {
     return ignores;
 }
 
-/* A job whose scene was rejected, or does not fit, is started only so that it fails, as its user must be told. *row is
- * the caller's in any case. */
+/* A job whose scene was rejected, or does not fit, is started only to fail, so that its user is told. *row is the
+ * caller's in any case. */
 static enum status check_scene(struct store *store, const struct job *job, struct scene_row *row, struct error *err) {
     const char *scene_id = job->scene_id;
     enum status status = store_scene_get(store, scene_id, row, err);
@@ -214,7 +214,7 @@ enum status attempt_start_check(struct attempt *a, const struct scheduler_config
         status = file_make_dirs(a->dir, &why);
     }
     scene_row_release(&row);
-    housekeeping_drop_temporary(a->dir); /* the daemon may have been killed in the middle of an earlier check */
+    housekeeping_drop_temporary(a->dir); /* the daemon may have been killed during an earlier check */
     if (status == STATUS_OK)
         status = write_order(a->dir, order, &why);
     if (status == STATUS_OK)

@@ -27,7 +27,7 @@ struct attempt {
     int number;         /* fences what is written for the job */
     char scene_id[SCENE_ID_SIZE];
     char *reading;           /* with which a scene is checked, JSON; owned; NULL for a job */
-    uint64_t user_max_bytes; /* as scheduler_config has it, for the check of a scene */
+    uint64_t user_max_bytes; /* as in scheduler_config, for the check of a scene */
     char *dir;
     struct worker worker;
     int wait_status;                /* when ended */

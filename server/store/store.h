@@ -69,8 +69,8 @@ struct scene_row {
     int64_t disk_bytes; /* size of its folder; -1: unknown */
     int64_t created_ms; /* when `owner` uploaded it */
     char *problems;     /* JSON array text: [{"file","reason"}]; "[]" if none */
-    char *facts;        /* JSON object text: what the check found; "{}" before */
-    char *reading;      /* JSON object text: how it is to be read, as was given (common/reading.h) */
+    char *facts;        /* JSON object text: the result of the check; "{}" before */
+    char *reading;      /* JSON object text: how its files are read, as submitted (common/reading.h) */
     bool is_pinned;
     int64_t expires_ms; /* Unix time as of now, 0: never; see retention.h */
 };
@@ -82,14 +82,14 @@ void scene_row_release(struct scene_row *row);
  * checked again. */
 enum status store_scene_add(struct store *store, const char *id, const char *name, uint64_t bytes, int64_t owner_id,
                             bool *existed, struct error *err);
-/* The end of a check, which read the scene as `reading` says (NULL: as it is to be read now). Where it is to be read
- * otherwise by now, nothing is entered: it stays in `checking` and is checked again. What a ready one takes of the disk
- * was entered before; of a rejected one, `facts` may have warnings. */
+/* Ends a check that used `reading` (NULL: the current one). If the scene's reading has changed since, nothing is
+ * entered: the scene stays in `checking` and is checked again. The disk usage of a ready scene must have been entered;
+ * `facts` of a rejected one may hold warnings. */
 enum status store_scene_ready(struct store *store, const char *id, const char *reading, const char *facts,
                               struct error *err);
 enum status store_scene_reject(struct store *store, const char *id, const char *reading, const char *problems,
                                const char *facts, struct error *err);
-/* As who sees all and owns nothing. */
+/* As seen by a caller who may read everything and owns nothing. */
 enum status store_scene_get(struct store *store, const char *id, struct scene_row *row, struct error *err);
 /* Finds the scene whose id starts with `prefix` (4 to 64 hex digits) among those that `who` (NULL: all) may read;
  * STATUS_CONFLICT when there are several. */
@@ -100,22 +100,21 @@ enum status store_scene_find(struct store *store, const struct caller *who, cons
 enum status store_scene_list(struct store *store, const struct caller *who, const char *cursor, size_t limit,
                              struct scene_row *rows, size_t *count, char next_cursor[128], struct error *err);
 struct scene_patch {
-    const char *name; /* NULL leaves it; changed for the owner that `who` sees */
+    const char *name; /* of the owner that `who` sees; NULL: unchanged */
     struct retention retention;
-    const char *reading; /* JSON object text; NULL leaves it */
+    const char *reading; /* JSON object text; NULL: unchanged */
 };
-/* A new reading puts the scene back into `checking`, also where it is the same and the check has ended. STATUS_CONFLICT
- * when others own it, too, and could lose it by this, or have jobs on it that have not ended and would read it otherwise;
- * not for an admin. And for anybody while a job that has begun with it has not ended. */
+/* A reading, even an unchanged one after the check has ended, puts the scene back into `checking`. STATUS_CONFLICT when
+ * other owners could lose the scene by the change, or have unfinished jobs that would read it differently (not for an
+ * admin); and for everybody while a job that has started on it has not ended. */
 enum status store_scene_patch(struct store *store, const struct caller *who, const char *id,
                               const struct scene_patch *patch, struct error *err);
-/* The same for a reading that comes with an upload: one that the scene has already changes nothing. */
+/* The same for a reading that comes with an upload; an unchanged one has no effect. */
 enum status store_scene_give_reading(struct store *store, const struct caller *who, const char *id, const char *reading,
                                      struct error *err);
-/* Ends the ownership of user owner_id (-1: everybody's); where nobody owns it any more, the scene
- * goes: *is_gone, and the caller removes the files. STATUS_CONFLICT while it is being checked or a
- * job that is not terminal (of that owner, where others stay) uses it. Terminal jobs keep its id. A
- * dry run changes nothing. */
+/* Ends the ownership of user owner_id (-1: of all). Without owners the scene is deleted: *is_gone is set, and the
+ * caller removes the files. STATUS_CONFLICT while it is being checked or a job that has not ended (of that owner,
+ * where others stay) uses it. Ended jobs keep its id. A dry run changes nothing. */
 enum status store_scene_delete(struct store *store, const char *id, int64_t owner_id, bool dry_run, bool *is_gone,
                                struct error *err);
 /* Scenes in `checking` that are not waiting for disk space: the oldest of each user, except skip[skip_count]. Fills
@@ -126,8 +125,8 @@ struct unchecked {
 };
 enum status store_scene_unchecked(struct store *store, const struct unchecked *skip, size_t skip_count, size_t limit,
                                   struct unchecked *list, size_t *count, struct error *err);
-/* A check that found too little room, as `problems` says: the scene stays in `checking`, can be removed
- * while it waits, and is no next one before store_scene_check_again, which makes all of them so. */
+/* The check found too little disk space, as `problems` says. The scene stays in `checking` and can be deleted; it is
+ * not checked again until store_scene_check_again, which applies to all such scenes. */
 enum status store_scene_postpone(struct store *store, const char *id, const char *reading, const char *problems,
                                  struct error *err);
 enum status store_scene_check_again(struct store *store, struct error *err);
@@ -194,8 +193,9 @@ enum status store_job_retry(struct store *store, int64_t id, int max_attempts, c
 enum status store_job_extend(struct store *store, int64_t id, int max_attempts, const char *settings,
                              const struct count_limits *limits, struct error *err);
 
-/* What the scheduler does. A job whose scene is being checked does not start; `attempt` fences: STATUS_CONFLICT when another one is present. A request
- * to cancel, recorded before, wins over every end; one to pause over going back to the queue. */
+/* The scheduler's transitions, fenced by `attempt`: STATUS_CONFLICT when another attempt is current. A job whose scene
+ * is being checked does not start. A recorded request to cancel overrides every end; one to pause overrides a return to
+ * the queue. */
 enum status store_job_start(struct store *store, int64_t id, int *attempt, struct error *err);
 enum status store_job_succeed(struct store *store, int64_t id, int attempt, struct error *err);
 /* The same, with a remark for the user: what a time limit left out. */
@@ -375,9 +375,9 @@ struct upload_row {
     int64_t owner_id;
     char *owner;                  /* a user's name; "" for nobody */
     char *name;                   /* for the scene */
-    char *metadata;               /* as the client gave it: Upload-Metadata */
-    char *reading;                /* for the scene, as scene_row has it; "" or NULL: not said */
-    char sha256[SCENE_ID_SIZE];   /* what the client says the whole will have; "" if it does not */
+    char *metadata;               /* Upload-Metadata as sent by the client */
+    char *reading;                /* for the scene, as in scene_row; "" or NULL: none */
+    char sha256[SCENE_ID_SIZE];   /* of the whole, as announced by the client; "" if it was not */
     uint64_t length, received;    /* bytes; `received` are on disk */
     char boot[UPLOAD_BOOT_SIZE];  /* see store_upload_begin */
     char scene_id[SCENE_ID_SIZE]; /* the scene that it became; "" before */
@@ -386,8 +386,8 @@ struct upload_row {
 };
 void upload_row_release(struct upload_row *row);
 
-/* A new row with nothing received; id, owner_id, name, metadata, reading, sha256, length and boot are taken from *row.
- * `hash`: the state of an empty hash. The limits are those of unfinished ones. */
+/* Adds an upload with nothing received. Uses id, owner_id, name, metadata, reading, sha256, length and boot of *row.
+ * `hash`: the state of an empty hash. The limits count unfinished uploads. */
 enum status store_upload_add(struct store *store, const struct upload_row *row, const void *hash, size_t hash_size,
                              const struct count_limits *limits, struct error *err);
 /* *hash (may be NULL) becomes the stored state; STATUS_CORRUPT when its size differs. */
