@@ -9,6 +9,7 @@
 #include "common/image.h"
 #include "common/mem.h"
 #include "server/http/listener.h"
+#include "server/ingest/gltf_meshopt.h"
 #include "server/render/accel.h"
 #include "server/store/store.h"
 
@@ -25,6 +26,7 @@ void libraries_list(struct library list[LIBRARY_COUNT]) {
     list[3] = named("libarchive", "libarchive ", archive_version_string());
     list[4] = named("cjson", "", cJSON_Version());
     list[5] = named("libheif", "", image_heif_version());
+    list[6] = named("meshoptimizer", "", gltf_meshopt_version());
 }
 
 char *libraries_text(void) {

@@ -2,9 +2,20 @@
 #include "server/ingest/faces.h"
 
 #include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
 
 #include "common/mem.h"
 #include "server/ingest/positions.h"
+
+void faces_note(struct faces_report *report, const char *format, ...) {
+    if (report->note_count == FACES_MAX_NOTES)
+        return;
+    va_list args;
+    va_start(args, format);
+    vsnprintf(report->note[report->note_count++], FACES_NOTE_BYTES, format, args);
+    va_end(args);
+}
 
 struct faces *faces_new(struct mesh *mesh, const char *name, size_t triangle_limit, bool has_object_id) {
     struct faces *f = mem_calloc(1, sizeof *f);

@@ -10,10 +10,15 @@
 #include "server/ingest/polygon.h"
 #include "server/scene/mesh.h"
 
+#define FACES_MAX_NOTES 6
+#define FACES_NOTE_BYTES 200
+
 struct faces_report {
     size_t polygon_count; /* faces with more than four corners, cut into triangles */
     size_t small_count;   /* faces with fewer than three corners, left out */
-    double step_m;        /* of the file's own precision at its farthest coordinate, where that is single; 0: finer */
+    size_t note_count;
+    char note[FACES_MAX_NOTES][FACES_NOTE_BYTES]; /* [note_count] what else was left out or changed, for warnings */
+    double step_m; /* of the file's own precision at its farthest coordinate, where that is single; 0: finer */
 };
 
 struct faces {
@@ -28,6 +33,9 @@ struct faces {
     vec3 single[POLYGON_MAX_CORNERS];        /* work space of faces_add, with triangle */
     uint32_t triangle[POLYGON_MAX_CORNERS][3];
 };
+
+/* Adds a sentence, which the file's name goes before; more than FACES_MAX_NOTES are dropped. */
+void faces_note(struct faces_report *report, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
 /* Appends to *mesh, which is empty, at most triangle_limit triangles. The caller's (mem_free). */
 struct faces *faces_new(struct mesh *mesh, const char *name, size_t triangle_limit, bool has_object_id);

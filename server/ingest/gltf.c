@@ -8,6 +8,8 @@
 
 #include "common/mem.h"
 #include "common/rng.h"
+#include "server/ingest/gltf_accessor.h"
+#include "server/ingest/gltf_extensions.h"
 #include "server/ingest/gltf_file.h"
 #include "server/ingest/gltf_node.h"
 #include "server/ingest/positions.h"
@@ -27,6 +29,7 @@ struct gltf_reader {
     bool lacks_normals; /* a primitive without normals */
     bool *visited;      /* [nodes.count]; owned */
     int64_t object_count;
+    size_t skinned_count, morphed_count, hidden_count; /* nodes, primitives, nodes */
     struct error *err;
 };
 
@@ -39,9 +42,9 @@ static enum status open_attribute(struct gltf_reader *r, const cJSON *primitive,
     enum status status = gltf_index(&r->file, attributes, key, where, &r->file.accessors, found, &accessor, r->err);
     if (status == STATUS_OK && *found)
         status = gltf_span(&r->file, accessor, "VEC3", span, r->err);
-    if (status == STATUS_OK && *found && span->component != GLTF_FLOAT)
-        status = error_set(r->err, STATUS_INPUT, "%s: accessors[%zu] of %s.%s does not hold floats", r->file.name,
-                           accessor, where, key);
+    if (status == STATUS_OK && *found && span->component == GLTF_UINT) /* KHR_mesh_quantization: up to 16 bits */
+        status = error_set(r->err, STATUS_INPUT, "%s: accessors[%zu] of %s.%s holds neither floats nor short integers",
+                           r->file.name, accessor, where, key);
     return status;
 }
 
@@ -58,8 +61,8 @@ struct primitive {
     uint32_t (*table)[2]; /* [table_size] index in the file, and in the mesh or NONE; owned */
 };
 
-static vec3 apply(const double m[3], const double m1[3], const double m2[3], const float v[3]) {
-    double x = (double)v[0], y = (double)v[1], z = (double)v[2];
+static vec3 apply(const double m[3], const double m1[3], const double m2[3], const double v[3]) {
+    double x = v[0], y = v[1], z = v[2];
     return (vec3){(float)(m[0] * x + m[1] * y + m[2] * z), (float)(m1[0] * x + m1[1] * y + m1[2] * z),
                   (float)(m2[0] * x + m2[1] * y + m2[2] * z)};
 }
@@ -67,22 +70,23 @@ static vec3 apply(const double m[3], const double m1[3], const double m2[3], con
 static uint32_t append_vertex(struct gltf_reader *r, const struct primitive *p, size_t number) {
     struct mesh *mesh = r->mesh;
     const struct affine *t = p->t;
-    float value[3];
+    double value[3];
     if (mesh->vertex_count == r->normal_capacity) {
         r->normal_capacity = r->normal_capacity ? r->normal_capacity + r->normal_capacity / 2 : 1024;
         mesh->normal = mem_realloc_array(mesh->normal, r->normal_capacity, sizeof *mesh->normal);
     }
-    gltf_read_vec3(&p->position, number, value);
+    gltf_read_vector(&p->position, number, 3, value);
     double at[3];
     for (int i = 0; i < 3; i++) {
-        double turned = t->m[i][0] * (double)value[0] + t->m[i][1] * (double)value[1] + t->m[i][2] * (double)value[2];
-        r->position.single = fmax(r->position.single, fabs(turned));
+        double turned = t->m[i][0] * value[0] + t->m[i][1] * value[1] + t->m[i][2] * value[2];
+        if (p->position.component == GLTF_FLOAT)
+            r->position.single = fmax(r->position.single, fabs(turned));
         at[i] = turned + t->m[i][3];
     }
     positions_append(&r->position, at);
     vec3 normal = {0.0f, 0.0f, 0.0f};
     if (p->has_normal) {
-        gltf_read_vec3(&p->normal, number, value);
+        gltf_read_vector(&p->normal, number, 3, value);
         normal = apply(p->normal_matrix[0], p->normal_matrix[1], p->normal_matrix[2], value);
     }
     mesh->normal[mesh->vertex_count] = p->mirrored ? vec3_neg(normal) : normal;
@@ -137,6 +141,7 @@ static enum status open_primitive(struct gltf_reader *r, const cJSON *object, st
         error_set(r->err, STATUS_INPUT, "%s: %s is compressed by Draco, which is not read", r->file.name, p->where);
         return error_hint(r->err, "export it without compression");
     }
+    r->morphed_count += cJSON_GetArraySize(cJSON_GetObjectItemCaseSensitive(object, "targets")) > 0;
     enum status status =
         gltf_index(&r->file, object, "indices", p->where, &r->file.accessors, &p->is_indexed, &accessor, r->err);
     if (status == STATUS_OK && p->is_indexed)
@@ -157,12 +162,20 @@ static enum status open_primitive(struct gltf_reader *r, const cJSON *object, st
     return status;
 }
 
+static void release_primitive(struct primitive *p) {
+    gltf_span_release(&p->position);
+    gltf_span_release(&p->normal);
+    gltf_span_release(&p->indices);
+}
+
 static enum status add_primitive(struct gltf_reader *r, const cJSON *object, const char *where, int mode,
                                  const struct affine *t) {
     struct primitive p = {.where = where, .mode = mode, .t = t};
     enum status status = open_primitive(r, object, &p);
-    if (status != STATUS_OK)
+    if (status != STATUS_OK) {
+        release_primitive(&p);
         return status;
+    }
     size_t count = p.is_indexed ? p.indices.count : p.position.count;
     size_t triangles = mode == TRIANGLES ? count / 3 : count < 3 ? 0 : count - 2;
     affine_cofactors(t, p.normal_matrix);
@@ -176,6 +189,7 @@ static enum status add_primitive(struct gltf_reader *r, const cJSON *object, con
     r->lacks_normals = r->lacks_normals || !p.has_normal;
     status = add_triangles(r, &p, triangles);
     mem_free(p.table);
+    release_primitive(&p);
     return status;
 }
 
@@ -206,6 +220,29 @@ static enum status add_mesh(struct gltf_reader *r, size_t mesh, const struct aff
 
 /* --- nodes ---------------------------------------------------------------------------------- */
 
+/* The mesh of a node, once or as often as the node says. */
+static enum status add_instances(struct gltf_reader *r, size_t node, size_t mesh, const struct affine *t) {
+    const cJSON *object = r->file.nodes.item[node];
+    const cJSON *instancing = gltf_extension(object, "EXT_mesh_gpu_instancing");
+    struct affine *instance;
+    size_t count;
+    r->skinned_count += cJSON_GetObjectItemCaseSensitive(object, "skin") != NULL;
+    if (!instancing)
+        return add_mesh(r, mesh, t);
+    enum status status = gltf_node_instances(&r->file, node, instancing, &instance, &count, r->err);
+    for (size_t i = 0; i < count && status == STATUS_OK; i++) {
+        struct affine own = affine_multiply(t, &instance[i]);
+        status = add_mesh(r, mesh, &own);
+    }
+    mem_free(instance);
+    return status;
+}
+
+/* KHR_node_visibility: neither it nor its children are seen. */
+static bool is_hidden(const cJSON *node) {
+    return cJSON_IsFalse(cJSON_GetObjectItemCaseSensitive(gltf_extension(node, "KHR_node_visibility"), "visible"));
+}
+
 static enum status visit(struct gltf_reader *r, size_t node, const struct affine *parent, int depth) {
     const cJSON *object = r->file.nodes.item[node], *item;
     struct affine own, t;
@@ -223,9 +260,13 @@ static enum status visit(struct gltf_reader *r, size_t node, const struct affine
         status = gltf_index(&r->file, object, "mesh", where, &r->file.meshes, &found, &mesh, r->err);
     if (status != STATUS_OK)
         return status;
+    if (is_hidden(object)) {
+        r->hidden_count++;
+        return STATUS_OK;
+    }
     t = affine_multiply(parent, &own);
     if (found)
-        status = add_mesh(r, mesh, &t);
+        status = add_instances(r, node, mesh, &t);
     cJSON_ArrayForEach(item, cJSON_GetObjectItemCaseSensitive(object, "children")) {
         double child = cJSON_GetNumberValue(item);
         if (status != STATUS_OK)
@@ -287,6 +328,21 @@ static enum status read_scene(struct gltf_reader *r) {
     return visit_list(r, cJSON_GetObjectItemCaseSensitive(r->file.scenes.item[scene], "nodes"), "the scene");
 }
 
+static void take_notes(struct gltf_reader *r) {
+    struct faces_report *report = &r->faces->report;
+    const char *unknown = gltf_extensions_unknown(&r->file);
+    if (unknown)
+        faces_note(report, "it uses the extension %.64s, which was not read", unknown);
+    if (r->skinned_count > 0)
+        faces_note(report,
+                   "%zu nodes are skinned: their meshes were read as stored, in the pose that they were bound in",
+                   r->skinned_count);
+    if (r->morphed_count > 0)
+        faces_note(report, "%zu primitives have morph targets, which were left out", r->morphed_count);
+    if (r->hidden_count > 0)
+        faces_note(report, "%zu nodes are hidden and were left out", r->hidden_count);
+}
+
 static void finish(struct gltf_reader *r) {
     struct mesh *mesh = r->mesh;
     r->faces->report.step_m = positions_step(r->position.single);
@@ -308,9 +364,13 @@ enum status gltf_parse(const void *data, size_t size, const char *name, const ch
     r.faces = faces_new(mesh, name, triangle_limit, true);
     enum status status = gltf_file_open(&r.file, data, size, name, folder, err);
     if (status == STATUS_OK)
+        status = gltf_extensions_check(&r.file, err);
+    if (status == STATUS_OK)
         status = read_scene(&r);
     if (status == STATUS_OK && mesh->triangle_count == 0)
         status = error_set(err, STATUS_INPUT, "%s has no triangles in its scene", name);
+    if (status == STATUS_OK)
+        take_notes(&r);
     if (status == STATUS_OK)
         finish(&r);
     else

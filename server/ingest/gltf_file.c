@@ -11,7 +11,6 @@
 #include "server/ingest/path.h"
 
 #define MAX_JSON_BYTES ((size_t)64 << 20) /* the parsed tree takes about ten times as much */
-#define MAX_BYTES ((double)((uint64_t)1 << 40))
 #define MAGIC 0x46546c67
 #define CHUNK_JSON 0x4e4f534a
 #define CHUNK_BIN 0x004e4942
@@ -127,28 +126,6 @@ static enum status make_list(const struct gltf_file *g, struct gltf_list *list, 
     return STATUS_OK;
 }
 
-/* Extensions that do not affect geometry. */
-static bool is_harmless(const char *extension) {
-    static const char *const start[] = {"KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_",
-                                        "KHR_animation_", "KHR_xmp",      "EXT_lights_"};
-    for (size_t i = 0; i < sizeof start / sizeof *start; i++)
-        if (strncmp(extension, start[i], strlen(start[i])) == 0)
-            return true;
-    return false;
-}
-
-static enum status check_extensions(const struct gltf_file *g, struct error *err) {
-    const cJSON *item;
-    cJSON_ArrayForEach(item, cJSON_GetObjectItemCaseSensitive(g->json, "extensionsRequired")) {
-        if (cJSON_IsString(item) && is_harmless(item->valuestring))
-            continue;
-        error_set(err, STATUS_INPUT, "%s requires the extension %.64s, which is not read", g->name,
-                  cJSON_IsString(item) ? item->valuestring : "(not a name)");
-        return error_hint(err, "export it without compression");
-    }
-    return STATUS_OK;
-}
-
 static enum status read_json(struct gltf_file *g, const struct chunks *c, struct error *err) {
     struct {
         struct gltf_list *list;
@@ -167,7 +144,7 @@ static enum status read_json(struct gltf_file *g, const struct chunks *c, struct
                          version ? version : "");
     for (size_t i = 0; i < sizeof table / sizeof *table && status == STATUS_OK; i++)
         status = make_list(g, table[i].list, table[i].key, err);
-    return status == STATUS_OK ? check_extensions(g, err) : status;
+    return status;
 }
 
 enum status gltf_file_open(struct gltf_file *g, const void *data, size_t size, const char *name, const char *folder,
@@ -184,6 +161,7 @@ enum status gltf_file_open(struct gltf_file *g, const void *data, size_t size, c
     if (status != STATUS_OK)
         return status;
     g->buffer = mem_calloc(g->buffers.count + 1, sizeof *g->buffer);
+    g->unpacked = mem_calloc(g->views.count + 1, sizeof *g->unpacked);
     for (size_t i = 0; i < g->buffers.count && status == STATUS_OK; i++)
         status = open_buffer(g, i, &c, err);
     return status;
@@ -196,6 +174,9 @@ void gltf_file_release(struct gltf_file *g) {
         mem_free(g->buffer[i].decoded);
     }
     mem_free(g->buffer);
+    for (size_t i = 0; g->unpacked && i < g->views.count; i++)
+        mem_free(g->unpacked[i]);
+    mem_free(g->unpacked);
     for (size_t i = 0; i < sizeof lists / sizeof *lists; i++)
         mem_free(lists[i]->item);
     cJSON_Delete(g->json);
@@ -204,9 +185,8 @@ void gltf_file_release(struct gltf_file *g) {
 
 /* --- numbers -------------------------------------------------------------------------------- */
 
-/* An integer from `least` to `most`; `fallback` when it is absent. */
-static enum status whole(const struct gltf_file *g, const cJSON *object, const char *key, const char *where,
-                         size_t index, double fallback, double least, double most, uint64_t *value, struct error *err) {
+enum status gltf_whole(const struct gltf_file *g, const cJSON *object, const char *key, const char *where, size_t index,
+                       double fallback, double least, double most, uint64_t *value, struct error *err) {
     const cJSON *member = cJSON_GetObjectItemCaseSensitive(object, key);
     double number = member ? cJSON_GetNumberValue(member) : fallback;
     if (!(number >= least && number <= most) || number != floor(number))
@@ -231,103 +211,7 @@ enum status gltf_index(const struct gltf_file *g, const cJSON *object, const cha
     return STATUS_OK;
 }
 
-static size_t component_bytes(uint64_t component) {
-    switch (component) {
-    case GLTF_BYTE:
-    case GLTF_UBYTE: return 1;
-    case GLTF_SHORT:
-    case GLTF_USHORT: return 2;
-    case GLTF_UINT:
-    case GLTF_FLOAT: return 4;
-    default: return 0;
-    }
-}
-
-/* The bytes of the accessor's buffer view from its byteOffset on (3.6.2.4). */
-static enum status view_of(const struct gltf_file *g, size_t index, size_t element, struct gltf_span *span,
-                           size_t *size, struct error *err) {
-    const cJSON *accessor = g->accessors.item[index];
-    char where[48];
-    bool found;
-    size_t v, b;
-    uint64_t view_offset, view_size, stride, offset;
-    snprintf(where, sizeof where, "accessors[%zu]", index);
-    if (cJSON_GetObjectItemCaseSensitive(accessor, "sparse"))
-        return error_set(err, STATUS_INPUT, "%s: %s is sparse, which is not read", g->name, where);
-    enum status status = gltf_index(g, accessor, "bufferView", where, &g->views, &found, &v, err);
-    if (status == STATUS_OK && !found)
-        status = error_set(err, STATUS_INPUT, "%s: %s has no bufferView", g->name, where);
-    if (status != STATUS_OK)
-        return status;
-    const cJSON *view = g->views.item[v];
-    snprintf(where, sizeof where, "bufferViews[%zu]", v);
-    status = gltf_index(g, view, "buffer", where, &g->buffers, &found, &b, err);
-    if (status == STATUS_OK && !found)
-        status = error_set(err, STATUS_INPUT, "%s: %s has no buffer", g->name, where);
-    if (status == STATUS_OK)
-        status = whole(g, view, "byteOffset", "bufferViews", v, 0.0, 0.0, MAX_BYTES, &view_offset, err);
-    if (status == STATUS_OK)
-        status = whole(g, view, "byteLength", "bufferViews", v, -1.0, 0.0, MAX_BYTES, &view_size, err);
-    if (status == STATUS_OK)
-        status = whole(g, view, "byteStride", "bufferViews", v, (double)element, (double)element, 252.0, &stride, err);
-    if (status == STATUS_OK)
-        status = whole(g, accessor, "byteOffset", "accessors", index, 0.0, 0.0, MAX_BYTES, &offset, err);
-    if (status != STATUS_OK)
-        return status;
-    if (view_offset + view_size > g->buffer[b].size || offset > view_size)
-        return error_set(err, STATUS_INPUT,
-                         "%s: bufferViews[%zu] with accessors[%zu] does not lie within the "
-                         "%zu bytes of buffers[%zu]",
-                         g->name, v, index, g->buffer[b].size, b);
-    span->data = g->buffer[b].data + view_offset + offset;
-    span->stride = (size_t)stride;
-    *size = (size_t)(view_size - offset);
-    return STATUS_OK;
-}
-
-enum status gltf_span(const struct gltf_file *g, size_t index, const char *type, struct gltf_span *span,
-                      struct error *err) {
-    const cJSON *accessor = g->accessors.item[index];
-    const char *own = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(accessor, "type"));
-    uint64_t component = 0, count = 0;
-    size_t size = 0;
-    if (!own || strcmp(own, type) != 0)
-        return error_set(err, STATUS_INPUT, "%s: accessors[%zu] is of type %.16s, wanted is %s", g->name, index,
-                         own ? own : "none", type);
-    enum status status =
-        whole(g, accessor, "componentType", "accessors", index, 0.0, GLTF_BYTE, GLTF_FLOAT, &component, err);
-    if (status == STATUS_OK)
-        status = whole(g, accessor, "count", "accessors", index, -1.0, 1.0, UINT32_MAX - 1.0, &count, err);
-    size_t element = component_bytes(component) * (strcmp(type, "VEC3") == 0 ? 3 : 1);
-    if (status == STATUS_OK && element == 0)
-        status = error_set(err, STATUS_INPUT, "%s: accessors[%zu].componentType is none", g->name, index);
-    if (status == STATUS_OK)
-        status = view_of(g, index, element, span, &size, err);
-    if (status != STATUS_OK)
-        return status;
-    if (size < element || count - 1 > (size - element) / span->stride)
-        return error_set(err, STATUS_INPUT,
-                         "%s: accessors[%zu] promises %llu elements, but its bufferView "
-                         "holds %zu",
-                         g->name, index, (unsigned long long)count,
-                         size < element ? 0 : (size - element) / span->stride + 1);
-    span->count = (size_t)count;
-    span->component = (enum gltf_component)component;
-    return STATUS_OK;
-}
-
-void gltf_read_vec3(const struct gltf_span *span, size_t at, float value[3]) {
-    for (size_t i = 0; i < 3; i++) {
-        uint32_t bits = word_at(span->data + at * span->stride + 4 * i);
-        memcpy(&value[i], &bits, sizeof bits);
-    }
-}
-
-uint32_t gltf_read_index(const struct gltf_span *span, size_t at) {
-    const uint8_t *data = span->data + at * span->stride;
-    switch (component_bytes(span->component)) {
-    case 1: return data[0];
-    case 2: return (uint32_t)data[0] | (uint32_t)data[1] << 8;
-    default: return word_at(data);
-    }
+const cJSON *gltf_extension(const cJSON *object, const char *extension) {
+    const cJSON *extensions = cJSON_GetObjectItemCaseSensitive(object, "extensions");
+    return cJSON_GetObjectItemCaseSensitive(extensions, extension);
 }

@@ -1,8 +1,5 @@
-/* gltf_file.h -- a glTF 2.0 file (.glb or .gltf): its JSON, buffers and accessors. Accessors are checked to lie
- * within their buffers before they are read.
- *
- * Buffers are the GLB's own, files below the .gltf's folder, or base64 data: URIs. Sparse and compressed accessors
- * are refused. */
+/* gltf_file.h -- a glTF 2.0 file (.glb or .gltf): its JSON and its buffers, which are the GLB's own, files below the
+ * .gltf's folder, or base64 data: URIs. gltf_accessor.h reads numbers from them. */
 #ifndef UNBAKE_INGEST_GLTF_FILE_H
 #define UNBAKE_INGEST_GLTF_FILE_H
 
@@ -27,11 +24,19 @@ struct gltf_buffer {
     uint8_t *decoded; /* owned */
 };
 
+/* Bytes of a buffer view, or the rest of it. */
+struct gltf_bytes {
+    const uint8_t *data; /* NULL: there is no view */
+    size_t size;
+    uint64_t stride; /* of its elements, bytes */
+};
+
 struct gltf_file {
     const char *name, *folder; /* file name for messages; folder of external buffers, NULL: none */
     cJSON *json;
     struct gltf_list buffers, views, accessors, meshes, nodes, scenes;
     struct gltf_buffer *buffer; /* [buffers.count] */
+    uint8_t **unpacked;         /* [views.count] contents of compressed views, NULL before they are used; owned */
 };
 
 /* `data` must stay until gltf_file_release, which must also be called after a failure. */
@@ -44,20 +49,12 @@ void gltf_file_release(struct gltf_file *g);
 enum status gltf_index(const struct gltf_file *g, const cJSON *object, const char *key, const char *where,
                        const struct gltf_list *list, bool *found, size_t *index, struct error *err);
 
-enum gltf_component { GLTF_BYTE = 5120, GLTF_UBYTE, GLTF_SHORT, GLTF_USHORT, GLTF_UINT = 5125, GLTF_FLOAT };
+/* The member as a whole number from `least` to `most`; `fallback` when it is absent. The message calls it
+ * "WHERE[INDEX].KEY". */
+enum status gltf_whole(const struct gltf_file *g, const cJSON *object, const char *key, const char *where, size_t index,
+                       double fallback, double least, double most, uint64_t *value, struct error *err);
 
-struct gltf_span {
-    const uint8_t *data;
-    size_t count, stride; /* stride in bytes */
-    enum gltf_component component;
-};
-
-/* The elements of accessor `index`, which must be of `type` ("VEC3", "SCALAR"). */
-enum status gltf_span(const struct gltf_file *g, size_t index, const char *type, struct gltf_span *span,
-                      struct error *err);
-
-/* Read three floats; read an unsigned integer of any width. */
-void gltf_read_vec3(const struct gltf_span *span, size_t at, float value[3]);
-uint32_t gltf_read_index(const struct gltf_span *span, size_t at);
+/* The extension's object of a JSON object; NULL when there is none. */
+const cJSON *gltf_extension(const cJSON *object, const char *extension);
 
 #endif

@@ -57,6 +57,8 @@ static void warn_of_place(const char *name, const struct mesh *mesh, const struc
 void mesh_file_warn(const char *name, const struct mesh *mesh, const struct faces_report *report,
                     const struct mesh_report *check, struct findings *f) {
     warn_of_place(name, mesh, report, f);
+    for (size_t i = 0; i < report->note_count; i++)
+        findings_warning(f, "%s: %s", name, report->note[i]);
     if (report->small_count > 0)
         findings_warning(f, "%s: %zu faces have fewer than three corners and were left out", name, report->small_count);
     if (check->unused_count > 0)

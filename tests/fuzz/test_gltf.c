@@ -41,9 +41,25 @@ static void add_glb(struct seeds *s) {
     mem_free(file);
 }
 
+/* A sparse accessor of shorts, instances, and a view that meshopt has packed: 16 times the same 4 bytes, 3 indices. */
+#define EXTENSIONS                                                                                                         \
+    "\"asset\":{\"version\":\"2.0\"},\"extensionsUsed\":[\"EXT_mesh_gpu_instancing\",\"A\"],\"bufferViews\":[{\"buffer\":" \
+    "0,\"byteLength\":36},{\"buffer\":0,\"byteOffset\":36,\"byteLength\":6},{\"buffer\":0,\"byteLength\":64,"              \
+    "\"byteStride\":4,\"extensions\":{\"EXT_meshopt_compression\":{\"buffer\":0,\"byteOffset\":42,\"byteLength\":41,"      \
+    "\"byteStride\":4,\"count\":16,\"mode\":\"ATTRIBUTES\",\"filter\":\"OCTAHEDRAL\"}}}],\"accessors\":[{"                 \
+    "\"bufferView\":0,\"componentType\":5122,\"normalized\":true,\"count\":3,\"type\":\"VEC3\",\"sparse\":{"               \
+    "\"count\":1,\"indices\":{\"bufferView\":1,\"componentType\":5123},\"values\":{\"bufferView\":0}}},{"                  \
+    "\"bufferView\":2,\"componentType\":5120,\"normalized\":true,\"count\":3,\"type\":\"VEC3\"},{\"bufferView\":0,"        \
+    "\"componentType\":5126,\"count\":2,\"type\":\"VEC3\"}],\"meshes\":[{\"primitives\":[{\"attributes\":{"                \
+    "\"POSITION\":0,\"NORMAL\":1}}]}],\"nodes\":[{\"mesh\":0,\"extensions\":{\"EXT_mesh_gpu_instancing\":{"                \
+    "\"attributes\":{\"TRANSLATION\":2,\"SCALE\":2}}}}]"
+
 void fuzz_seeds(struct seeds *s) {
     s->mutants = 10000;
     add_glb(s);
+    seeds_text(s, "{" EXTENSIONS ",\"buffers\":[{\"byteLength\":83,\"uri\":\"data:x;base64,"
+                  "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAABAAIAoAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA"
+                  "AAAAAAAA\"}]}");
     seeds_text(s, "{" TABLES ",\"buffers\":[{\"byteLength\":44,\"uri\":\"data:application/octet-stream;base64,"
                   "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAABAAIAAAA=\"}]}");
 }

@@ -190,7 +190,7 @@ static const struct {
     {"{" ASSET "}", "no triangles"},
     {"{" ASSET ",\"nodes\":{}}", "\"nodes\" must be an array"},
     {"{" ASSET ",\"nodes\":[3]}", "nodes[0] must be an object"},
-    {"{" ASSET ",\"extensionsRequired\":[\"KHR_materials_unlit\",\"EXT_meshopt_compression\"]}", "EXT_meshopt"},
+    {"{" ASSET ",\"extensionsRequired\":[\"KHR_materials_unlit\",\"KHR_meshopt_compression\"]}", "KHR_meshopt"},
     {"{" ASSET ",\"nodes\":[{\"children\":[0]}]}", "no triangles"}, /* no root */
     {"{" ASSET ",\"nodes\":[{\"children\":[0]}],\"scenes\":[{\"nodes\":[0]}]}", "more than one parent"},
     {"{" ASSET ",\"nodes\":[{\"children\":[1]},{}],\"scenes\":[{\"nodes\":[0,1]}]}", "nodes[1] has more than one"},
@@ -207,9 +207,9 @@ static const struct {
     {WHOLE(MESH("{\"attributes\":{\"POSITION\":0},\"indices\":4}"), NODE), "indices is none of the 4 accessors"},
     {WHOLE(MESH("{\"attributes\":{\"POSITION\":0},\"extensions\":{\"KHR_draco_mesh_compression\":{}}}"), NODE),
      "Draco"},
-    {"{" ASSET "," BUFFER "," VIEWS ",\"accessors\":[{\"bufferView\":0,\"componentType\":5123,\"count\":6,\"type\":"
+    {"{" ASSET "," BUFFER "," VIEWS ",\"accessors\":[{\"bufferView\":0,\"componentType\":5125,\"count\":6,\"type\":"
      "\"VEC3\"}]," MESH(BARE) "," NODE "}",
-     "does not hold floats"},
+     "holds neither floats nor short integers"},
     {"{" ASSET "," BUFFER "," VIEWS ",\"accessors\":[{\"bufferView\":0,\"componentType\":5124,\"count\":6,\"type\":"
      "\"VEC3\"}]," MESH(BARE) "," NODE "}",
      "componentType is none"},
