@@ -5,6 +5,7 @@
 
 #include "common/mem.h"
 #include "server/admin/commands.h"
+#include "server/check/check_command.h"
 #include "server/demo/demo_command.h"
 #include "server/evaluate/evaluate_command.h"
 #include "server/evaluate/relight_command.h"
@@ -41,6 +42,11 @@ static const struct server_command table[] = {
      "DIR is made, or must be empty. Every file is held against its digest in the backup; where one is\n"
      "damaged, nothing is restored, or with --skip-damaged all others. Root gives the files to DIR's owner.\n",
      "  unbaked restore /backup/2026-01-31 /var/lib/unbaked\n", restore_flags, restore_command},
+    {"check", "ROOM", "say what a folder holds, and whether its mesh and photographs belong together",
+     "Reads the folder ROOM as the daemon reads an upload, with no daemon: cameras, mesh, photographs, every\n"
+     "problem. Then compares the photographs on the mesh, with their poses as they are given and with others:\n"
+     "turned axes, other scales, frames out of step. Ends with 1 when the room would be rejected or does not fit.\n",
+     "  unbaked check ~/scan --scene-set scale=0.001\n", check_flags, check_command},
     {"demo-room", "DIR", "make a room whose materials and lights are known",
      "Photographs a furnished room and writes a bundle to DIR that `unbake submit DIR` takes, with the\n"
      "ground truth in DIR/truth.\n",

@@ -301,6 +301,7 @@ enum status bundle_load(const char *dir, const struct reading *given, const stru
     const char *name = match.found ? match.found : chosen ? chosen : BUNDLE_TRANSFORMS;
     bool has_frames = f.problem_count == 0 || t.frame_count > 0;
     reading_apply_frames(&reading, &t);
+    scene->pose_axes = reading.axes != AXES_OF_FORMAT ? reading.axes : t.axes;
     if (reading.mesh)
         status = choose_mesh(root, reading.mesh, &mesh, &f, err);
     else

@@ -4,6 +4,7 @@
 
 #include <stddef.h>
 
+#include "common/reading.h"
 #include "server/scene/mesh.h"
 #include "server/scene/photograph.h"
 
@@ -14,6 +15,7 @@ struct scene {
     struct photograph *photograph; /* [photograph_count]; owned */
     char *source;       /* kind of capture: "COLMAP"; NULL in scenes that were not read from a bundle; owned */
     size_t named_count; /* frames that its files name, of which the photographs are those that can be used */
+    enum matrix_axes pose_axes; /* what the matrices of the cameras' file were taken for */
     size_t warning_count;
     char **warning; /* [warning_count] sentences for the user; owned */
 };

@@ -10,7 +10,7 @@
 #include "common/mem.h"
 #include "common/parallel.h"
 #include "server/data/layout.h"
-#include "server/ingest/bundle.h"
+#include "server/check/scene_check.h"
 #include "server/ingest/facts.h"
 #include "server/worker/tasks.h"
 
@@ -36,12 +36,18 @@ static void tell_problems(struct progress *progress, const cJSON *problems) {
         progress_problem(progress, text_of(problem, "file"), text_of(problem, "reason"), text_of(problem, "hint"));
 }
 
+static void tell_facts(struct progress *progress, const struct scene_check *room) {
+    cJSON *facts = facts_of(&room->scene);
+    scene_check_facts(room, facts);
+    progress_scene(progress, facts);
+}
+
 enum status task_check(const struct order *order, struct progress *progress, struct error *err) {
     struct bundle_limits limits = bundle_default_limits();
     char *archive = layout_archive(order->dir), *files = layout_files(order->dir);
     struct parallel *pool = parallel_new(order->thread_count);
     cJSON *problems = cJSON_CreateArray();
-    struct scene scene;
+    struct scene_check room;
     struct reading reading;
     /* Removes what an earlier, killed check left, or one with another reading. */
     enum status status = reading_parse(order->reading, &reading, err);
@@ -50,15 +56,15 @@ enum status task_check(const struct order *order, struct progress *progress, str
     if (status == STATUS_OK)
         status = bundle_unpack(archive, files, &limits, err);
     if (status == STATUS_OK) {
-        status = bundle_load(files, &reading, &limits, pool, &scene, problems, err);
+        status = scene_check(&room, files, &reading, &limits, pool, problems, err);
         tell_problems(progress, problems);
         if (status == STATUS_OK)
             status = flush(order->dir, err);
         if (status == STATUS_OK)
-            progress_scene(progress, facts_of(&scene));
+            tell_facts(progress, &room);
         if (status != STATUS_OK)
             file_remove_tree(files, NULL); /* a rejected scene keeps only its archive */
-        scene_release(&scene);
+        scene_check_release(&room);
     }
     reading_release(&reading);
     cJSON_Delete(problems);

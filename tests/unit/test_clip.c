@@ -53,11 +53,11 @@ static void take(void) {
 }
 
 /* Of a stripe, or of its tiles: the share of pixels that are said to saturate in red, and the mean of the others. */
-struct reading {
+struct clip_case {
     double white, mean;
 };
 
-static struct reading read_stripe(uint32_t stripe, bool of_tiles) {
+static struct clip_case read_stripe(uint32_t stripe, bool of_tiles) {
     double white = 0.0, sum = 0.0, count = 0.0;
     for (uint32_t i = stripe * STRIPE * SIDE; i < (stripe + 1) * STRIPE * SIDE; i++) {
         struct photograph_sample s;
@@ -69,7 +69,7 @@ static struct reading read_stripe(uint32_t stripe, bool of_tiles) {
         sum += s.saturated[0] ? 0.0 : (double)s.radiance.r;
         CHECK(!s.saturated[0] || s.radiance.r >= 1.0f);
     }
-    return (struct reading){white / count, sum / fmax(count - white, 1.0)};
+    return (struct clip_case){white / count, sum / fmax(count - white, 1.0)};
 }
 
 int main(void) {
@@ -77,8 +77,8 @@ int main(void) {
     struct parallel *pool = parallel_new(2);
     clip_mark(&scene, &views, &noise, pool);
     CHECK(photograph[0].saturated && !photograph[1].saturated && !photograph[2].saturated);
-    struct reading below = read_stripe(0, false), about = read_stripe(1, false), at = read_stripe(2, false),
-                   beyond = read_stripe(3, false), tiles = read_stripe(3, true);
+    struct clip_case below = read_stripe(0, false), about = read_stripe(1, false), at = read_stripe(2, false),
+                     beyond = read_stripe(3, false), tiles = read_stripe(3, true);
     CHECK(below.white == 0.0);
     CHECK_NEAR(below.mean, 0.5, 0.01);
     CHECK_THAT(at.white > 0.95 && beyond.white > 0.98, "%g %g", at.white, beyond.white);

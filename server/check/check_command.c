@@ -1,0 +1,136 @@
+/* check_command.c -- see check_command.h. */
+#include "server/check/check_command.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "common/mem.h"
+#include "common/settings.h"
+#include "server/check/scene_check.h"
+#include "server/ingest/facts.h"
+
+const struct flag check_flags[] = {
+    {"--scene-set", "KEY=VALUE",
+     "how the bundle is to be read: transforms, mesh, axes, mesh_axes, scale, shift, exposures"},
+    {"--set", "NAME=VALUE", "a setting of the job that memory and time are estimated for"},
+    {"--json", NULL, "print the facts as JSON"},
+    {"--threads", "N", "0: one per processor (0)"},
+    COMMAND_HELP_FLAG,
+    {0},
+};
+
+/* The values of a flag that may be given several times, as an object; the caller's. */
+static enum status collect(const struct arguments *a, const char *flag,
+                           enum status (*parse)(const char *, cJSON *, struct error *), cJSON **object,
+                           struct error *err) {
+    enum status status = STATUS_OK;
+    *object = cJSON_CreateObject();
+    for (size_t i = 0; i < a->given_count && status == STATUS_OK; i++)
+        if (strcmp(a->given[i].flag->name, flag) == 0)
+            status = parse(a->given[i].value, *object, err);
+    return status;
+}
+
+static const char *text_of(const cJSON *object, const char *key) {
+    const char *text = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(object, key));
+    return text ? text : "";
+}
+
+static void print_list(const char *title, const cJSON *list) {
+    const cJSON *item;
+    cJSON_ArrayForEach(item, list)
+        printf("%s%s\n", title, cJSON_GetStringValue(item));
+}
+
+static void print_facts(const cJSON *facts) {
+    const cJSON *fit = cJSON_GetObjectItemCaseSensitive(facts, "fit"), *row;
+    cJSON_ArrayForEach(row, cJSON_GetObjectItemCaseSensitive(facts, "table"))
+        printf("  %-18s %s\n", text_of(row, "label"), text_of(row, "value"));
+    print_list("warning: ", cJSON_GetObjectItemCaseSensitive(facts, "warnings"));
+    printf("fit: %s\n", text_of(fit, "verdict"));
+    print_list("  ", cJSON_GetObjectItemCaseSensitive(fit, "evidence"));
+    if (*text_of(fit, "remedy_text"))
+        printf("%s: %s\n", cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(fit, "taken")) ? "taken" : "remedy",
+               text_of(fit, "remedy_text"));
+}
+
+static void print_problems(const cJSON *problems) {
+    const cJSON *problem;
+    cJSON_ArrayForEach(problem, problems) {
+        const char *hint = text_of(problem, "hint");
+        printf("problem: %s: %s%s%s\n", text_of(problem, "file"), text_of(problem, "reason"), *hint ? "; " : "", hint);
+    }
+}
+
+static void print_json(const cJSON *json) {
+    char *text = json_page(json);
+    puts(text);
+    mem_free(text);
+}
+
+/* Checks the room and prints what was found. */
+static enum status check(const struct arguments *a, const struct reading *reading, const cJSON *settings,
+                         struct parallel *pool, bool *fits, struct error *err) {
+    struct bundle_limits limits = bundle_default_limits();
+    struct scene_check room;
+    cJSON *problems = cJSON_CreateArray(), *facts = NULL;
+    bool as_json = arguments_have(a, "--json");
+    (void)settings;
+    enum status status = scene_check(&room, a->words[0], reading, &limits, pool, problems, err);
+    *fits = status == STATUS_OK && room.fit.verdict != FIT_NO;
+    if (status == STATUS_OK) {
+        facts = facts_of(&room.scene);
+        scene_check_facts(&room, facts);
+        json_add_number(facts, "load_sec", room.load_sec);
+        json_add_number(facts, "fit_sec", room.fit_sec);
+    } else if (as_json) {
+        facts = cJSON_CreateObject();
+        json_add(facts, "problems", cJSON_Duplicate(problems, true));
+    }
+    if (as_json)
+        print_json(facts);
+    else if (facts)
+        print_facts(facts);
+    else
+        print_problems(problems);
+    cJSON_Delete(facts);
+    cJSON_Delete(problems);
+    scene_check_release(&room);
+    return status;
+}
+
+int check_command(int argc, char **argv) {
+    uint32_t threads = 0;
+    const struct number_flag numbers[] = {{"--threads", 0, 1024, .count = &threads}};
+    struct arguments a;
+    struct error err;
+    struct reading reading = reading_default();
+    cJSON *given = NULL, *settings = NULL;
+    bool fits = false;
+    if (!arguments_read(&a, argc, argv, check_flags))
+        return EXIT_USAGE;
+    if (arguments_have(&a, "--help"))
+        return COMMAND_HELP;
+    if (!arguments_numbers(&a, numbers, sizeof numbers / sizeof *numbers))
+        return EXIT_USAGE;
+    if (a.word_count != 1)
+        return COMMAND_MISUSED;
+    enum status status = collect(&a, "--scene-set", reading_parse_assignment, &given, &err);
+    if (status == STATUS_OK)
+        status = collect(&a, "--set", settings_parse_assignment, &settings, &err);
+    if (status == STATUS_OK)
+        status = reading_parse(given, &reading, &err);
+    bool is_usage = status != STATUS_OK;
+    if (status == STATUS_OK) {
+        struct parallel *pool = parallel_new((int)threads);
+        status = check(&a, &reading, settings, pool, &fits, &err);
+        parallel_free(pool);
+    }
+    if (status != STATUS_OK)
+        fprintf(stderr, "unbaked check: %s\n", err.message);
+    reading_release(&reading);
+    cJSON_Delete(given);
+    cJSON_Delete(settings);
+    return is_usage ? EXIT_USAGE : status == STATUS_OK && fits ? EXIT_SUCCESS : EXIT_FAILURE;
+}
