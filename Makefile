@@ -29,7 +29,7 @@ EMBREE_LIB = $(if $(wildcard /usr/include/embree4/rtcore.h /usr/local/include/em
 
 COMMON_SRC = $(wildcard common/*.c)
 # The engine's libraries stay out of the client: it links only these.
-CLIENT_COMMON_SRC = $(filter-out common/image.c common/image_%.c common/exr_%.c common/png_%.c common/tiff%.c common/jpeg.c common/heif.c common/webp.c common/hdr.c common/exif.c common/color.c common/color_%.c,$(COMMON_SRC))
+CLIENT_COMMON_SRC = $(filter-out common/image.c common/image_%.c common/exr_%.c common/png_%.c common/tiff%.c common/jpeg.c common/heif%.c common/webp.c common/hdr.c common/exif.c common/color.c common/color_%.c,$(COMMON_SRC))
 CLIENT_SRC = $(wildcard client/*.c)
 SERVER_SRC = $(wildcard server/*.c server/*/*.c server/*/*/*.c)
 SERVER_LIB_SRC = $(filter-out server/main.c,$(SERVER_SRC))

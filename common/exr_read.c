@@ -29,6 +29,8 @@ struct canvas {
 static void put_row(void *user, const struct exr_row *row) {
     const struct canvas *canvas = user;
     const struct image *image = canvas->image;
+    if (canvas->reader->target[row->channel] < 0)
+        return;
     size_t pixel = (size_t)row->y * image->width + row->x, channel = (size_t)canvas->reader->target[row->channel];
     unpack_row(row->values, row->type, row->width, image->channel_count,
                image->pixel + pixel * image->channel_count + channel);

@@ -2,7 +2,11 @@
 #ifndef UNBAKE_COMMON_EXR_READER_H
 #define UNBAKE_COMMON_EXR_READER_H
 
+#include "common/exr_layers.h"
 #include "common/exr_stream.h"
+
+/* Of a part: renders with all passes and Cryptomatte have about a hundred. */
+#define EXR_MAX_CHANNELS 512
 
 struct exr_reader {
     exr_context_t context;
@@ -12,8 +16,9 @@ struct exr_reader {
     exr_compression_t compression;
     const exr_attr_chlist_t *list;
     exr_attr_box2i_t data, display;
+    struct exr_colors colors;       /* only where source->wants_color */
     int grey;                       /* index in `list` of the Y that becomes R, G and B; or -1 */
-    int target[IMAGE_MAX_CHANNELS]; /* channel of the picture for each of `list` */
+    int target[EXR_MAX_CHANNELS]; /* channel of the picture for each of `list`; -1: not wanted */
 };
 
 /* Chooses part and channels and checks the limits; sets the size (display window) and channel names of *image. */

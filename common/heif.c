@@ -13,6 +13,7 @@
 
 #include "common/color_cicp.h"
 #include "common/color_icc.h"
+#include "common/heif_items.h"
 #include "common/image_codec.h"
 #include "common/mem.h"
 
@@ -132,6 +133,9 @@ static void use_nclx(const struct heif_picture *p, const struct image_info *info
 
 static enum status read_header(struct heif_picture *p, struct image *image, struct image_info *info,
                                struct error *err) {
+    const char *fault = heif_items_fault(p->source);
+    if (fault)
+        return error_set(err, STATUS_INPUT, "%s: damaged HEIF: %s", p->source->name, fault);
     p->context = heif_context_alloc();
     if (!p->context)
         mem_exhausted("libheif");
@@ -158,14 +162,25 @@ static enum status read_header(struct heif_picture *p, struct image *image, stru
     return STATUS_OK;
 }
 
+/* Whether it is an AVIF and libaom is there. The other decoder, dav1d, starts a thread a processor for each picture. */
+static bool prefers_aom(struct image_source *source) {
+    const struct heif_decoder_descriptor *decoder[16];
+    char brand[4] = "";
+    bool is_there = false;
+    int count = heif_get_decoder_descriptors(heif_compression_AV1, decoder, 16);
+    for (int i = 0; i < count && i < 16; i++)
+        is_there = is_there || strcmp(heif_decoder_descriptor_get_id_name(decoder[i]), "aom") == 0;
+    return is_there && image_source_read(source, 8, brand, 4) == 4 && memcmp(brand, "avif", 4) == 0;
+}
+
 static enum status decode(struct heif_picture *p, struct error *err) {
     struct heif_decoding_options *options = heif_decoding_options_alloc();
     if (!options)
         mem_exhausted("libheif");
     if (options->version >= 3)
         options->strict_decoding = 1;
-    if (options->version >= 4)
-        options->decoder_id = "aom"; /* of AVIF, where it is there; dav1d starts a thread a processor for each picture */
+    if (options->version >= 4 && prefers_aom(p->source))
+        options->decoder_id = "aom";
     bool is_deep = heif_image_handle_get_luma_bits_per_pixel(p->handle) > 8;
     enum heif_chroma chroma = is_deep ? (p->has_alpha ? heif_chroma_interleaved_RRGGBBAA_LE : heif_chroma_interleaved_RRGGBB_LE)
                               : p->has_alpha ? heif_chroma_interleaved_RGBA

@@ -44,6 +44,11 @@ enum image_encoding {
     IMAGE_CONVERTED /* others of another colour space: converted to linear light; image.clipped marks lower bounds */
 };
 
+/* Pixels from (x, y). */
+struct image_window {
+    uint32_t x, y, width, height;
+};
+
 struct image_info {
     enum image_encoding encoding;
     int bits; /* per channel as stored: 8, 16, 32 */
@@ -51,6 +56,10 @@ struct image_info {
     double exposure_time_sec, iso, f_number;
     int orientation;      /* EXIF orientation 1..8, 1 when absent; the reader does NOT rotate. HEIC and AVIF: 1, since
                            * their rotation is part of the picture and has been applied */
+    /* EXR only, else 0: the part of the picture that the file has pixels of, and the size of its data window, which
+     * some libraries (OpenCV, imageio) take for the picture. */
+    struct image_window window;
+    uint32_t stored_width, stored_height;
     bool is_adobe_rgb;    /* EXIF says so; cameras without profile do that */
     bool is_uncalibrated; /* EXIF says that the colour space is not sRGB, without naming it */
     /* Set by reading, not by probing: */
@@ -91,12 +100,18 @@ enum status image_read(const char *path, struct image *image, struct image_info 
 /* The same with stored values of PNG, JPEG and others, without colour conversion: for masks. */
 enum status image_read_stored(const char *path, struct image *image, struct error *err);
 
+/* The same of a photograph: only R, G, B and, if there, A. Of an EXR's layers the one that is the picture, as Blender
+ * and other renderers name it ("ViewLayer.Combined.R"; "r", "g", "b"); STATUS_INPUT where several may be, or none. */
+enum status image_read_photograph(const char *path, struct image *image, struct image_info *info, struct error *err);
+
 /* The same from memory; `name` stands for the path in messages. */
 enum status image_read_memory(const char *name, const void *data, size_t size, struct image *image,
                               struct image_info *info, struct error *err);
 
-/* The same without reading pixels: only width, height, channels and info; pixel is NULL. */
+/* image_read, and image_read_photograph, without reading pixels: only width, height, channels and info; pixel is
+ * NULL. */
 enum status image_probe(const char *path, struct image *image, struct image_info *info, struct error *err);
+enum status image_probe_photograph(const char *path, struct image *image, struct image_info *info, struct error *err);
 
 /* Version of libheif; and which decoder it was installed without, as a sentence, or NULL (its decoders are packages of
  * their own since Debian 13). */

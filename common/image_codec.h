@@ -17,6 +17,7 @@ struct image_source {
     uint64_t size;  /* bytes */
     int io_error;   /* errno of the first read that the system refused, else 0 */
     bool as_stored; /* values of PNG and JPEG are not converted */
+    bool wants_color; /* only the picture's R, G, B and A */
 };
 
 /* Opens a file (a FIFO under a picture's name does not block) that must be a regular one; `path` is borrowed. */

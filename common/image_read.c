@@ -68,29 +68,39 @@ static enum status read_source(struct image_source *source, bool probe, struct i
     return status;
 }
 
-static enum status read_path(const char *path, bool probe, bool as_stored, struct image *image, struct image_info *info,
-                             struct error *err) {
+/* `how` has the flags of the source. */
+static enum status read_path(const char *path, bool probe, struct image_source how, struct image *image,
+                             struct image_info *info, struct error *err) {
     *image = (struct image){0};
     struct image_source source;
     enum status status = image_source_open(&source, path, err);
     if (status != STATUS_OK)
         return status;
-    source.as_stored = as_stored;
+    source.as_stored = how.as_stored;
+    source.wants_color = how.wants_color;
     status = read_source(&source, probe, image, info, err);
     image_source_close(&source);
     return status;
 }
 
 enum status image_read(const char *path, struct image *image, struct image_info *info, struct error *err) {
-    return read_path(path, false, false, image, info, err);
+    return read_path(path, false, (struct image_source){0}, image, info, err);
+}
+
+enum status image_read_photograph(const char *path, struct image *image, struct image_info *info, struct error *err) {
+    return read_path(path, false, (struct image_source){.wants_color = true}, image, info, err);
 }
 
 enum status image_read_stored(const char *path, struct image *image, struct error *err) {
-    return read_path(path, false, true, image, NULL, err);
+    return read_path(path, false, (struct image_source){.as_stored = true}, image, NULL, err);
 }
 
 enum status image_probe(const char *path, struct image *image, struct image_info *info, struct error *err) {
-    return read_path(path, true, false, image, info, err);
+    return read_path(path, true, (struct image_source){0}, image, info, err);
+}
+
+enum status image_probe_photograph(const char *path, struct image *image, struct image_info *info, struct error *err) {
+    return read_path(path, true, (struct image_source){.wants_color = true}, image, info, err);
 }
 
 enum status image_read_memory(const char *name, const void *data, size_t size, struct image *image,

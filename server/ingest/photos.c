@@ -217,7 +217,7 @@ static enum status load_photograph(const struct loading *l, size_t index) {
     struct image_info info;
     enum status status = check_size(l, frame, path, &photo->camera, &outcome->err);
     if (status == STATUS_OK)
-        status = image_read(path, &image, &info, &outcome->err);
+        status = image_read_photograph(path, &image, &info, &outcome->err);
     mem_free(path);
     if (status != STATUS_OK)
         return status;

@@ -1,6 +1,6 @@
 /* test_image_formats.c -- TIFF, HEIC, AVIF, WebP and CMYK JPEG: pictures of six patches, made here by the libraries'
- * encoders (those of HEIF are in tests/data/image, by libheif 1.15 with x265 and aom), come back in their colours; what
- * is cut short, or of a kind that is not read, is refused. */
+ * encoders (those of HEIF are in tests/data/image, by libheif 1.15 with x265 and aom), come back in their colours; layers of
+ * EXR; what is cut short, or of a kind that is not read, is refused. */
 #include <tiffio.h>
 #include <webp/encode.h>
 #include <webp/mux.h>
@@ -304,16 +304,17 @@ static void heif(void) {
         CHECK_NEAR(middle(&image, 3)[1], 92.2457 / 203, .01);
         image_release(&image);
     }
-    /* 32 x 48 as shown: rotated by the file, whose EXIF says so a second time; Display P3. */
+    /* 64 x 96 as shown, of patches twice as large: rotated by the file, whose EXIF says so a second time; Display P3. */
     if (reads("tests/data/image/turned.heic", &image, &info)) {
-        const float *grey = image.pixel + (8 * 32 + 8) * 3, *red = image.pixel + (8 * 32 + 24) * 3;
-        CHECK(image.width == 32 && image.height == 48 && info.orientation == 1);
+        const float *grey = image.pixel + (16 * 64 + 16) * 3, *red = image.pixel + (16 * 64 + 48) * 3;
+        CHECK(image.width == 64 && image.height == 96 && info.orientation == 1);
         CHECK(info.iso == 400 && fabs(info.exposure_time_sec - .02) < 1e-9 && fabs(info.f_number - 1.8) < 1e-9);
         CHECK(info.encoding == IMAGE_CONVERTED && info.color_space[0]);
         CHECK_NEAR(grey[0], image_srgb_to_linear(.502f), .005);
         CHECK(red[0] > image_srgb_to_linear(.8f) && red[1] < 0.03f);
         image_release(&image);
     }
+    check_refused("tests/fuzz/seeds/heif/found-image-derived-from-itself", "derived from itself");
     cut_short("tests/data/image/blocks.avif", 0);
     cut_short("tests/data/image/turned.heic", 0);
 }
@@ -344,6 +345,54 @@ static void foreign(void) {
     }
 }
 
+/* --- layers of EXR ------------------------------------------------------------------------- */
+
+/* Reads an EXR of channels with these names, in which the channel at place i holds i + 1. */
+static enum status read_channels(const char *const *name, uint32_t count, struct image *image) {
+    struct image written;
+    image_init(&written, 4, 2, count, name);
+    for (uint32_t i = 0; i < 8 * count; i++)
+        written.pixel[i] = (float)(i % count + 1);
+    CHECK(image_write_exr(scratch, &written, IMAGE_FLOAT, false, &err) == STATUS_OK);
+    image_release(&written);
+    return image_read_photograph(scratch, image, NULL, &err);
+}
+
+static void layers(void) {
+    static const struct {
+        const char *name[8];
+        float wanted[4]; /* R, G, B, A (0: none); all 0: refused */
+    } kinds[] = {
+        {{"b", "g", "r"}, {3, 2, 1}},
+        {{"B", "G", "R", "a.B", "a.G", "a.R"}, {3, 2, 1}},
+        {{"ViewLayer.Combined.A", "ViewLayer.Combined.B", "ViewLayer.Combined.G", "ViewLayer.Combined.R",
+          "ViewLayer.DiffCol.B", "ViewLayer.DiffCol.G", "ViewLayer.DiffCol.R", "ViewLayer.Depth.Z"},
+         {4, 3, 2, 1}},
+        {{"Composite.Combined.B", "Composite.Combined.G", "Composite.Combined.R", "V.Combined.B", "V.Combined.G",
+          "V.Combined.R"},
+         {3, 2, 1}},
+        {{"x.red", "x.green", "x.blue"}, {1, 2, 3}},
+        {{"Y", "id"}, {1, 1, 1}},
+        {{"a.B", "a.G", "a.R", "b.B", "b.G", "b.R"}, {0}},
+        {{"X", "Z"}, {0}},
+    };
+    for (size_t k = 0; k < sizeof kinds / sizeof *kinds; k++) {
+        struct image image;
+        uint32_t count = 0;
+        while (count < 8 && kinds[k].name[count])
+            count++;
+        enum status status = read_channels(kinds[k].name, count, &image);
+        const float *wanted = kinds[k].wanted;
+        CHECK_THAT((status == STATUS_OK) == (wanted[0] > 0), "layers %zu: %s", k, status ? err.message : "is read");
+        uint32_t channel_count = wanted[3] > 0 ? 4 : 3;
+        CHECK(status != STATUS_OK || (image.channel_count == channel_count && image_channel(&image, "B") == 2));
+        for (uint32_t c = 0; c < channel_count && status == STATUS_OK; c++)
+            CHECK_THAT(image.pixel[c] == wanted[c], "layers %zu: channel %u is %g", k, c, (double)image.pixel[c]);
+        image_release(&image);
+    }
+    CHECK(strstr(err.message, "no channels R, G and B"));
+}
+
 int main(void) {
     snprintf(scratch, sizeof scratch, "/tmp/unbake-test-formats-%d", (int)getpid());
     TIFFSetWarningHandler(NULL);
@@ -353,6 +402,7 @@ int main(void) {
     heif();
     cmyk();
     foreign();
+    layers();
     unlink(scratch);
     return check_result();
 }
