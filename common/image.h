@@ -76,6 +76,11 @@ void image_init_rgb(struct image *image, uint32_t width, uint32_t height); /* ch
 void image_take_rgb(const struct image *from, struct image *image);
 void image_release(struct image *image);
 
+/* Turns a picture as EXIF's orientation (1 to 8; others: not) says. */
+void image_orient(struct image *image, int orientation);
+/* Whether the upright picture is as wide as the stored one is high. */
+static inline bool image_orientation_swaps(int orientation) { return orientation >= 5 && orientation <= 8; }
+
 /* First half of image_init, for sizes from a file: sets size and channel names, without pixels; STATUS_LIMIT when a
  * limit is exceeded, STATUS_INPUT when a size is 0. `name` is for messages. */
 enum status image_header(struct image *image, const char *name, uint64_t width, uint64_t height, uint32_t channel_count,

@@ -12,6 +12,7 @@
 #include "common/mem.h"
 #include "server/ingest/path.h"
 #include "server/ingest/photo_color.h"
+#include "server/ingest/photo_fit.h"
 
 #define HALF_LARGEST 65504.0f
 
@@ -20,6 +21,7 @@ struct outcome {
     enum status status;
     struct error err;
     bool mask_failed; /* err is about the mask */
+    bool is_broken;   /* the picture, or its mask, could not be decoded */
     int orientation;
     enum exposure_source source;
     size_t not_finite_count, clamped_count; /* pixels */
@@ -34,6 +36,7 @@ struct loading {
     struct photograph *photograph; /* [frame_count] */
     struct outcome *outcome;       /* [frame_count] */
     struct photo_color *color;     /* [frame_count] */
+    struct photo_fit *fit;         /* [frame_count] */
     uint16_t *half_of_srgb;        /* [65536] linear half value of a 16-bit sRGB code value */
     float clip;
 };
@@ -43,7 +46,8 @@ struct loading {
 /* Path of a frame's picture: as named or, for names without extension (instant-ngp), with one added. NULL when there
  * is none. */
 static char *find_picture(const char *dir, const char *name) {
-    static const char *const extensions[] = {"png", "jpg", "jpeg", "exr", "PNG", "JPG", "JPEG", "EXR"};
+    static const char *const extensions[] = {"png", "jpg", "jpeg", "exr", "tif", "tiff", "webp", "heic", "avif",
+                                             "PNG", "JPG", "JPEG", "EXR", "TIF", "TIFF", "WEBP", "HEIC", "AVIF"};
     if (file_is_in(dir, name))
         return mem_strdup(name);
     for (size_t i = 0; i < sizeof extensions / sizeof *extensions; i++) {
@@ -132,23 +136,38 @@ static void mask_by_alpha(const struct image *image, struct photograph *photo) {
         photo->mask[i] = image->pixel[i * image->channel_count + (size_t)alpha] < 0.5f ? 0 : 255;
 }
 
-/* Black mask pixels are excluded (nerfstudio's convention). */
-static enum status load_mask(const struct loading *l, const char *name, struct photograph *photo, struct error *err) {
+/* Whether a mask is of the photograph's size, upright or as stored before the photograph was turned. */
+static bool mask_fits(const struct image *mask, const struct camera *camera, int *turn) {
+    bool is_upright = mask->width == camera->width && mask->height == camera->height;
+    if (is_upright && mask->width != mask->height)
+        *turn = 1;
+    return is_upright ||
+           (image_orientation_swaps(*turn) && mask->width == camera->height && mask->height == camera->width);
+}
+
+/* Black mask pixels are excluded (nerfstudio's convention). `turn` is that of the photograph. */
+static enum status load_mask(const struct loading *l, const char *name, int turn, struct photograph *photo,
+                             struct outcome *outcome) {
     struct image image;
+    struct error *err = &outcome->err;
     if (!file_is_in(l->dir, name))
         return error_set(err, STATUS_INPUT, "the mask is not in the bundle");
     char *path = file_join(l->dir, name);
     enum status status = image_probe(path, &image, NULL, err);
+    outcome->is_broken = status == STATUS_INPUT;
     if (status != STATUS_OK)
         goto out;
-    if (image.width != photo->camera.width || image.height != photo->camera.height)
+    if (!mask_fits(&image, &photo->camera, &turn))
         status = error_set(err, STATUS_INPUT, "the mask is %u x %u pixels, its photograph %u x %u", image.width,
                            image.height, photo->camera.width, photo->camera.height);
     image_release(&image);
-    if (status == STATUS_OK)
+    if (status == STATUS_OK) {
         status = image_read_stored(path, &image, err);
+        outcome->is_broken = status == STATUS_INPUT;
+    }
     if (status != STATUS_OK)
         goto out;
+    image_orient(&image, turn);
     size_t count = (size_t)image.width * image.height;
     if (!photo->mask) {
         photo->mask = mem_alloc(count);
@@ -181,20 +200,18 @@ static void set_exposure(const struct transforms_frame *frame, const struct imag
     photo->exposure = photo->exposure_known ? single : 1.0f;
 }
 
-static enum status check_size(const struct loading *l, const struct transforms_frame *frame, const char *path,
-                              struct camera *camera, struct error *err) {
-    struct image image;
-    enum status status = image_probe(path, &image, NULL, err);
-    if (status != STATUS_OK)
-        return status;
-    uint64_t pixels = (uint64_t)image.width * image.height;
+static enum status check_size(const struct loading *l, size_t index, struct camera *camera, struct outcome *outcome) {
+    const struct photo_fit *fit = &l->fit[index];
+    uint64_t pixels = (uint64_t)fit->width * fit->height;
+    if (fit->status != STATUS_OK) {
+        outcome->is_broken = fit->status == STATUS_INPUT;
+        outcome->err = fit->err;
+        return fit->status;
+    }
     if (pixels > l->pixel_limit)
-        status = error_set(err, STATUS_LIMIT, "the picture has %" PRIu64 " pixels, more than the limit of %" PRIu64,
-                           pixels, l->pixel_limit);
-    else
-        status = transforms_camera(frame, image.width, image.height, l->offset, camera, err);
-    image_release(&image);
-    return status;
+        return error_set(&outcome->err, STATUS_LIMIT,
+                         "the picture has %" PRIu64 " pixels, more than the limit of %" PRIu64, pixels, l->pixel_limit);
+    return photo_fit_camera(fit, &l->transforms->frame[index], l->offset, camera, &outcome->err);
 }
 
 /* Takes over image->clipped and the clip value and names the colour space. */
@@ -215,18 +232,21 @@ static enum status load_photograph(const struct loading *l, size_t index) {
     char *path = file_join(l->dir, l->path[index]);
     struct image image;
     struct image_info info;
-    enum status status = check_size(l, frame, path, &photo->camera, &outcome->err);
-    if (status == STATUS_OK)
+    enum status status = check_size(l, index, &photo->camera, outcome);
+    if (status == STATUS_OK) {
         status = image_read_photograph(path, &image, &info, &outcome->err);
+        outcome->is_broken = status == STATUS_INPUT;
+    }
     mem_free(path);
     if (status != STATUS_OK)
         return status;
     photo->name = mem_strdup(frame->file);
     photo->is_test = frame->is_test;
     photo->gain = rgb_gray(1.0f);
+    photo_fit_apply(&l->fit[index], &info, &image);
     set_clip(l, &image, &info, photo);
     photo_color_note(&l->color[index], frame->file, &image, &info);
-    outcome->orientation = info.orientation;
+    outcome->orientation = l->fit[index].turn > 1 ? 1 : info.orientation;
     set_exposure(frame, &info, photo, outcome);
     /* image_read puts R, G, B first */
     if (image_channel(&image, "B") != 2) {
@@ -242,7 +262,7 @@ static enum status load_photograph(const struct loading *l, size_t index) {
     }
     image_release(&image);
     if (status == STATUS_OK && frame->mask) {
-        status = load_mask(l, frame->mask, photo, &outcome->err);
+        status = load_mask(l, frame->mask, l->fit[index].turn, photo, outcome);
         outcome->mask_failed = status != STATUS_OK;
     }
     return status;
@@ -299,9 +319,22 @@ static void warn_about_pixels(const struct loading *l, struct findings *f) {
     }
 }
 
-/* Turns each frame's outcome into problems, in the frames' order. */
+/* Files that cannot be decoded (cut short, another kind) are left out, as missing ones are, while at least half of the
+ * photographs and PHOTOS_MIN_COUNT remain: a few come broken from cards and transfers, and the rest reconstructs the
+ * room. Where more are broken something is wrong with all: each is a problem. */
+static bool leaves_out_broken(const struct loading *l) {
+    size_t broken = 0, usable = 0;
+    for (size_t i = 0; i < l->transforms->frame_count; i++) {
+        broken += l->outcome[i].is_broken;
+        usable += l->path[i] && l->outcome[i].status == STATUS_OK;
+    }
+    return broken <= usable && usable >= PHOTOS_MIN_COUNT;
+}
+
+/* Turns each frame's outcome into problems and warnings, in the frames' order. */
 static enum status collect(struct loading *l, const char *name, struct findings *f, struct error *err) {
     enum status status = STATUS_OK;
+    bool leaves_out = leaves_out_broken(l);
     for (size_t i = 0; i < l->transforms->frame_count; i++) {
         const struct transforms_frame *frame = &l->transforms->frame[i];
         struct outcome *o = &l->outcome[i];
@@ -313,7 +346,9 @@ static enum status collect(struct loading *l, const char *name, struct findings 
         if (o->status == STATUS_OK)
             continue;
         make_relative(&o->err, l->dir);
-        if (o->status == STATUS_INPUT || o->status == STATUS_LIMIT) {
+        if (o->is_broken && leaves_out) {
+            findings_warning(f, "%s was left out: %s", l->path[i], o->err.message);
+        } else if (o->status == STATUS_INPUT || o->status == STATUS_LIMIT) {
             findings_error(f, o->mask_failed ? frame->mask : l->path[i], &o->err);
         } else if (status == STATUS_OK) {
             status = o->status;
@@ -365,7 +400,9 @@ enum status photos_load(const char *dir, const char *name, const struct transfor
     for (size_t i = 0; i < t->frame_count; i++)
         l.path[i] = find_picture(dir, t->frame[i].file);
     l.color = mem_calloc(t->frame_count, sizeof *l.color);
+    l.fit = mem_calloc(t->frame_count, sizeof *l.fit);
     find_duplicates(&l, name, f);
+    photo_fit_all(dir, name, l.path, t, pool, l.fit, f);
     parallel_for(pool, t->frame_count, load_body, &l);
     enum status status = collect(&l, name, f, err);
     move_photographs(&l, scene);
@@ -376,6 +413,7 @@ enum status photos_load(const char *dir, const char *name, const struct transfor
         mem_free(l.path[i]);
     mem_free(l.path);
     mem_free(l.color);
+    mem_free(l.fit);
     mem_free(l.outcome);
     mem_free(l.half_of_srgb);
     return status;

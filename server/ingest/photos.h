@@ -1,8 +1,9 @@
 /* photos.h -- loads the photographs named by transforms.json.
  *
- * EXR and Radiance are linear; PNG and JPEG are sRGB unless an ICC profile or colour chunks say otherwise (image.h),
- * and are made linear; conversions are reported. EXIF orientation is not applied, since poses refer to the stored
- * pixels. */
+ * EXR, Radiance and TIFF of floats are linear; others are sRGB unless an ICC profile or colour chunks say otherwise
+ * (image.h), and are made linear; conversions are reported. EXIF orientation is applied where the stated sizes ask for
+ * it (photo_fit.h), since otherwise poses refer to the stored pixels. HEIC and AVIF are read as every viewer shows them:
+ * their rotation is part of the picture. */
 #ifndef UNBAKE_INGEST_PHOTOS_H
 #define UNBAKE_INGEST_PHOTOS_H
 
@@ -17,7 +18,7 @@
 #define PHOTOS_MIN_COUNT 3 /* fewer views do not constrain materials and light */
 
 /* Loads the picture and mask of every frame from folder `dir` into scene->photograph, in the frames' order; missing
- * pictures are left out with a warning. Faults of the files become problems in *f; other statuses than STATUS_OK are
+ * pictures are left out with a warning, and so are some that are broken. Faults of the files become problems in *f; other statuses than STATUS_OK are
  * failures of the machine. `name` is that of the transforms file. */
 enum status photos_load(const char *dir, const char *name, const struct transforms *t, uint64_t pixel_limit,
                         struct parallel *pool, struct scene *scene, struct findings *f, struct error *err);

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "common/image.h"
@@ -41,9 +42,25 @@ static const cJSON *holder(const struct context *c, const char *key) {
     return own && !cJSON_IsNull(own) ? c->frame : c->root;
 }
 
+/* A number, also in quotes, as some scripts write it. */
+static bool is_plain_number(const cJSON *item, double *value) {
+    const char *text = cJSON_GetStringValue(item);
+    char *end = NULL;
+    if (cJSON_IsNumber(item)) {
+        *value = item->valuedouble;
+        return true;
+    }
+    if (!text || text[0] == '\0' || text[strspn(text, "0123456789+-.eE")] != '\0')
+        return false;
+    *value = strtod(text, &end);
+    return *end == '\0' && isfinite(*value);
+}
+
 static double number(struct context *c, const char *key, double fallback) {
     struct error err;
     double value;
+    if (is_plain_number(cJSON_GetObjectItemCaseSensitive(holder(c, key), key), &value) && isfinite(value))
+        return value;
     if (json_number(holder(c, key), key, c->place, fallback, &value, &err) != STATUS_OK) {
         findings_error(c->findings, c->name, &err);
         c->ok = false;
@@ -219,7 +236,7 @@ static void read_pose(struct context *c, struct transforms_frame *frame) {
         columns = 0;
         cJSON_ArrayForEach(cell, row) {
             if (rows < 4 && columns < 4)
-                m[rows][columns] = cJSON_IsNumber(cell) ? cell->valuedouble : NAN;
+                m[rows][columns] = is_plain_number(cell, &m[rows][columns]) ? m[rows][columns] : NAN;
             columns++;
         }
         shaped = shaped && columns == 4;

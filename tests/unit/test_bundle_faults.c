@@ -269,7 +269,7 @@ static void check_content(void) {
     image_release(&image);
     put("transforms.json",
         "{\"fl_x\":3,\"frames\":[{\"file_path\":\"images/1.exr\"," MATRIX ",\"mask_path\":\"mask.png\"}]}");
-    check_blamed(TRANSFORMS, "images/1.exr", "the picture has no red, green and blue");
+    check_blamed(TRANSFORMS, "images/1.exr", "the EXR has no channels R, G and B, in no layer, and no Y");
     mem_free(path);
 
     put_bundle(TRANSFORMS);

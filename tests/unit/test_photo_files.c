@@ -1,0 +1,232 @@
+/* test_photo_files.c -- photographs as people have them: formats, sizes and orientations other than those stated, broken
+ * files among good ones. A bundle of three pictures made here, and those of the shared captures. */
+#include <sys/stat.h>
+
+#include "common/file.h"
+#include "common/image.h"
+#include "common/mem.h"
+#include "server/ingest/bundle.h"
+#include "server/ingest/photos.h"
+#include "tests/check.h"
+
+static char work[64];
+static struct parallel *pool;
+static struct scene scene;
+static char told[16384]; /* problems and warnings of the last bundle, a line each */
+
+static bool load(const char *dir) {
+    struct bundle_limits limits = bundle_default_limits();
+    cJSON *problems = cJSON_CreateArray(), *problem;
+    struct error err = {.message = ""};
+    scene_release(&scene);
+    enum status status = bundle_load(dir, NULL, &limits, pool, &scene, problems, &err);
+    size_t used = 0;
+    told[0] = '\0';
+    cJSON_ArrayForEach(problem, problems) {
+        for (const cJSON *part = problem->child; part && used < sizeof told; part = part->next)
+            used += (size_t)snprintf(told + used, sizeof told - used, "%s: %s\n", part->string, part->valuestring);
+    }
+    for (size_t i = 0; i < scene.warning_count && used < sizeof told; i++)
+        used += (size_t)snprintf(told + used, sizeof told - used, "%s\n", scene.warning[i]);
+    cJSON_Delete(problems);
+    CHECK_THAT(status == STATUS_OK || status == STATUS_INPUT, "%s: %s", dir, err.message);
+    return status == STATUS_OK;
+}
+
+/* --- a bundle made here ----------------------------------------------------------------------- */
+
+#define POSE "\"transform_matrix\":[[1,0,0,0.5],[0,1,0,0.5],[0,0,1,2],[0,0,0,1]]"
+#define FRAME(name) "{\"file_path\":\"" name "\"," POSE "}"
+#define MESH                                                                                                           \
+    "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"                  \
+    "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+
+static void put(const char *name, const char *data, size_t size) {
+    char *path = file_join(work, name);
+    CHECK(file_replace(path, data, size, NULL) == STATUS_OK);
+    mem_free(path);
+}
+
+static void put_copy(const char *name, const char *from, size_t most) {
+    struct buf bytes;
+    buf_init(&bytes, 1 << 20);
+    CHECK(file_read(from, &bytes, NULL) == STATUS_OK);
+    put(name, bytes.data, bytes.length < most ? bytes.length : most);
+    buf_release(&bytes);
+}
+
+/* Five copies of a picture, with the lens in `top`. */
+static bool load_copies(const char *picture, const char *top) {
+    static const char *const names[] = {"0.jpg", "1.jpg", "2.jpg", "3.jpg", "4.jpg"};
+    for (size_t i = 0; i < 5; i++)
+        put_copy(names[i], picture, SIZE_MAX);
+    char *text = mem_printf("{%s,\"frames\":[" FRAME("0.jpg") "," FRAME("1.jpg") "," FRAME("2.jpg") "," FRAME(
+                                "3.jpg") "," FRAME("4.jpg") "]}",
+                            top);
+    put("transforms.json", text, strlen(text));
+    mem_free(text);
+    return load(work);
+}
+
+#define JPEG "tests/data/image/exif_little.jpg"    /* 24 x 16, orientation 6 */
+#define PLAIN "tests/data/image/progressive.jpg"   /* 24 x 16, none */
+
+static void check_lens(double fx, double fy, double cx, double cy) {
+    for (size_t i = 0; i < scene.photograph_count; i++) {
+        const struct camera *c = &scene.photograph[i].camera;
+        CHECK_NEAR(c->fx, fx, 1e-4);
+        CHECK_NEAR(c->fy, fy, 1e-4);
+        CHECK_NEAR(c->cx, cx, 1e-4);
+        CHECK_NEAR(c->cy, cy, 1e-4);
+    }
+}
+
+static void turned(void) {
+    struct image image;
+    CHECK(image_read_photograph(JPEG, &image, NULL, NULL) == STATUS_OK);
+    CHECK(load_copies(JPEG, "\"w\":24,\"h\":16,\"fl_x\":20,\"cx\":12,\"cy\":8"));
+    CHECK_THAT(strstr(told, "the EXIF orientation of 5 photographs was ignored"), "%s", told);
+    CHECK(load_copies(JPEG, "\"w\":16,\"h\":24,\"fl_x\":20,\"cx\":8,\"cy\":12"));
+    CHECK_THAT(strstr(told, "5 photographs were turned by their EXIF orientation") && !strstr(told, "ignored"), "%s",
+               told);
+    const struct photograph *p = &scene.photograph[0];
+    CHECK(scene.photograph_count == 5 && p->camera.width == 16 && p->camera.height == 24);
+    size_t wrong = 0; /* orientation 6: the stored first row is the right side, the first column the top */
+    for (uint32_t y = 0; y < 24 && p->camera.width == 16; y++)
+        for (uint32_t x = 0; x < 16; x++) {
+            float stored = image.pixel[((size_t)(15 - x) * 24 + y) * 3 + 1];
+            wrong += fabsf(image_float_from_half(p->pixel[y * 16 + x][1]) - image_srgb_to_linear(stored)) > 1e-3f;
+        }
+    CHECK_THAT(wrong == 0, "%zu pixels are elsewhere", wrong);
+    image_release(&image);
+    CHECK(load_copies(JPEG, "\"w\":32,\"h\":48,\"fl_x\":40,\"cx\":16,\"cy\":24"));
+    CHECK(scene.photograph[0].camera.width == 16 && strstr(told, "multiplied by 0.5"));
+    check_lens(20, 20, 8, 12);
+}
+
+/* All eight orientations against the definition of each: where the stored first row and first column are seen. */
+static void orientations(void) {
+    static const char *const seen[9] = {NULL,         "top left",    "top right",    "bottom right", "bottom left",
+                                        "left top",   "right top",   "right bottom", "left bottom"};
+    for (int o = 1; o <= 8; o++) {
+        struct image image;
+        image_init_rgb(&image, 5, 3);
+        image.pixel[0] = 1;                    /* row 0, column 0 */
+        image.pixel[(size_t)4 * 3 + 1] = 1;    /* row 0, last column */
+        image.pixel[(size_t)2 * 5 * 3 + 2] = 1; /* last row, column 0 */
+        image_orient(&image, o);
+        uint32_t w = image.width, h = image.height;
+        bool swaps = o >= 5;
+        CHECK(w == (swaps ? 3u : 5u) && h == (swaps ? 5u : 3u));
+        bool is_right = strstr(seen[o], "right") != NULL, is_bottom = strstr(seen[o], "bottom") != NULL;
+        uint32_t x = is_right ? w - 1 : 0, y = is_bottom ? h - 1 : 0;
+        uint32_t other_x = w - 1 - x, other_y = h - 1 - y;
+        size_t origin = ((size_t)y * w + x) * 3;
+        size_t along_row = swaps ? ((size_t)other_y * w + x) * 3 : ((size_t)y * w + other_x) * 3;
+        size_t along_column = swaps ? ((size_t)y * w + other_x) * 3 : ((size_t)other_y * w + x) * 3;
+        CHECK_THAT(image.pixel[origin] == 1 && image.pixel[along_row + 1] == 1 && image.pixel[along_column + 2] == 1,
+                   "orientation %d", o);
+        image_release(&image);
+    }
+}
+
+static void scaled(void) {
+    CHECK(load_copies(PLAIN, "\"w\":24,\"h\":16,\"fl_x\":20,\"cx\":12,\"cy\":8") && told[0] == '\0');
+    CHECK(load_copies(PLAIN, "\"w\":\"48\",\"h\":\"32\",\"fl_x\":\"40\",\"cx\":24,\"cy\":\"16.0\""));
+    CHECK_THAT(strstr(told, "24 x 16 instead of 48 x 32") && strstr(told, "multiplied by 0.5"), "%s", told);
+    check_lens(20, 20, 12, 8);
+    CHECK(load_copies(PLAIN, "\"w\":97,\"h\":65,\"fl_x\":80,\"fl_y\":81,\"cx\":48,\"cy\":32")); /* rounded down */
+    check_lens(80 * 24 / 97.0, 81 * 16 / 65.0, 48 * 24 / 97.0, 32 * 16 / 65.0);
+    CHECK(load_copies(PLAIN, "\"fl_x\":80,\"cx\":48.5,\"cy\":31.8"));
+    CHECK_THAT(strstr(told, "no w and h") && strstr(told, "4 times"), "%s", told);
+    check_lens(20, 20, 48.5 / 4, 31.8 / 4);
+    CHECK(load_copies(PLAIN, "\"fl_x\":20,\"cx\":11,\"cy\":9") && told[0] == '\0'); /* a usual principal point */
+    CHECK(!load_copies(PLAIN, "\"w\":25,\"h\":16,\"fl_x\":20") && strstr(told, "24 x 16"));
+    CHECK(!load_copies(PLAIN, "\"w\":48,\"h\":36,\"fl_x\":40") && strstr(told, "48 x 36"));
+    CHECK(!load_copies(PLAIN, "\"w\":16,\"h\":24,\"fl_x\":20"));
+    CHECK_THAT(strstr(told, "w and h are exchanged"), "%s", told);
+    CHECK(!load_copies(PLAIN, "\"w\":\"24px\",\"h\":16,\"fl_x\":20") && strstr(told, "\"w\" must be a number"));
+    CHECK(!load_copies(PLAIN, "\"w\":\"0x18\",\"h\":16,\"fl_x\":20") && strstr(told, "\"w\" must be a number"));
+}
+
+/* Two of five may be broken; three may not. */
+static void broken(void) {
+    static const char top[] = "\"w\":24,\"h\":16,\"fl_x\":20";
+    CHECK(load_copies(PLAIN, top));
+    put_copy("1.jpg", PLAIN, 300);
+    put("3.jpg", "<html>404</html>", 16);
+    CHECK_THAT(load(work) && scene.photograph_count == 3, "%s", told);
+    CHECK_THAT(strstr(told, "1.jpg was left out: 1.jpg: damaged JPEG") && strstr(told, "3.jpg was left out"), "%s", told);
+    put("0.jpg", "", 0);
+    CHECK(!load(work));
+    CHECK_THAT(strstr(told, "file: 0.jpg") && strstr(told, "file: 1.jpg") && strstr(told, "file: 3.jpg"), "%s", told);
+}
+
+/* An EXR whose data window is smaller than its picture: what it leaves out is no observation. */
+static void data_window(void) {
+    CHECK(load_copies("tests/data/image/zip.exr", "\"w\":25,\"h\":15,\"fl_x\":20"));
+    const struct photograph *p = &scene.photograph[0];
+    CHECK_THAT(strstr(told, "135 pixels"), "%s", told);
+    CHECK(isnan(image_float_from_half(p->pixel[2 * 25 + 2][0])) && !isnan(image_float_from_half(p->pixel[2 * 25 + 3][0])));
+    CHECK(!load_copies("tests/data/image/zip.exr", "\"w\":20,\"h\":12,\"fl_x\":20"));
+    CHECK_THAT(strstr(told, "data window"), "%s", told);
+}
+
+/* --- the shared captures ---------------------------------------------------------------------- */
+
+static void captures(void) {
+    static const struct {
+        const char *name;
+        bool is_ready;
+        const char *part; /* of what is told; NULL: nothing is */
+    } cases[] = {
+        {"ph_heic", true, NULL},
+        {"ph_heic_named_jpg", true, NULL},
+        {"ph_jpeg_cmyk", true, "it is CMYK"},
+        {"ph_tiff8", true, NULL},
+        {"ph_tiff16", true, "16 bits without a colour profile"},
+        {"ph_webp", true, NULL},
+        {"ph_dng", false, "16-bit linear"},
+        {"png16_linear_gama", true, NULL},
+        {"exr_blender_multilayer", true, NULL},
+        {"exr_lower", true, NULL},
+        {"icc_p3", true, NULL},
+        {"exif_orient_swapped", true, "EXIF orientation"},
+        {"one_corrupt", true, "was left out"},
+        {"ns_downscaled", true, "multiplied by 0.5"},
+        {"ns_downscaled_nowh", true, "no w and h"},
+        {"cm_downscaled", true, "multiplied by 0.5"},
+        {"ns_swapped_wh", false, "w and h are exchanged"},
+        {"ns_string_wh", true, NULL},
+    };
+    if (access(check_data("captures"), R_OK) != 0) {
+        printf("no captures: %s\n", check_data("captures"));
+        return;
+    }
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char path[256];
+        snprintf(path, sizeof path, "captures/%s", cases[i].name);
+        bool is_ready = load(check_data(path));
+        bool is_told = cases[i].part ? strstr(told, cases[i].part) != NULL : told[0] == '\0';
+        CHECK_THAT(is_ready == cases[i].is_ready && is_told, "%s: %s: %s", cases[i].name, is_ready ? "ready" : "refused",
+                   told);
+    }
+}
+
+int main(void) {
+    snprintf(work, sizeof work, "%s/unbake-test-photo-files-%d", access("/dev/shm", W_OK) == 0 ? "/dev/shm" : "/tmp",
+             (int)getpid());
+    pool = parallel_new(2);
+    CHECK(mkdir(work, 0700) == 0);
+    put("mesh.ply", MESH, strlen(MESH));
+    orientations();
+    turned();
+    scaled();
+    broken();
+    data_window();
+    captures();
+    scene_release(&scene);
+    file_remove_tree(work, NULL);
+    parallel_free(pool);
+    return check_result();
+}
