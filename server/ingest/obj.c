@@ -12,6 +12,7 @@
 
 #define MAX_TOKEN 64 /* characters of a number or of a corner of a face */
 #define NONE UINT32_MAX
+#define NO_CORNER "a corner of the face is not written as v, v/vt, v//vn or v/vt/vn"
 /* Below this size there are fewer points than NONE, since each takes a line of 8 bytes, "v 0 0 0". */
 #define MAX_BYTES ((size_t)8 * (NONE - 1))
 
@@ -22,9 +23,11 @@ struct obj_reader {
     const uint8_t *data;
     size_t size, at, line_end; /* `at` is within the line */
     size_t line, next_line;    /* numbers, from 1; a continued line counts as several */
+    uint8_t newline;           /* '\r' in files of old Macintosh programs */
     struct positions position, normal;
     struct faces *faces;
     bool lacks_normals;  /* a corner without normal */
+    size_t absent_count; /* corners that name a normal which the file does not have */
     struct intern pairs; /* position and normal of each vertex of the mesh */
     uint32_t (*pair)[2]; /* [pairs.count]; owned */
     size_t pair_capacity;
@@ -54,13 +57,21 @@ static bool next_line(struct obj_reader *r) {
         return false;
     r->line = r->next_line;
     for (size_t end = r->at;; end++) {
-        const uint8_t *newline = end < r->size ? memchr(r->data + end, '\n', r->size - end) : NULL;
+        const uint8_t *newline = end < r->size ? memchr(r->data + end, r->newline, r->size - end) : NULL;
         r->next_line++;
         end = newline ? (size_t)(newline - r->data) : r->size;
         r->line_end = end;
         if (!newline || !is_continued(r, end))
             return true;
     }
+}
+
+/* Skips a byte order mark and finds how lines end. */
+static void begin_text(struct obj_reader *r) {
+    if (r->size >= 3 && memcmp(r->data, "\xef\xbb\xbf", 3) == 0)
+        r->line_end = 3;
+    bool has_newline = r->size > 0 && memchr(r->data, '\n', r->size);
+    r->newline = has_newline ? '\n' : '\r';
 }
 
 static bool is_blank(uint8_t c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n' || c == '\\'; }
@@ -116,35 +127,42 @@ static uint32_t object_of_face(struct obj_reader *r) {
 /* --- faces ---------------------------------------------------------------------------------- */
 
 /* Converts an index of the file (1 for the first of `count`, -1 for the last) to one from 0. */
-static enum status resolve(const struct obj_reader *r, const char *text, char **end, size_t count, const char *kind,
-                           uint32_t *index) {
+static enum status resolve(const struct obj_reader *r, const char *text, char **end, size_t count, uint32_t *index) {
     long value = strtol(text, end, 10);
     if (*end == text)
-        return line_error(r, "a corner of the face is not written as v, v/vt, v//vn or v/vt/vn");
+        return line_error(r, NO_CORNER);
     if (value == 0 || value > (long)count || value < -(long)count)
         return error_set(r->err, STATUS_INPUT,
-                         "%s, line %zu: the face refers to %s %ld, but there are %zu "
-                         "above it",
-                         r->name, r->line, kind, value, count);
+                         "%s, line %zu: the face refers to vertex %ld, but there are %zu above it", r->name, r->line,
+                         value, count);
     *index = (uint32_t)(value > 0 ? value - 1 : (long)count + value);
     return STATUS_OK;
 }
 
-/* "v", "v/vt", "v//vn", "v/vt/vn": position and normal (or NONE). */
-static enum status read_corner(const struct obj_reader *r, char *token, uint32_t pair[2]) {
+/* An index of a texture coordinate or a normal, which some programs leave away ("1/2/") or write without any to refer
+ * to; NONE then. */
+static uint32_t resolve_spare(const char *text, char **end, size_t count) {
+    long value = strtol(text, end, 10);
+    if (value == 0 || value > (long)count || value < -(long)count)
+        return NONE;
+    return (uint32_t)(value > 0 ? value - 1 : (long)count + value);
+}
+
+/* "v", "v/vt", "v//vn", "v/vt/vn", the last of which may be empty: position and normal (or NONE). */
+static enum status read_corner(struct obj_reader *r, char *token, uint32_t pair[2]) {
     char *end;
     pair[1] = NONE;
-    enum status status = resolve(r, token, &end, r->position.count, "vertex", &pair[0]);
-    if (status != STATUS_OK || *end == '\0')
+    enum status status = resolve(r, token, &end, r->position.count, &pair[0]);
+    if (status != STATUS_OK)
         return status;
-    char *normal = *end == '/' ? strchr(end + 1, '/') : NULL;
-    if (normal)
-        status = resolve(r, normal + 1, &end, r->normal.count, "normal", &pair[1]);
-    else if (*end == '/')
-        strtol(end + 1, &end, 10);
-    if (status == STATUS_OK && *end != '\0')
-        status = line_error(r, "a corner of the face is not written as v, v/vt, v//vn or v/vt/vn");
-    return status;
+    if (*end == '/') /* a texture coordinate */
+        resolve_spare(end + 1, &end, 0);
+    if (*end == '/') {
+        const char *normal = end + 1;
+        pair[1] = resolve_spare(normal, &end, r->normal.count);
+        r->absent_count += pair[1] == NONE && end > normal;
+    }
+    return *end == '\0' ? STATUS_OK : line_error(r, NO_CORNER);
 }
 
 static uint32_t vertex_of(struct obj_reader *r, const uint32_t pair[2]) {
@@ -211,6 +229,10 @@ static enum status read_line(struct obj_reader *r) {
 /* --- the mesh ------------------------------------------------------------------------------- */
 
 static void finish(struct obj_reader *r, struct mesh *mesh) {
+    if (r->absent_count > 0)
+        faces_note(&r->faces->report,
+                   "%zu corners of faces name a normal that is not there: it was read without normals",
+                   r->absent_count);
     struct positions vertices = {.capacity = r->pairs.count};
     memcpy(vertices.offset, r->position.offset, sizeof vertices.offset);
     vertices.at = mem_array(vertices.capacity, sizeof *vertices.at);
@@ -252,6 +274,7 @@ enum status obj_parse(const void *data, size_t size, const char *name, size_t tr
     intern_init(&r->objects);
     for (int i = 0; i < LABEL_COUNT; i++)
         r->label[i] = intern_number(&r->labels, "", 0);
+    begin_text(r);
     enum status status = STATUS_OK;
     while (status == STATUS_OK && next_line(r))
         status = read_line(r);

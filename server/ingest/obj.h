@@ -2,8 +2,9 @@
  * programs write them).
  *
  * Reads v (x y z), vn, f with indices from 1 or negative from the last, and the names of o, g and usemtl; skips
- * texture coordinates, materials, lines, points and curves. A mesh vertex is a pair of position and normal; normals
- * are used if every corner of every face has one. Each combination of object, group and material with faces is an
+ * texture coordinates, materials, lines, points and curves. Lines end in LF, CR LF or CR; a byte order mark is skipped. A
+ * mesh vertex is a pair of position and normal; normals are used if every corner of every face has one that is above it
+ * in the file. Each combination of object, group and material with faces is an
  * object_id, numbered from 0 in order of first use; no object_id if there is only one. */
 #ifndef UNBAKE_INGEST_OBJ_H
 #define UNBAKE_INGEST_OBJ_H

@@ -1,7 +1,7 @@
-/* ply.c -- see ply.h; ply_header.c reads the header, this file the body.
+/* ply.c -- see ply.h; ply_header.c reads the header, ply_values.c numbers, this file
+ * elements.
  *
- * The file is read in place. Counts in the header are checked against the file's size before memory is allocated. An
- * ASCII record is one line; extra values are ignored, missing ones are an error. */
+ * The file is read in place. Counts in the header are checked against the file's size before memory is allocated. */
 #include "server/ingest/ply.h"
 
 #include <inttypes.h>
@@ -10,182 +10,44 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 #include "common/mem.h"
 #include "server/ingest/mapping.h"
-#include "server/ingest/ply_header.h"
+#include "server/ingest/ply_values.h"
 #include "server/ingest/positions.h"
 
-#define MAX_TOKEN 64 /* characters of a number */
-
 struct ply_reader {
-    struct ply_cursor cursor;
-    struct ply_header header;
-    const char *element; /* element being read, for messages */
-    uint64_t record;
+    struct ply_values in;
     struct positions position;
     struct error *err;
 };
 
-/* --- values ------------------------------------------------------------------------------ */
-
-static enum status value_error(struct ply_reader *r, const char *what) {
-    bool ascii = r->header.format == PLY_ASCII;
-    return error_set(r->err, STATUS_INPUT, "%s, %s %zu: %s %" PRIu64 " %s", r->cursor.name, ascii ? "line" : "byte",
-                     ascii ? r->cursor.line : r->cursor.at, r->element, r->record, what);
-}
-
-static uint64_t load(const uint8_t *at, size_t bytes, bool big) {
-    uint64_t bits = 0;
-    for (size_t i = 0; i < bytes; i++)
-        bits |= (uint64_t)at[big ? bytes - 1 - i : i] << (8 * i);
-    return bits;
-}
-
-static enum status read_binary(struct ply_reader *r, enum ply_type type, double *value) {
-    size_t bytes = ply_type_bytes(type);
-    if (r->cursor.size - r->cursor.at < bytes)
-        return value_error(r, "is cut off: the file ends there");
-    uint64_t bits = load(r->cursor.data + r->cursor.at, bytes, r->header.format == PLY_BIG_ENDIAN);
-    r->cursor.at += bytes;
-    float single;
-    uint32_t low = (uint32_t)bits;
-    switch (type) {
-    case PLY_INT8: *value = (int8_t)bits; break;
-    case PLY_INT16: *value = (int16_t)bits; break;
-    case PLY_INT32: *value = (int32_t)low; break;
-    case PLY_UINT8:
-    case PLY_UINT16:
-    case PLY_UINT32: *value = low; break;
-    case PLY_FLOAT32:
-        memcpy(&single, &low, sizeof single);
-        *value = (double)single;
-        break;
-    case PLY_FLOAT64: memcpy(value, &bits, sizeof *value); break;
-    }
-    return STATUS_OK;
-}
-
-static bool is_blank(uint8_t c) { return c == ' ' || c == '\t' || c == '\r'; }
-
-static enum status read_ascii(struct ply_reader *r, double *value) {
-    while (r->cursor.at < r->cursor.line_end && is_blank(r->cursor.data[r->cursor.at]))
-        r->cursor.at++;
-    if (r->cursor.at >= r->cursor.line_end)
-        return value_error(r, "has fewer values than the header says");
-    char token[MAX_TOKEN];
-    size_t length = 0;
-    while (r->cursor.at < r->cursor.line_end && !is_blank(r->cursor.data[r->cursor.at])) {
-        if (length + 1 == sizeof token)
-            return value_error(r, "has a value that is not a number");
-        token[length++] = (char)r->cursor.data[r->cursor.at++];
-    }
-    token[length] = '\0';
-    char *end;
-    *value = strtod(token, &end);
-    if (end != token + length || strpbrk(token, "xX("))
-        return value_error(r, "has a value that is not a number");
-    return STATUS_OK;
-}
-
-static enum status read_value(struct ply_reader *r, enum ply_type type, double *value) {
-    return r->header.format == PLY_ASCII ? read_ascii(r, value) : read_binary(r, type, value);
-}
-
-static enum status read_list_count(struct ply_reader *r, const struct ply_property *p, uint64_t *count) {
-    double value;
-    enum status status = read_value(r, p->count_type, &value);
-    if (status != STATUS_OK)
-        return status;
-    if (!(value >= 0.0 && value <= UINT32_MAX) || value != floor(value))
-        return value_error(r, "has a list of impossible length");
-    *count = (uint64_t)value;
-    return STATUS_OK;
-}
-
-static enum status skip_property(struct ply_reader *r, const struct ply_property *p) {
-    uint64_t count = 1;
-    double ignored;
-    if (p->is_list) {
-        enum status status = read_list_count(r, p, &count);
-        if (status != STATUS_OK)
-            return status;
-    }
-    if (r->header.format != PLY_ASCII) {
-        if ((r->cursor.size - r->cursor.at) / ply_type_bytes(p->type) < count)
-            return value_error(r, "is cut off: the file ends there");
-        r->cursor.at += (size_t)count * ply_type_bytes(p->type);
-        return STATUS_OK;
-    }
-    for (uint64_t i = 0; i < count; i++) {
-        enum status status = read_ascii(r, &ignored);
-        if (status != STATUS_OK)
-            return status;
-    }
-    return STATUS_OK;
-}
-
-/* Moves to the first value of the next record; in ASCII, skips blank lines. */
-static enum status begin_record(struct ply_reader *r, uint64_t record) {
-    r->record = record;
-    if (r->header.format != PLY_ASCII)
-        return STATUS_OK;
-    const uint8_t *line;
-    size_t length;
-    do {
-        if (!ply_next_line(&r->cursor, &line, &length))
-            return value_error(r, "is missing: the file ends there");
-        while (length > 0 && is_blank(line[0])) {
-            line++;
-            length--;
-        }
-    } while (length == 0);
-    r->cursor.at = (size_t)(line - r->cursor.data);
-    return STATUS_OK;
-}
-
-static void end_record(struct ply_reader *r) {
-    if (r->header.format == PLY_ASCII)
-        r->cursor.at = r->cursor.line_end < r->cursor.size ? r->cursor.line_end + 1 : r->cursor.size;
-}
-
-/* Checks that the rest of the file is large enough for the element's records. */
-static enum status begin_element(struct ply_reader *r, const struct ply_element *e) {
-    r->element = e->name;
-    uint64_t least = 0;
-    for (size_t i = 0; i < e->property_count; i++) {
-        const struct ply_property *p = &r->header.property[e->first + i];
-        /* A character and a separator per ASCII value; an empty list still has its length. */
-        enum ply_type first = p->is_list ? p->count_type : p->type;
-        least += r->header.format == PLY_ASCII ? 2 : ply_type_bytes(first);
-    }
-    uint64_t rest = r->cursor.size - r->cursor.at + 1; /* the last line may lack its newline */
-    if (least > 0 && e->count > rest / least)
-        return error_set(r->err, STATUS_INPUT,
-                         "%s: the header promises %" PRIu64 " of element %s, but the %" PRIu64
-                         " bytes that are left hold at most %" PRIu64,
-                         r->cursor.name, e->count, e->name, rest - 1, rest / least);
-    return STATUS_OK;
-}
-
 /* --- elements ---------------------------------------------------------------------------- */
 
+/* The property of that name; else one of that name in other letters of it. */
 static size_t find_property(const struct ply_reader *r, const struct ply_element *e, const char *name) {
-    for (size_t i = 0; i < e->property_count; i++)
-        if (strcmp(r->header.property[e->first + i].name, name) == 0)
+    size_t found = SIZE_MAX;
+    for (size_t i = 0; i < e->property_count; i++) {
+        const char *own = r->in.header.property[e->first + i].name;
+        if (strcmp(own, name) == 0)
             return i;
-    return SIZE_MAX;
+        if (found == SIZE_MAX && strcasecmp(own, name) == 0)
+            found = i;
+    }
+    return found;
 }
 
 static enum status skip_element(struct ply_reader *r, const struct ply_element *e) {
-    enum status status = begin_element(r, e);
+    enum status status = ply_begin_element(&r->in, e);
     if (e->property_count == 0)
         return status;
     for (uint64_t i = 0; status == STATUS_OK && i < e->count; i++) {
-        status = begin_record(r, i);
+        status = ply_begin_record(&r->in, i);
         for (size_t k = 0; status == STATUS_OK && k < e->property_count; k++)
-            status = skip_property(r, &r->header.property[e->first + k]);
-        end_record(r);
+            status = ply_skip_property(&r->in, &r->in.header.property[e->first + k]);
+        if (status == STATUS_OK)
+            status = ply_end_record(&r->in);
     }
     return status;
 }
@@ -197,35 +59,39 @@ static enum status read_vertices(struct ply_reader *r, const struct ply_element 
     bool has_normal = true, is_single[6] = {false};
     for (int i = 0; i < 6; i++) {
         size_t k = find_property(r, e, wanted[i]);
-        bool usable = k != SIZE_MAX && !r->header.property[e->first + k].is_list;
+        bool usable = k != SIZE_MAX && !r->in.header.property[e->first + k].is_list;
         if (usable) {
             target[k] = (signed char)i;
-            is_single[i] = r->header.format != PLY_ASCII && r->header.property[e->first + k].type == PLY_FLOAT32;
+            is_single[i] = r->in.header.format != PLY_ASCII && r->in.header.property[e->first + k].type == PLY_FLOAT32;
         } else if (i < 3) {
-            return error_set(r->err, STATUS_INPUT, "%s: its vertices have no property %s", r->cursor.name, wanted[i]);
+            return error_set(r->err, STATUS_INPUT, "%s: its vertices have no property %s", r->in.cursor.name,
+                             wanted[i]);
         } else {
             has_normal = false;
         }
     }
-    enum status status = begin_element(r, e);
+    enum status status = ply_begin_element(&r->in, e);
     if (status != STATUS_OK)
         return status;
     if (e->count >= UINT32_MAX)
-        return error_set(r->err, STATUS_LIMIT, "%s has %" PRIu64 " vertices, more than fit", r->cursor.name, e->count);
+        return error_set(r->err, STATUS_LIMIT, "%s has %" PRIu64 " vertices, more than fit", r->in.cursor.name,
+                         e->count);
     mesh->vertex_count = r->position.capacity = (size_t)e->count;
     r->position.at = mem_array(mesh->vertex_count, sizeof *r->position.at);
     if (has_normal)
         mesh->normal = mem_array(mesh->vertex_count, sizeof *mesh->normal);
     for (size_t i = 0; i < mesh->vertex_count; i++) {
         double v[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
-        status = begin_record(r, i);
+        status = ply_begin_record(&r->in, i);
         for (size_t k = 0; status == STATUS_OK && k < e->property_count; k++) {
-            const struct ply_property *p = &r->header.property[e->first + k];
-            status = target[k] >= 0 ? read_value(r, p->type, &v[(int)target[k]]) : skip_property(r, p);
+            const struct ply_property *p = &r->in.header.property[e->first + k];
+            status =
+                target[k] >= 0 ? ply_read_value(&r->in, p->type, &v[(int)target[k]]) : ply_skip_property(&r->in, p);
         }
+        if (status == STATUS_OK)
+            status = ply_end_record(&r->in);
         if (status != STATUS_OK)
             return status;
-        end_record(r);
         positions_append(&r->position, v);
         for (int k = 0; k < 3; k++)
             r->position.single = is_single[k] ? fmax(r->position.single, fabs(v[k])) : r->position.single;
@@ -235,41 +101,57 @@ static enum status read_vertices(struct ply_reader *r, const struct ply_element 
     return STATUS_OK;
 }
 
+static enum status check_vertex(struct ply_reader *r, const struct faces *faces, double value) {
+    size_t count = faces->mesh->vertex_count;
+    char what[128];
+    if (value >= 0.0 && value < (double)count && value == floor(value))
+        return STATUS_OK;
+    snprintf(what, sizeof what, "refers to vertex %.15g, but vertices run from 0 to %zu", value, count - 1);
+    return ply_value_error(&r->in, count > 0 ? what : "refers to a vertex of none");
+}
+
+static void set_corner(const struct ply_reader *r, struct faces *faces, size_t corner, double vertex) {
+    faces->corner[corner] = (uint32_t)vertex;
+    memcpy(faces->position[corner], r->position.at[faces->corner[corner]], sizeof faces->position[corner]);
+}
+
 static enum status read_corners(struct ply_reader *r, const struct ply_property *p, struct faces *faces) {
     uint64_t count;
-    enum status status = read_list_count(r, p, &count);
+    enum status status = ply_read_list_count(&r->in, p, &count);
     if (status == STATUS_OK && count > POLYGON_MAX_CORNERS)
-        return value_error(r, "has more than 1024 corners");
+        return ply_value_error(&r->in, "has more than 1024 corners");
     for (uint64_t i = 0; status == STATUS_OK && i < count; i++) {
         double value;
-        status = read_value(r, p->type, &value);
-        if (status != STATUS_OK)
-            break;
-        if (!(value >= 0.0 && value < (double)faces->mesh->vertex_count) || value != floor(value)) {
-            char what[128];
-            snprintf(what, sizeof what, "refers to vertex %.15g, but vertices run from 0 to %zu", value,
-                     faces->mesh->vertex_count - 1);
-            return value_error(r, faces->mesh->vertex_count > 0 ? what : "refers to a vertex of none");
-        }
-        faces->corner[i] = (uint32_t)value;
-        memcpy(faces->position[i], r->position.at[faces->corner[i]], sizeof faces->position[i]);
+        status = ply_read_value(&r->in, p->type, &value);
+        if (status == STATUS_OK)
+            status = check_vertex(r, faces, value);
+        if (status == STATUS_OK)
+            set_corner(r, faces, (size_t)i, value);
     }
     faces->corner_count = (size_t)count;
     return status;
 }
 
-static enum status find_face_properties(struct ply_reader *r, const struct ply_element *e, size_t *list, size_t *id) {
+static enum status find_indices(struct ply_reader *r, const struct ply_element *e, size_t *list) {
     *list = find_property(r, e, "vertex_indices");
     if (*list == SIZE_MAX)
         *list = find_property(r, e, "vertex_index");
-    if (*list == SIZE_MAX || !r->header.property[e->first + *list].is_list ||
-        r->header.property[e->first + *list].type >= PLY_FLOAT32)
-        return error_set(r->err, STATUS_INPUT, "%s: its faces have no list vertex_indices of an integer type",
-                         r->cursor.name);
+    if (*list == SIZE_MAX || !r->in.header.property[e->first + *list].is_list ||
+        r->in.header.property[e->first + *list].type >= PLY_FLOAT32)
+        return error_set(r->err, STATUS_INPUT, "%s: its %ss have no list vertex_indices of an integer type",
+                         r->in.cursor.name, strcasecmp(e->name, "face") == 0 ? "face" : "strip");
+    return STATUS_OK;
+}
+
+static enum status find_face_properties(struct ply_reader *r, const struct ply_element *e, size_t *list, size_t *id) {
+    enum status status = find_indices(r, e, list);
+    if (status != STATUS_OK)
+        return status;
     *id = find_property(r, e, "object_id");
-    const struct ply_property *p = *id != SIZE_MAX ? &r->header.property[e->first + *id] : NULL;
+    const struct ply_property *p = *id != SIZE_MAX ? &r->in.header.property[e->first + *id] : NULL;
     if (p && (p->is_list || p->type >= PLY_FLOAT32))
-        return error_set(r->err, STATUS_INPUT, "%s: the faces' object_id must be one integer per face", r->cursor.name);
+        return error_set(r->err, STATUS_INPUT, "%s: the faces' object_id must be one integer per face",
+                         r->in.cursor.name);
     return STATUS_OK;
 }
 
@@ -277,32 +159,33 @@ static enum status read_faces(struct ply_reader *r, const struct ply_element *e,
     size_t list = SIZE_MAX, id = SIZE_MAX;
     enum status status = find_face_properties(r, e, &list, &id);
     if (status == STATUS_OK)
-        status = begin_element(r, e);
+        status = ply_begin_element(&r->in, e);
     if (status != STATUS_OK)
         return status;
     if (e->count > faces->limit)
-        return error_set(r->err, STATUS_LIMIT, "%s has %" PRIu64 " faces, more than the limit of %zu", r->cursor.name,
-                         e->count, faces->limit);
+        return error_set(r->err, STATUS_LIMIT, "%s has %" PRIu64 " faces, more than the limit of %zu",
+                         r->in.cursor.name, e->count, faces->limit);
     faces->has_object_id = id != SIZE_MAX;
     faces_reserve(faces, (size_t)e->count);
     for (size_t i = 0; i < e->count; i++) {
         double object_id = 0.0;
-        status = begin_record(r, i);
+        status = ply_begin_record(&r->in, i);
         for (size_t k = 0; status == STATUS_OK && k < e->property_count; k++) {
-            const struct ply_property *p = &r->header.property[e->first + k];
+            const struct ply_property *p = &r->in.header.property[e->first + k];
             if (k == list)
                 status = read_corners(r, p, faces);
             else if (k == id)
-                status = read_value(r, p->type, &object_id);
+                status = ply_read_value(&r->in, p->type, &object_id);
             else
-                status = skip_property(r, p);
+                status = ply_skip_property(&r->in, p);
         }
+        if (status == STATUS_OK)
+            status = ply_end_record(&r->in);
         if (status != STATUS_OK)
             return status;
-        end_record(r);
         /* ASCII values are unbounded, and the conversion would be undefined out of range */
         if (!(fabs(object_id) < 0x1p53) || object_id != floor(object_id))
-            return value_error(r, "has an object_id that is no integer");
+            return ply_value_error(&r->in, "has an object_id that is no integer");
         status = faces_add(faces, (int64_t)object_id, r->err);
         if (status != STATUS_OK)
             return status;
@@ -310,43 +193,92 @@ static enum status read_faces(struct ply_reader *r, const struct ply_element *e,
     return STATUS_OK;
 }
 
+/* Triangles of a strip: each index makes one with the two before it, turned in every second; -1 starts anew. A
+ * triangle with a vertex twice only leads to the next. */
+static enum status read_strip(struct ply_reader *r, const struct ply_property *p, struct faces *faces) {
+    uint64_t count;
+    double before[2] = {-1.0, -1.0};
+    bool turned = false;
+    enum status status = ply_read_list_count(&r->in, p, &count);
+    for (uint64_t i = 0; status == STATUS_OK && i < count; i++) {
+        double value;
+        status = ply_read_value(&r->in, p->type, &value);
+        if (status == STATUS_OK && value != -1.0)
+            status = check_vertex(r, faces, value);
+        if (status != STATUS_OK)
+            break;
+        bool leads = before[0] < 0.0 || before[1] < 0.0;
+        if (!leads && value >= 0.0 && value != before[0] && value != before[1] && before[0] != before[1]) {
+            const double corner[3] = {before[turned], before[!turned], value};
+            faces->corner_count = 3;
+            for (int k = 0; k < 3; k++)
+                set_corner(r, faces, (size_t)k, corner[k]);
+            status = faces_add(faces, 0, r->err);
+        }
+        turned = !leads && value >= 0.0 && !turned;
+        before[0] = value < 0.0 ? -1.0 : before[1];
+        before[1] = value;
+    }
+    return status;
+}
+
+static enum status read_strips(struct ply_reader *r, const struct ply_element *e, struct faces *faces) {
+    size_t list = SIZE_MAX;
+    enum status status = find_indices(r, e, &list);
+    if (status == STATUS_OK)
+        status = ply_begin_element(&r->in, e);
+    for (uint64_t i = 0; i < e->count && status == STATUS_OK; i++) {
+        status = ply_begin_record(&r->in, i);
+        for (size_t k = 0; status == STATUS_OK && k < e->property_count; k++) {
+            const struct ply_property *p = &r->in.header.property[e->first + k];
+            status = k == list ? read_strip(r, p, faces) : ply_skip_property(&r->in, p);
+        }
+        if (status == STATUS_OK)
+            status = ply_end_record(&r->in);
+    }
+    return status;
+}
+
+static enum status read_surface(struct ply_reader *r, const struct ply_element *e, struct faces *faces) {
+    return strcasecmp(e->name, "face") == 0 ? read_faces(r, e, faces) : read_strips(r, e, faces);
+}
+
+/* The element with the surface: faces or, in files without, triangle strips; NULL: none. */
+static const struct ply_element *find_surface(const struct ply_header *header) {
+    const struct ply_element *face = ply_find_element(header, "face");
+    const struct ply_element *strips = ply_find_element(header, "tristrips");
+    return strips && (!face || face->count == 0) ? strips : face;
+}
+
 static enum status read_body(struct ply_reader *r, struct faces *faces) {
-    bool has_vertices = false, has_faces = false;
-    const struct ply_element *later = NULL; /* faces that precede the vertices */
-    size_t later_at = 0, later_line = 0;
-    for (size_t i = 0; i < r->header.element_count; i++) {
-        const struct ply_element *e = &r->header.element[i];
+    bool has_vertices = false;
+    const struct ply_element *surface = find_surface(&r->in.header);
+    struct ply_cursor surface_at = {0}; /* of a surface that precedes the vertices */
+    for (size_t i = 0; i < r->in.header.element_count; i++) {
+        const struct ply_element *e = &r->in.header.element[i];
         enum status status;
-        if (!has_vertices && strcmp(e->name, "vertex") == 0) {
+        if (!has_vertices && strcasecmp(e->name, "vertex") == 0) {
             has_vertices = true;
             status = read_vertices(r, e, faces->mesh);
-        } else if (!has_faces && strcmp(e->name, "face") == 0) {
-            has_faces = true;
-            if (has_vertices) {
-                status = read_faces(r, e, faces);
-            } else {
-                later = e;
-                later_at = r->cursor.at;
-                later_line = r->cursor.line;
-                status = skip_element(r, e);
-            }
+        } else if (e == surface && has_vertices) {
+            status = read_surface(r, e, faces);
         } else {
+            if (e == surface)
+                surface_at = r->in.cursor;
             status = skip_element(r, e);
         }
         if (status != STATUS_OK)
             return status;
     }
-    if (!has_vertices || !has_faces) {
-        error_set(r->err, STATUS_INPUT, "%s has no %s: it has no \"element %s\"", r->cursor.name,
+    if (!has_vertices || !surface) {
+        error_set(r->err, STATUS_INPUT, "%s has no %s: it has no \"element %s\"", r->in.cursor.name,
                   has_vertices ? "faces" : "vertices", has_vertices ? "face" : "vertex");
-        return error_hint(r->err, "a mesh of triangles or polygons is needed, not a point cloud or "
-                                  "triangle strips");
+        return error_hint(r->err, "a mesh of triangles or polygons is needed, not a point cloud");
     }
-    if (!later)
+    if (!surface_at.data)
         return STATUS_OK;
-    r->cursor.at = later_at;
-    r->cursor.line = later_line;
-    return read_faces(r, later, faces);
+    r->in.cursor = surface_at;
+    return read_surface(r, surface, faces);
 }
 
 enum status ply_parse(const void *data, size_t size, const char *name, size_t triangle_limit, struct mesh *mesh,
@@ -354,10 +286,10 @@ enum status ply_parse(const void *data, size_t size, const char *name, size_t tr
     *mesh = (struct mesh){0};
     struct ply_reader *r = mem_calloc(1, sizeof *r);
     struct faces *faces = faces_new(mesh, name, triangle_limit, false);
-    r->cursor = (struct ply_cursor){.name = name, .data = data, .size = size};
-    r->err = err;
-    enum status status = ply_header_parse(&r->cursor, &r->header, err);
-    memcpy(r->position.offset, r->header.offset, sizeof r->position.offset);
+    r->in.cursor = (struct ply_cursor){.name = name, .data = data, .size = size};
+    r->err = r->in.err = err;
+    enum status status = ply_header_parse(&r->in.cursor, &r->in.header, err);
+    memcpy(r->position.offset, r->in.header.offset, sizeof r->position.offset);
     if (status == STATUS_OK)
         status = read_body(r, faces);
     faces->report.step_m = positions_step(r->position.single);
@@ -394,8 +326,8 @@ enum status ply_count_faces(const char *path, const char *name, uint64_t *count,
     struct ply_header *header = mem_alloc(sizeof *header);
     struct ply_cursor cursor = {.name = name, .data = file.data, .size = file.size};
     status = ply_header_parse(&cursor, header, err);
-    const struct ply_element *face = status == STATUS_OK ? ply_find_element(header, "face") : NULL;
-    *count = face ? face->count : 0;
+    const struct ply_element *surface = status == STATUS_OK ? find_surface(header) : NULL;
+    *count = surface ? surface->count : 0;
     mem_free(header);
     mapping_close(&file);
     return status;

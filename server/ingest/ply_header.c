@@ -5,6 +5,7 @@
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 #include "server/ingest/positions.h"
 
@@ -44,14 +45,14 @@ size_t ply_type_bytes(enum ply_type type) { return type_table[type].bytes; }
 
 const struct ply_element *ply_find_element(const struct ply_header *header, const char *name) {
     for (size_t i = 0; i < header->element_count; i++)
-        if (strcmp(header->element[i].name, name) == 0)
+        if (strcasecmp(header->element[i].name, name) == 0)
             return &header->element[i];
     return NULL;
 }
 
 static bool parse_type(const char *word, enum ply_type *type) {
     for (size_t i = 0; i < sizeof type_table / sizeof *type_table; i++) {
-        if (strcmp(word, type_table[i].name) == 0 || strcmp(word, type_table[i].alias) == 0) {
+        if (strcasecmp(word, type_table[i].name) == 0 || strcasecmp(word, type_table[i].alias) == 0) {
             *type = (enum ply_type)i;
             return true;
         }

@@ -55,7 +55,7 @@ enum status ply_header_parse(struct ply_cursor *c, struct ply_header *header, st
 /* Moves to the next line and returns it without its newline; false at the end of the file. */
 bool ply_next_line(struct ply_cursor *c, const uint8_t **line, size_t *length);
 
-/* The element of that name; NULL when there is none. */
+/* The first element of that name, in capitals or not; NULL when there is none. */
 const struct ply_element *ply_find_element(const struct ply_header *header, const char *name);
 size_t ply_type_bytes(enum ply_type type);
 

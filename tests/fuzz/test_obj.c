@@ -19,4 +19,6 @@ void fuzz_seeds(struct seeds *s) {
     seeds_data(s, "vectors/assimp/OBJ", ".obj");
     seeds_text(s, "# x\r\nmtllib a.mtl\no a b\nv 0 0 0\nv 1 0 0 1\nv 1 1 0 .5 .5 .5\nv 0 \\\n1e0 0\nvt 0 0\nvn 0 0 1\n"
                   "usemtl m\ng g h\nf 1/1/1 2/1/1 3//1 -1//-1\nf 1 2 3\ns off\nl 1 2\n");
+    seeds_text(s,
+               "\xef\xbb\xbf# unbake offset 1e6 0 -1\rv 0 0 0\rv 900 1000.5 0\rv 900 1001 \\\r0\rf 1/1/ 2//9 -1//\r");
 }

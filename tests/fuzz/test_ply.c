@@ -54,6 +54,9 @@ void fuzz_seeds(struct seeds *s) {
     seeds_data(s, "vectors/assimp/PLY", "");
     seeds_data(s, "conformance/room.ply", "");
     seeds_text(s, text);
+    seeds_text(s, "ply\nformat ascii 1.0\ncomment unbake offset 1e6 2 3\nelement Vertex 5\nproperty double X\n"
+                  "property double Y\nproperty double z\nelement tristrips 1\nproperty list int int vertex_indices\n"
+                  "end_header\n0 0\n0\n4100000.5 0 0\n4100001 2 0\n1e7 1 1\nnan 0 0\n7 0 1 2\n -1 1 2 3\n");
     add_binary(s, false);
     add_binary(s, true);
 }

@@ -20,7 +20,7 @@ static void test_taken(void) {
                      "f 1/1 2/2 3/1 4/2\nf -3/1/ 6 7\\\n 8 # end\nf 1 2\nf 1/2 2/2 6/1 \\\r\n5/1 4/1",
                      &mesh, &report, &err) == STATUS_INPUT,
                "%s", err.message);
-    CHECK_STRING(err.message, "room.obj, line 18: a corner of the face is not written as v, v/vt, v//vn or v/vt/vn");
+    CHECK_STRING(err.message, "room.obj, line 18: the face refers to vertex 8, but there are 7 above it");
     CHECK_THAT(parse("# made by hand\r\nmtllib a.mtl\r\n\r\n  v 0 0 0 1\r\nv 1 0 0 .5 .5 .5\nv 1 1 0\nv 0 \\\n 1 0\n"
                      "v 0 0 1\nv 1e0 +0 1\nv 1 1 1\nvt 0 0\nvt 1 1\nl 1 2\np 1\ns off\n"
                      "f 1/1 2/2 3/1 4/2\nf -3 6 7\\\n # end\nf 1 2\nf 1/2 2/2 6/1 \\\r\n5/1 4/1",
@@ -47,6 +47,29 @@ static void test_normals(void) {
     mesh_release(&mesh);
     CHECK(parse(SQUARE "vn 0 0 1\nf 1//1 2//1 3//1\nf 1//1 3 4//1\n", &mesh, NULL, &err) == STATUS_OK);
     CHECK(mesh.triangle_count == 2 && !mesh.normal);
+    mesh_release(&mesh);
+}
+
+/* What others leave away or write without anything to refer to; old and new marks around the lines. */
+static void test_careless(void) {
+    struct mesh mesh;
+    struct faces_report report;
+    struct error err = {.message = ""};
+    CHECK(parse(SQUARE "vt 0 0\nvn 0 0 1\nf 1/1/ 2/1/ 3/1/\nf 1// 3/ 4/9\n", &mesh, &report, &err) == STATUS_OK);
+    CHECK(mesh.triangle_count == 2 && !mesh.normal && report.note_count == 0);
+    mesh_release(&mesh);
+    CHECK(parse(SQUARE "f 1//1 2//-3 3/7/0\nvn 0 0 1\nf 1//1 3//1 4//1\n", &mesh, &report, &err) == STATUS_OK);
+    CHECK(mesh.triangle_count == 2 && !mesh.normal && report.note_count == 1);
+    CHECK_STRING(report.note[0], "3 corners of faces name a normal that is not there: it was read without normals");
+    mesh_release(&mesh);
+    CHECK(parse("\xef\xbb\xbfv 5 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n", &mesh, &report, &err) == STATUS_OK);
+    CHECK(mesh.triangle_count == 1 && mesh.position[0].x == 5.0f);
+    mesh_release(&mesh);
+    CHECK(parse("# old\rv 0 0 0\rv 1 0 0\rv 1 \\\r1 0\r\ro a b\rf 1 2 3\rf 1 2 4\r", &mesh, &report, &err) ==
+          STATUS_INPUT);
+    CHECK_STRING(err.message, "room.obj, line 9: the face refers to vertex 4, but there are 3 above it");
+    CHECK(parse("# old\rv 0 0 0\rv 1 0 0\rv 1 \\\r1 0\rf -3 -2 -1", &mesh, &report, &err) == STATUS_OK);
+    CHECK(mesh.triangle_count == 1 && mesh.position[2].y == 1.0f);
     mesh_release(&mesh);
 }
 
@@ -87,7 +110,6 @@ static void test_refused(void) {
     refused(SQUARE "f 1 2 0\n", "vertex 0");
     refused(SQUARE "f 1 -5 2\n", "vertex -5");
     refused(SQUARE "f 1 2 99999999999999999999999\n", "vertex 9223372036854775807");
-    refused(SQUARE "f 1//1 2//1 3//1\n", "refers to normal 1, but there are 0 above it");
     refused(SQUARE "f 1/a 2 3\n", "line 5: a corner");
     refused(SQUARE "f 1 2 3/1/1/1\n", "line 5");
     refused(SQUARE "f a b c\n", "line 5: a corner");
@@ -174,6 +196,7 @@ static void test_intern(void) {
 int main(void) {
     test_taken();
     test_normals();
+    test_careless();
     test_objects();
     test_refused();
     test_limits();
