@@ -11,6 +11,7 @@
 #include "server/capture/fireflies.h"
 #include "server/capture/orient.h"
 #include "server/capture/radiance_preview.h"
+#include "server/capture/seen_share.h"
 #include "server/capture/texel_density.h"
 #include "server/capture/views.h"
 #include "server/light/lamp_find.h"
@@ -247,6 +248,13 @@ static enum status check_segment_settings(const struct reconstruction *r, struct
     return STATUS_OK;
 }
 
+/* Ends a job that could measure next to nothing before it takes minutes. */
+static enum status require_seen_surface(struct stage_run *run, struct error *err) {
+    struct seen_share share = seen_share_measure(&run->views, run->r->pool);
+    json_add_number(run->r->report, "seen_surface_share", share.surface);
+    return seen_share_require(&share, settings_is(run->r->settings, "fit", "ignore"), err);
+}
+
 static enum status prepare(struct stage_run *run, struct error *err) {
     struct reconstruction *r = run->r;
     const struct mesh *mesh = &r->scene->mesh;
@@ -265,7 +273,9 @@ static enum status prepare(struct stage_run *run, struct error *err) {
     prepare_advance(run, MAP_SHARE);
     views_init(&run->views, r->scene, &r->segments, r->world.accel, r->pool);
     prepare_advance(run, VIEWS_SHARE);
-    status = show_radiance(run, err);
+    status = require_seen_surface(run, err);
+    if (status == STATUS_OK)
+        status = show_radiance(run, err);
     if (status != STATUS_OK)
         return status;
     calibrate(r, &run->views, run->hooks);

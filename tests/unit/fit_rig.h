@@ -62,6 +62,15 @@ static inline struct mesh fit_mesh(void) {
     return m;
 }
 
+/* Turns the room's own triangles, the first 12, so that their front is inside; those of the boxes are outside. */
+static inline void fit_turn_inside(struct mesh *m) {
+    for (size_t t = 0; t < 12; t++) {
+        uint32_t second = m->index[t][1];
+        m->index[t][1] = m->index[t][2];
+        m->index[t][2] = second;
+    }
+}
+
 /* A camera at `origin` that looks along `forward`; z is up. */
 static inline void fit_point_camera(struct camera *camera, vec3 origin, vec3 forward) {
     vec3 z = vec3_normalize(forward), x = vec3_normalize(vec3_cross(z, vec3_make(0.0f, 0.0f, 1.0f)));
