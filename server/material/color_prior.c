@@ -5,6 +5,7 @@
 
 #include "common/image.h"
 #include "common/mem.h"
+#include "server/scene/materials.h"
 #include "server/scene/surface.h"
 
 /* Variance by light of other surfaces (measured.mixing) at which a texel has half its weight. Small: a few clean texels
@@ -76,15 +77,16 @@ static struct chart_evidence *grids_cell(const struct grids *g, int level, vec3 
     return &g->cell[level][index];
 }
 
-static bool is_known(const struct reconstruction *r, const struct measured *measured, uint32_t texel) {
-    return measured[texel].weight > 0.0f && !r->is_emitter[reconstruction_segment(r, texel)];
+static bool is_known(const struct surface *s, const bool *is_emitter, const struct measured *measured, uint32_t texel) {
+    return measured[texel].weight > 0.0f && !is_emitter[surface_segment(s, texel)];
 }
 
-static void grids_fill(struct grids *g, const struct reconstruction *r, const struct measured *measured) {
-    for (size_t i = 0; i < r->inverse.valid_count; i += STRIDE) {
-        uint32_t texel = r->inverse.valid[i];
+static void grids_fill(struct grids *g, const struct surface *s, const bool *is_emitter,
+                       const struct measured *measured) {
+    for (size_t i = 0; i < s->inverse->valid_count; i += STRIDE) {
+        uint32_t texel = s->inverse->valid[i];
         struct surface_point at;
-        if (!is_known(r, measured, texel) || !surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at))
+        if (!is_known(s, is_emitter, measured, texel) || !surface_at_texel(s->mesh, s->atlas, s->inverse, texel, &at))
             continue;
         for (int k = 0; k < LEVELS; k++)
             evidence_add(grids_cell(g, k, at.position), &measured[texel]);
@@ -92,12 +94,12 @@ static void grids_fill(struct grids *g, const struct reconstruction *r, const st
 }
 
 /* Means over the surroundings of each chart's texels, each from the finest grid that has enough measurements there. */
-static struct chart_evidence *around_charts(const struct reconstruction *r, const struct grids *g) {
-    struct chart_evidence *around = mem_calloc(r->atlas.chart_count, sizeof *around);
-    for (size_t i = 0; i < r->inverse.valid_count; i += STRIDE) {
-        uint32_t texel = r->inverse.valid[i];
+static struct chart_evidence *around_charts(const struct surface *s, const struct grids *g) {
+    struct chart_evidence *around = mem_calloc(s->atlas->chart_count, sizeof *around);
+    for (size_t i = 0; i < s->inverse->valid_count; i += STRIDE) {
+        uint32_t texel = s->inverse->valid[i];
         struct surface_point at;
-        if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at))
+        if (!surface_at_texel(s->mesh, s->atlas, s->inverse, texel, &at))
             continue;
         int level = LEVELS - 1;
         while (level > 0 && !(grids_cell(g, level, at.position)->weight > MIN_WEIGHT))
@@ -105,7 +107,7 @@ static struct chart_evidence *around_charts(const struct reconstruction *r, cons
         const struct chart_evidence *cell = grids_cell(g, level, at.position);
         if (!(cell->weight > 0.0))
             continue;
-        struct chart_evidence *to = &around[r->atlas.chart_of_triangle[r->inverse.triangle[texel]]];
+        struct chart_evidence *to = &around[surface_chart(s, texel)];
         for (int c = 0; c < 3; c++)
             to->color[c] += cell->color[c] / cell->weight;
         to->squares += cell->squares / cell->weight;
@@ -117,14 +119,14 @@ static struct chart_evidence *around_charts(const struct reconstruction *r, cons
 /* --- segments ------------------------------------------------------------------------------------ */
 
 /* Sums over each segment, and its number of texels. */
-static struct chart_evidence *of_segments(const struct reconstruction *r, const struct measured *measured,
-                                          size_t *texels) {
-    struct chart_evidence *own = mem_calloc(r->segments.count, sizeof *own);
-    for (size_t i = 0; i < r->inverse.valid_count; i++) {
-        uint32_t texel = r->inverse.valid[i];
-        texels[reconstruction_segment(r, texel)]++;
-        if (is_known(r, measured, texel))
-            evidence_add(&own[reconstruction_segment(r, texel)], &measured[texel]);
+static struct chart_evidence *of_segments(const struct surface *s, const bool *is_emitter,
+                                          const struct measured *measured, size_t *texels) {
+    struct chart_evidence *own = mem_calloc(s->segments->count, sizeof *own);
+    for (size_t i = 0; i < s->inverse->valid_count; i++) {
+        uint32_t texel = s->inverse->valid[i];
+        texels[surface_segment(s, texel)]++;
+        if (is_known(s, is_emitter, measured, texel))
+            evidence_add(&own[surface_segment(s, texel)], &measured[texel]);
     }
     return own;
 }
@@ -134,20 +136,20 @@ static struct color_prior mix(struct color_prior a, struct color_prior b, float 
                                 a.variance + part_of_b * (b.variance - a.variance)};
 }
 
-struct color_prior *color_priors(const struct reconstruction *r, const struct measured *measured) {
+struct color_prior *color_priors(const struct surface *s, const bool *is_emitter, const struct measured *measured) {
     struct grids grids;
-    size_t *texels = mem_calloc(r->segments.count, sizeof *texels);
-    struct chart_evidence *own = of_segments(r, measured, texels);
-    grids_init(&grids, &r->scene->mesh);
-    grids_fill(&grids, r, measured);
-    struct chart_evidence *around = around_charts(r, &grids);
-    struct color_prior *prior = mem_array(r->atlas.chart_count, sizeof *prior);
-    for (size_t i = 0; i < r->scene->mesh.triangle_count; i++) {
-        size_t chart = r->atlas.chart_of_triangle[i], segment = r->segments.of_triangle[i];
+    size_t *texels = mem_calloc(s->segments->count, sizeof *texels);
+    struct chart_evidence *own = of_segments(s, is_emitter, measured, texels);
+    grids_init(&grids, s->mesh);
+    grids_fill(&grids, s, is_emitter, measured);
+    struct chart_evidence *around = around_charts(s, &grids);
+    struct color_prior *prior = mem_array(s->atlas->chart_count, sizeof *prior);
+    for (size_t i = 0; i < s->mesh->triangle_count; i++) {
+        size_t chart = s->atlas->chart_of_triangle[i], segment = s->segments->of_triangle[i];
         double share = own[segment].weight / ((double)texels[segment] + 1.0) / SHARE_KNOWN;
-        prior[chart] = r->is_emitter[segment] ? (struct color_prior){rgb_gray(NEUTRAL_BASE_COLOR), 1.0f}
-                                              : mix(prior_of(&around[chart]), prior_of(&own[segment]),
-                                                    (float)(share * share / (1.0 + share * share)));
+        prior[chart] = is_emitter[segment] ? (struct color_prior){rgb_gray(NEUTRAL_BASE_COLOR), 1.0f}
+                                           : mix(prior_of(&around[chart]), prior_of(&own[segment]),
+                                                 (float)(share * share / (1.0 + share * share)));
     }
     mem_free(around);
     mem_free(own);

@@ -7,9 +7,10 @@
 #define UNBAKE_MATERIAL_COLOR_PRIOR_H
 
 #include "server/material/denoise.h"
-#include "server/state/reconstruction.h"
+#include "server/scene/surface.h"
 
 /* [chart_count] from measured[height][width]; the caller's. Emitters get NEUTRAL_BASE_COLOR. */
-struct color_prior *color_priors(const struct reconstruction *r, const struct measured *measured);
+struct color_prior *color_priors(const struct surface *surface, const bool *is_emitter,
+                                 const struct measured *measured);
 
 #endif

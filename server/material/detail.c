@@ -49,7 +49,7 @@ struct picture_job {
 };
 
 static const struct photograph *photograph_of(const struct detail *d, uint32_t train) {
-    return &d->r->scene->photograph[d->views->train[train]];
+    return &d->in.views->scene->photograph[d->in.views->train[train]];
 }
 
 static size_t pixels_of(const struct detail *d, uint32_t train) {
@@ -60,20 +60,20 @@ static size_t pixels_of(const struct detail *d, uint32_t train) {
 /* Calls body for each row of a photograph. */
 static void for_rows(struct detail *d, uint32_t train, void (*body)(void *user, size_t row, int thread)) {
     struct picture_job job = {.detail = d, .train = train};
-    parallel_for(d->r->pool, photograph_of(d, train)->camera.height, body, &job);
+    parallel_for(d->in.pool, photograph_of(d, train)->camera.height, body, &job);
 }
 
-static size_t chunks_of(const struct detail *d) { return (d->r->inverse.valid_count + CHUNK - 1) / CHUNK; }
+static size_t chunks_of(const struct detail *d) { return (d->in.surface.inverse->valid_count + CHUNK - 1) / CHUNK; }
 
 /* The texels in the footprint of a pixel that shows a triangle; false where too few of them are known. */
 static bool pixel_footprint(const struct detail *d, uint32_t train, uint32_t x, uint32_t y, uint32_t triangle,
                             struct footprint_texels *t) {
-    const struct reconstruction *r = d->r;
+    const struct surface *s = &d->in.surface;
     struct footprint f;
     return triangle != NONE &&
-           footprint_of_triangle(&f, &r->scene->mesh, &r->atlas, &photograph_of(d, train)->camera, x, y, triangle) &&
-           footprint_texels(t, &f, r->atlas.chart_of_triangle[triangle], d->chart_of_texel, r->inverse.width,
-                            r->inverse.height) >= MIN_KNOWN;
+           footprint_of_triangle(&f, s->mesh, s->atlas, &photograph_of(d, train)->camera, x, y, triangle) &&
+           footprint_texels(t, &f, s->atlas->chart_of_triangle[triangle], d->chart_of_texel, s->inverse->width,
+                            s->inverse->height) >= MIN_KNOWN;
 }
 
 static void add_to(_Atomic int32_t *sum, float what) {
@@ -87,16 +87,16 @@ static rgb divided(rgb over, rgb under) { return rgb_make(over.r / under.r, over
 /* The triangle that a pixel shows; NONE for emitters, mixed pixels, fireflies and saturated pixels. */
 static uint32_t pixel_triangle(const struct detail *d, uint32_t train, uint32_t x, uint32_t y, rgb *observed) {
     const struct photograph *photo = photograph_of(d, train);
-    const struct reconstruction *r = d->r;
-    struct photograph_sample s;
+    const struct surface *s = &d->in.surface;
+    struct photograph_sample sample;
     struct footprint f;
     float cx = (float)x + 0.5f, cy = (float)y + 0.5f;
-    if (d->views->edge[train][(size_t)y * photo->camera.width + x] > 0 || photograph_has_firefly(photo, cx, cy) ||
-        !photograph_sample(photo, cx, cy, &s) || photograph_sample_saturates(&s) ||
-        !footprint_find(&f, &r->scene->mesh, &r->atlas, d->views->accel, &photo->camera, x, y) ||
-        r->is_emitter[r->segments.of_triangle[f.triangle]])
+    if (d->in.views->edge[train][(size_t)y * photo->camera.width + x] > 0 || photograph_has_firefly(photo, cx, cy) ||
+        !photograph_sample(photo, cx, cy, &sample) || photograph_sample_saturates(&sample) ||
+        !footprint_find(&f, s->mesh, s->atlas, d->in.views->accel, &photo->camera, x, y) ||
+        d->in.is_emitter[s->segments->of_triangle[f.triangle]])
         return NONE;
-    *observed = s.radiance;
+    *observed = sample.radiance;
     return f.triangle;
 }
 
@@ -104,7 +104,7 @@ static uint32_t pixel_triangle(const struct detail *d, uint32_t train, uint32_t 
 static float weight_of(const struct detail *d, const struct photograph *photo, rgb predicted, rgb lambert) {
     rgb bright = rgb_mad(rgb_clamp(predicted, 0.0f, INFINITY), SPECULAR_FLOOR, lambert);
     float dark = SPECULAR_FLOOR * rgb_mean(lambert) / rgb_mean(bright);
-    return noise_weight_of_brightness(&d->r->noise, photo, bright) * dark * dark;
+    return noise_weight_of_brightness(d->in.noise, photo, bright) * dark * dark;
 }
 
 /* Residual of each pixel as base colour. It is clamped: a single far too bright pixel, as path tracers leave, would
@@ -123,9 +123,9 @@ static void residual_row(void *user, size_t row, int thread) {
         if (!pixel_footprint(d, job->train, x, (uint32_t)row, triangle, &t))
             continue;
         for (size_t i = 0; i < t.count; i++) {
-            rgb part = rgb_scale(rgb_from_half(d->lambert[t.texel[i]]), t.share[i]);
+            rgb part = rgb_scale(rgb_from_half(d->in.lambert[t.texel[i]]), t.share[i]);
             lambert = rgb_add(lambert, part);
-            predicted = rgb_add(predicted, rgb_mul(part, rgb_from_half(d->measured[t.texel[i]].value)));
+            predicted = rgb_add(predicted, rgb_mul(part, rgb_from_half(d->in.measured[t.texel[i]].value)));
         }
         d->triangle[job->train][at] = triangle;
         d->weight[job->train][at] = weight_of(d, photo, predicted, lambert);
@@ -138,7 +138,7 @@ static void filter_row(void *user, size_t row, int thread) {
     (void)thread;
     const struct picture_job *job = user;
     const struct camera *camera = &photograph_of(job->detail, job->train)->camera;
-    const uint8_t *owner = job->detail->views->owner[job->train];
+    const uint8_t *owner = job->detail->in.views->owner[job->train];
     const uint32_t *triangle = job->detail->triangle[job->train];
     long width = (long)camera->width, height = (long)camera->height, y0 = (long)row;
     for (long x0 = 0; x0 < width; x0++) {
@@ -163,9 +163,9 @@ static void filter_row(void *user, size_t row, int thread) {
 /* --- agreement of photographs ------------------------------------------------------------------- */
 
 static void clear_sums(struct detail *d) {
-    for (size_t i = 0; i < d->r->inverse.valid_count; i++)
+    for (size_t i = 0; i < d->in.surface.inverse->valid_count; i++)
         for (int k = 0; k < SUMS; k++)
-            d->sum[d->r->inverse.valid[i]][k] = 0;
+            d->sum[d->in.surface.inverse->valid[i]][k] = 0;
 }
 
 /* Adds each pixel's weight and weighted residual to the texels of its footprint. */
@@ -191,7 +191,7 @@ static void weigh_row(void *user, size_t row, int thread) {
 static void sum_weighted(struct detail *d, int split, float scale) {
     clear_sums(d);
     d->sum_scale = scale;
-    for (uint32_t t = 0; t < d->views->train_count; t++)
+    for (uint32_t t = 0; t < d->in.views->train_count; t++)
         if (split == ALL_PHOTOGRAPHS || halves_of(t, split) == 0)
             for_rows(d, t, weigh_row);
 }
@@ -216,7 +216,7 @@ static void agree_chunk(void *user, size_t chunk, int thread) {
     (void)thread;
     const struct agreement_job *a = user;
     const struct detail *d = a->detail;
-    const struct inverse_uv *inverse = &d->r->inverse;
+    const struct inverse_uv *inverse = d->in.surface.inverse;
     for (size_t i = chunk * CHUNK; i < (chunk + 1) * CHUNK && i < inverse->valid_count; i++) {
         uint32_t texel = inverse->valid[i];
         double all = (double)d->weight_sum[texel];
@@ -234,7 +234,7 @@ static void agree_chunk(void *user, size_t chunk, int thread) {
 /* Share of a texel's residual that is not noise. */
 static float signal_share_of(const struct agreement_job *a, uint32_t texel) {
     const struct detail *d = a->detail;
-    long width = (long)d->r->inverse.width, height = (long)d->r->inverse.height;
+    long width = (long)d->in.surface.inverse->width, height = (long)d->in.surface.inverse->height;
     long x0 = (long)texel % width, y0 = (long)texel / width;
     double square = 0.0, common = 0.0;
     if (!(a->agreement[texel].square > 0.0f))
@@ -257,7 +257,7 @@ static void share_chunk(void *user, size_t chunk, int thread) {
     (void)thread;
     const struct agreement_job *a = user;
     struct detail *d = a->detail;
-    const struct inverse_uv *inverse = &d->r->inverse;
+    const struct inverse_uv *inverse = d->in.surface.inverse;
     for (size_t i = chunk * CHUNK; i < (chunk + 1) * CHUNK && i < inverse->valid_count; i++)
         if (d->chart_of_texel[inverse->valid[i]] != NONE)
             d->signal_share[inverse->valid[i]] = signal_share_of(a, inverse->valid[i]);
@@ -267,11 +267,11 @@ static void share_chunk(void *user, size_t chunk, int thread) {
 static void sum_weights(struct detail *d) {
     float most = 0.0f;
     sum_weighted(d, ALL_PHOTOGRAPHS, COUNT_SCALE);
-    for (size_t i = 0; i < d->r->inverse.valid_count; i++)
-        most = fmaxf(most, (float)scaled(d, d->r->inverse.valid[i], WEIGHT));
+    for (size_t i = 0; i < d->in.surface.inverse->valid_count; i++)
+        most = fmaxf(most, (float)scaled(d, d->in.surface.inverse->valid[i], WEIGHT));
     sum_weighted(d, ALL_PHOTOGRAPHS, MAX_SUM / fmaxf(most, 1.0f));
-    for (size_t i = 0; i < d->r->inverse.valid_count; i++)
-        d->weight_sum[d->r->inverse.valid[i]] = (float)scaled(d, d->r->inverse.valid[i], WEIGHT);
+    for (size_t i = 0; i < d->in.surface.inverse->valid_count; i++)
+        d->weight_sum[d->in.surface.inverse->valid[i]] = (float)scaled(d, d->in.surface.inverse->valid[i], WEIGHT);
 }
 
 /* Finds the share of each texel's residual on which the photographs agree. Expects the sums over all photographs, as
@@ -280,13 +280,13 @@ static void find_shares(struct detail *d, size_t texels) {
     struct agreement_job a = {.detail = d,
                               .residual = mem_calloc_large(texels, sizeof *a.residual),
                               .agreement = mem_calloc_large(texels, sizeof *a.agreement)};
-    for (size_t i = 0; i < d->r->inverse.valid_count; i++)
-        a.residual[d->r->inverse.valid[i]] = (float)scaled(d, d->r->inverse.valid[i], RESIDUAL);
+    for (size_t i = 0; i < d->in.surface.inverse->valid_count; i++)
+        a.residual[d->in.surface.inverse->valid[i]] = (float)scaled(d, d->in.surface.inverse->valid[i], RESIDUAL);
     for (int split = 0; split < SPLITS; split++) {
         sum_weighted(d, split, d->sum_scale);
-        parallel_for(d->r->pool, chunks_of(d), agree_chunk, &a);
+        parallel_for(d->in.pool, chunks_of(d), agree_chunk, &a);
     }
-    parallel_for(d->r->pool, chunks_of(d), share_chunk, &a);
+    parallel_for(d->in.pool, chunks_of(d), share_chunk, &a);
     mem_free(a.agreement);
     mem_free(a.residual);
 }
@@ -336,7 +336,7 @@ static void step_texel(struct detail *d, uint32_t texel) {
     const _Atomic int32_t *sum = d->sum[texel];
     rgb step = rgb_scale(rgb_make((float)sum[RED], (float)sum[GREEN], (float)sum[BLUE]), scale);
     rgb change = rgb_scale(rgb_add(extrapolated(d, texel), step), d->signal_share[texel]);
-    rgb start = measured_value(&d->measured[texel]);
+    rgb start = measured_value(&d->in.measured[texel]);
     memcpy(d->change[texel][1], d->change[texel][0], sizeof d->change[texel][0]);
     rgb_to_half(d->change[texel][0],
                 rgb_make(bounded(change.r, start.r), bounded(change.g, start.g), bounded(change.b, start.b)));
@@ -345,7 +345,7 @@ static void step_texel(struct detail *d, uint32_t texel) {
 static void step_chunk(void *user, size_t chunk, int thread) {
     (void)thread;
     struct detail *d = user;
-    const struct inverse_uv *inverse = &d->r->inverse;
+    const struct inverse_uv *inverse = d->in.surface.inverse;
     for (size_t i = chunk * CHUNK; i < (chunk + 1) * CHUNK && i < inverse->valid_count; i++)
         if (d->signal_share[inverse->valid[i]] > 0.0f)
             step_texel(d, inverse->valid[i]);
@@ -353,18 +353,18 @@ static void step_chunk(void *user, size_t chunk, int thread) {
 
 void detail_step(struct detail *d) {
     clear_sums(d);
-    for (uint32_t t = 0; t < d->views->train_count; t++)
+    for (uint32_t t = 0; t < d->in.views->train_count; t++)
         for_rows(d, t, step_row);
-    parallel_for(d->r->pool, chunks_of(d), step_chunk, d);
+    parallel_for(d->in.pool, chunks_of(d), step_chunk, d);
     float before = d->t;
     d->t = 0.5f * (1.0f + sqrtf(1.0f + 4.0f * before * before));
     d->momentum = (before - 1.0f) / d->t;
 }
 
 void detail_finish(struct detail *d) {
-    for (size_t i = 0; i < d->r->inverse.valid_count; i++) {
-        uint32_t texel = d->r->inverse.valid[i];
-        struct measured *m = &d->measured[texel];
+    for (size_t i = 0; i < d->in.surface.inverse->valid_count; i++) {
+        uint32_t texel = d->in.surface.inverse->valid[i];
+        struct measured *m = &d->in.measured[texel];
         if (!(d->signal_share[texel] > 0.0f))
             continue;
         rgb_to_half(m->value, rgb_add(measured_value(m), rgb_from_half(d->change[texel][0])));
@@ -374,14 +374,14 @@ void detail_finish(struct detail *d) {
 
 /* --- the whole ---------------------------------------------------------------------------------- */
 
-double detail_texels_per_pixel(const struct reconstruction *r, const struct views *views) {
+double detail_texels_per_pixel(const struct surface *s, const struct views *views) {
     double area = 0.0, count = 0.0;
     for (uint32_t t = 0; t < views->train_count; t++) {
-        const struct camera *camera = &r->scene->photograph[views->train[t]].camera;
+        const struct camera *camera = &views->scene->photograph[views->train[t]].camera;
         for (uint32_t y = STRIDE / 2; y < camera->height; y += STRIDE) {
             for (uint32_t x = STRIDE / 2; x < camera->width; x += STRIDE) {
                 struct footprint f;
-                if (!footprint_find(&f, &r->scene->mesh, &r->atlas, views->accel, camera, x, y))
+                if (!footprint_find(&f, s->mesh, s->atlas, views->accel, camera, x, y))
                     continue;
                 area += (double)fabsf(f.across.x * f.down.y - f.across.y * f.down.x);
                 count += 1.0;
@@ -397,40 +397,41 @@ static void make_picture(struct detail *d, uint32_t train) {
     d->triangle[train] = mem_array(pixels, sizeof **d->triangle);
     d->weight[train] = mem_array(pixels, sizeof **d->weight);
     d->residual[train] = mem_array(pixels, sizeof **d->residual);
-    parallel_for(d->r->pool, photograph_of(d, train)->camera.height, residual_row, &job);
-    parallel_for(d->r->pool, photograph_of(d, train)->camera.height, filter_row, &job);
+    parallel_for(d->in.pool, photograph_of(d, train)->camera.height, residual_row, &job);
+    parallel_for(d->in.pool, photograph_of(d, train)->camera.height, filter_row, &job);
     mem_free(job.raw);
 }
 
 /* Drops pixels whose high-pass filter had too few neighbours, and scales the greatest weight to 1. */
 static void choose_pixels(struct detail *d) {
     float most = 0.0f;
-    for (uint32_t t = 0; t < d->views->train_count; t++) {
+    for (uint32_t t = 0; t < d->in.views->train_count; t++) {
         for (size_t i = 0; i < pixels_of(d, t); i++) {
             if (isnan(image_float_from_half(d->residual[t][i][0])))
                 d->triangle[t][i] = NONE;
             most = d->triangle[t][i] == NONE ? most : fmaxf(most, d->weight[t][i]);
         }
     }
-    for (uint32_t t = 0; t < d->views->train_count; t++)
+    for (uint32_t t = 0; t < d->in.views->train_count; t++)
         for (size_t i = 0; i < pixels_of(d, t); i++)
             d->weight[t][i] = d->triangle[t][i] == NONE ? 0.0f : d->weight[t][i] / most;
 }
 
 /* Marks the texels that may change: measured ones with enough light. */
 static void mark_known(struct detail *d, size_t texels) {
-    const struct reconstruction *r = d->r;
+    const struct surface *s = &d->in.surface;
     d->chart_of_texel = mem_array(texels, sizeof *d->chart_of_texel);
     for (size_t i = 0; i < texels; i++) {
-        bool known = r->inverse.triangle[i] != INVERSE_UV_NONE && d->measured[i].weight > 0.0f && d->lambert[i][0] != 0;
-        d->chart_of_texel[i] = known ? r->atlas.chart_of_triangle[r->inverse.triangle[i]] : NONE;
+        bool known =
+            s->inverse->triangle[i] != INVERSE_UV_NONE && d->in.measured[i].weight > 0.0f && d->in.lambert[i][0] != 0;
+        d->chart_of_texel[i] = known ? surface_chart(s, (uint32_t)i) : NONE;
     }
 }
 
-void detail_init(struct detail *d, const struct reconstruction *r, const struct views *views,
-                 const uint16_t (*lambert)[3], struct measured *measured) {
-    size_t texels = (size_t)r->inverse.width * r->inverse.height;
-    *d = (struct detail){.r = r, .views = views, .lambert = lambert, .measured = measured, .t = 1.0f};
+void detail_init(struct detail *d, const struct detail_input *input) {
+    const struct views *views = input->views;
+    size_t texels = (size_t)input->surface.inverse->width * input->surface.inverse->height;
+    *d = (struct detail){.in = *input, .t = 1.0f};
     d->triangle = mem_array(views->train_count, sizeof *d->triangle);
     d->weight = mem_array(views->train_count, sizeof *d->weight);
     d->residual = mem_array(views->train_count, sizeof *d->residual);
@@ -447,7 +448,7 @@ void detail_init(struct detail *d, const struct reconstruction *r, const struct 
 }
 
 void detail_release(struct detail *d) {
-    for (uint32_t t = 0; t < d->views->train_count; t++) {
+    for (uint32_t t = 0; t < d->in.views->train_count; t++) {
         mem_free(d->triangle[t]);
         mem_free(d->weight[t]);
         mem_free(d->residual[t]);

@@ -17,15 +17,24 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "server/capture/noise.h"
 #include "server/capture/views.h"
 #include "server/material/measured.h"
-#include "server/state/reconstruction.h"
+#include "server/scene/surface.h"
 
-struct detail {
-    const struct reconstruction *r; /* borrowed, as the next three */
+/* What detail reads, and `measured`, which it writes. Borrowed. */
+struct detail_input {
+    struct surface surface;
     const struct views *views;
+    const struct noise *noise;    /* of the photographs */
+    const bool *is_emitter;       /* [segment_count] */
     const uint16_t (*lambert)[3]; /* [height][width] radiance at albedo 1 (divide.h); 0: not known */
     struct measured *measured;    /* [height][width] value and noise are written */
+    struct parallel *pool;
+};
+
+struct detail {
+    struct detail_input in;
     /* Of each photograph, [train_count][pixels], 14 bytes a pixel of all of them together; owned. */
     uint32_t **triangle;      /* that the pixel shows; UINT32_MAX: the pixel is not used */
     float **weight;           /* inverse noise variance, up to a factor; at most 1 */
@@ -41,10 +50,9 @@ struct detail {
 };
 
 /* Mean number of texels that a pixel covers; up to one, nothing is blurred at the texture's resolution. */
-double detail_texels_per_pixel(const struct reconstruction *r, const struct views *views);
+double detail_texels_per_pixel(const struct surface *surface, const struct views *views);
 
-void detail_init(struct detail *d, const struct reconstruction *r, const struct views *views,
-                 const uint16_t (*lambert)[3], struct measured *measured);
+void detail_init(struct detail *d, const struct detail_input *input);
 void detail_release(struct detail *d);
 
 /* One step of FISTA. */

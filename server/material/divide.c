@@ -378,7 +378,8 @@ void divide_finish(struct divide *d, const struct divide_outgoing *outgoing) {
     struct reconstruction *r = d->r;
     for (size_t i = 0; i < r->inverse.valid_count; i++)
         d->measured[r->inverse.valid[i]] = d->measured[source_texel(d, r->inverse.valid[i])];
-    struct color_prior *prior = color_priors(r, d->measured);
+    const struct surface surface = reconstruction_surface(r);
+    struct color_prior *prior = color_priors(&surface, r->is_emitter, d->measured);
     if (d->denoises)
         denoise(&r->atlas, &r->inverse, r->scene->mesh.triangle_count, d->measured, prior, NULL,
                 &r->materials.base_color, r->pool);

@@ -54,6 +54,7 @@ struct segment_points {
 };
 
 struct specular_job {
+    const bool *is_emitter; /* [segment_count]; borrowed, both */
     struct materials *materials;
     struct specular_observer observer;
     struct segment_points *points;      /* [threads]; owned */
@@ -93,7 +94,7 @@ static float misfit_channel(const struct specular_point *p, size_t k, size_t m, 
 }
 
 static void find_misfits(const struct specular_job *job, struct segment_points *e) {
-    float median = job->observer.views->median_radiance;
+    float median = job->observer.in.views->median_radiance;
     for (size_t i = 0; i < e->count; i++) {
         for (size_t k = 0; k < ROUGHNESSES; k++) {
             for (size_t m = 0; m < SPECULARS; m++) {
@@ -180,15 +181,14 @@ static double likelihood(const struct segment_points *e, struct candidate_levels
 /* --- segments ----------------------------------------------------------------------------------- */
 
 /* Mean over the observed texels of a segment. */
-static rgb mean_base_color(const struct specular_observer *l, size_t segment) {
-    const struct reconstruction *r = l->r;
+static rgb mean_base_color(const struct specular_observer *l, const struct texture *base_color, size_t segment) {
     double sum[3] = {0.0}, count = 0.0;
     for (uint32_t i = l->texels.first[segment]; i < l->texels.first[segment + 1]; i++) {
         uint32_t texel = l->texels.texel[i];
-        if (!(r->fused.count[texel] > 0.0f))
+        if (!(l->in.fused->count[texel] > 0.0f))
             continue;
         for (size_t c = 0; c < 3; c++)
-            sum[c] += (double)r->materials.base_color.texel[texel][c];
+            sum[c] += (double)base_color->texel[texel][c];
         count += 1.0;
     }
     double scale = 1.0 / fmax(count, 1.0);
@@ -213,12 +213,13 @@ static double roughness_about(const struct segment_points *e, struct candidate_l
     return middle + offset * (offset < 0.0 ? middle - (double)level[k - 1] : (double)level[k + 1] - middle);
 }
 
-static void set_evidence(const struct specular_observer *l, size_t segment, const struct segment_points *e,
-                         struct specular_evidence *evidence) {
+static void set_evidence(const struct specular_job *job, size_t segment, const struct segment_points *e) {
+    const struct specular_observer *l = &job->observer;
+    struct specular_evidence *evidence = &job->evidence[segment];
     struct candidate_levels best = best_of(e);
     evidence->is_observed = true;
-    evidence->part = (double)by_segment_count(&l->texels, segment) / (double)l->r->inverse.valid_count;
-    evidence->base_color = mean_base_color(l, segment);
+    evidence->part = (double)by_segment_count(&l->texels, segment) / (double)l->in.surface.inverse->valid_count;
+    evidence->base_color = mean_base_color(l, &job->materials->base_color, segment);
     evidence->best = best.m == 0 ? SPECULAR_DIFFUSE : specular_candidate(best.k, best.m - 1);
     evidence->best_roughness = roughness_about(e, best);
     evidence->likelihood[SPECULAR_DIFFUSE] = likelihood(e, diffuse_candidate, best);
@@ -251,14 +252,14 @@ static bool is_too_dark(const struct specular_job *job, size_t segment, int thre
 
 static void measure_segment(void *user, size_t segment, int thread) {
     const struct specular_job *job = user;
-    if (job->observer.r->is_emitter[segment]) { /* its own light hides what it reflects */
+    if (job->is_emitter[segment]) { /* its own light hides what it reflects */
         set_lobe(job->materials, segment, 1.0, 0.0);
         return;
     }
     set_lobe(job->materials, segment, UNKNOWN_ROUGHNESS, UNKNOWN_SPECULAR);
     if (sample_segment(job, segment, thread)) {
         find_misfits(job, &job->points[thread]);
-        set_evidence(&job->observer, segment, &job->points[thread], &job->evidence[segment]);
+        set_evidence(job, segment, &job->points[thread]);
     } else if (is_too_dark(job, segment, thread)) {
         set_lobe(job->materials, segment, 1.0, 0.0);
     }
@@ -269,21 +270,23 @@ static void fit_segment(void *user, size_t segment, int thread) {
     const struct specular_job *job = user;
     if (!job->evidence[segment].is_observed)
         return;
-    struct specular_posterior posterior = specular_posterior(job->evidence, job->observer.r->segments.count, segment);
+    struct specular_posterior posterior =
+        specular_posterior(job->evidence, job->observer.in.surface.segments->count, segment);
     if (posterior.diffuse > DIFFUSE_CERTAIN)
         set_lobe(job->materials, segment, 1.0, 0.0);
     else
         set_lobe(job->materials, segment, posterior.roughness, posterior.specular);
 }
 
-void specular_fit(struct reconstruction *r, const struct views *views, const struct probes *probes,
-                  const struct light_field *field) {
-    struct specular_job job = {.materials = &r->materials};
-    specular_observer_init(&job.observer, r, views, probes, field);
-    job.points = mem_array((size_t)parallel_thread_count(r->pool), sizeof *job.points);
-    job.evidence = mem_calloc(r->segments.count, sizeof *job.evidence);
-    parallel_for(r->pool, r->segments.count, measure_segment, &job);
-    parallel_for(r->pool, r->segments.count, fit_segment, &job);
+void specular_fit(const struct specular_input *input, const bool *is_emitter, struct materials *materials,
+                  struct parallel *pool) {
+    struct specular_job job = {.is_emitter = is_emitter, .materials = materials};
+    size_t threads = (size_t)parallel_thread_count(pool), segments = input->surface.segments->count;
+    specular_observer_init(&job.observer, input, (int)threads);
+    job.points = mem_array(threads, sizeof *job.points);
+    job.evidence = mem_calloc(segments, sizeof *job.evidence);
+    parallel_for(pool, segments, measure_segment, &job);
+    parallel_for(pool, segments, fit_segment, &job);
     mem_free(job.evidence);
     mem_free(job.points);
     specular_observer_release(&job.observer);

@@ -10,15 +10,14 @@
 #ifndef UNBAKE_MATERIAL_SPECULAR_FIT_H
 #define UNBAKE_MATERIAL_SPECULAR_FIT_H
 
-#include <stdint.h>
+#include <stdbool.h>
 
 #include "common/parallel.h"
-#include "server/capture/views.h"
-#include "server/gather/probes.h"
-#include "server/state/reconstruction.h"
+#include "server/material/specular_observation.h"
+#include "server/scene/materials.h"
 
-/* Writes r->materials.roughness and .specular. */
-void specular_fit(struct reconstruction *r, const struct views *views, const struct probes *probes,
-                  const struct light_field *field);
+/* Reads materials->base_color; writes roughness and specular of the segments, which are diffuse where is_emitter. */
+void specular_fit(const struct specular_input *input, const bool *is_emitter, struct materials *materials,
+                  struct parallel *pool);
 
 #endif

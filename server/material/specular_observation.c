@@ -40,24 +40,24 @@ struct specular_patch {
 
 /* Places around a texel that are in its chart and have similar normals. */
 static void patch_around(const struct specular_observer *l, uint32_t texel, float side, struct specular_patch *patch) {
-    const struct reconstruction *r = l->r;
+    const struct surface *s = &l->in.surface;
     struct surface_point at;
     patch->count = 0;
-    if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at))
+    if (!surface_at_texel(s->mesh, s->atlas, s->inverse, texel, &at))
         return;
-    uint32_t chart = r->atlas.chart_of_triangle[at.triangle];
-    float x0 = (float)(texel % r->atlas.width) + 0.5f, y0 = (float)(texel / r->atlas.width) + 0.5f;
+    uint32_t chart = s->atlas->chart_of_triangle[at.triangle];
+    float x0 = (float)(texel % s->atlas->width) + 0.5f, y0 = (float)(texel / s->atlas->width) + 0.5f;
     for (int i = 0; i < PATCH * PATCH; i++) {
         struct surface_point p;
         struct probe_mix mix;
         float dx = ((float)(i % PATCH) + 0.5f) / PATCH - 0.5f, dy = ((float)(i / PATCH) + 0.5f) / PATCH - 0.5f;
         float x = x0 + side * dx, y = y0 + side * dy;
-        if (!surface_at(&r->scene->mesh, &r->atlas, &r->inverse, x, y, &p) ||
-            r->atlas.chart_of_triangle[p.triangle] != chart || vec3_dot(p.shading, at.shading) < MIN_NORMAL_COSINE)
+        if (!surface_at(s->mesh, s->atlas, s->inverse, x, y, &p) || s->atlas->chart_of_triangle[p.triangle] != chart ||
+            vec3_dot(p.shading, at.shading) < MIN_NORMAL_COSINE)
             continue;
-        probes_mix(l->probes, &r->atlas, &r->fused, (uint32_t)y * r->atlas.width + (uint32_t)x, &p, &mix);
-        probes_irradiance(l->probes, &mix, &patch->light[patch->count]);
-        sun_add_light(&r->sun, r->world.accel, &p, &patch->light[patch->count]);
+        probes_mix(l->in.probes, s->atlas, l->in.fused, (uint32_t)y * s->atlas->width + (uint32_t)x, &p, &mix);
+        probes_irradiance(l->in.probes, &mix, &patch->light[patch->count]);
+        sun_add_light(l->in.sun, l->in.field->world->accel, &p, &patch->light[patch->count]);
         patch->at[patch->count++] = p;
     }
 }
@@ -92,8 +92,8 @@ static void predict(const struct specular_observer *l, const struct specular_pat
     for (size_t i = 0; i < patch->count; i++) {
         const struct surface_point *at = &patch->at[i];
         struct highlight highlight;
-        vec3 wo = views_direction(l->views, train, at->position);
-        highlight_gather(&highlight, scratch, l->field, at, wo, &specular_levels,
+        vec3 wo = views_direction(l->in.views, train, at->position);
+        highlight_gather(&highlight, scratch, l->in.field, at, wo, &specular_levels,
                          sampler_key(KEY_SPECULAR + i, texel, train), SAMPLES_A_LEVEL * HIGHLIGHT_ROUGHNESSES,
                          LIGHT_SAMPLES);
         for (size_t k = 0; k < HIGHLIGHT_ROUGHNESSES; k++) {
@@ -116,9 +116,9 @@ static bool observe_texel(const struct specular_observer *l, uint32_t texel, str
     if (patch.count == 0)
         return false;
     const struct surface_point *middle = &patch.at[patch.count / 2];
-    size_t view_count = views_pick(l->views, middle->position, middle->normal, texel, VIEWS_TRIED, view);
+    size_t view_count = views_pick(l->in.views, middle->position, middle->normal, texel, VIEWS_TRIED, view);
     for (size_t i = 0; i < view_count && observed_count < SPECULAR_VIEWS; i++) {
-        if (patch_observed(l->views, &view[i], &patch, criteria.edge, &point->observation[observed_count].observed))
+        if (patch_observed(l->in.views, &view[i], &patch, criteria.edge, &point->observation[observed_count].observed))
             view[observed_count++] = view[i];
     }
     if (observed_count < criteria.least)
@@ -136,7 +136,7 @@ size_t specular_points_wanted(const struct specular_observer *l, size_t segment)
 }
 
 float specular_widest_patch(const struct specular_observer *l, size_t segment) {
-    const struct atlas *atlas = &l->r->atlas;
+    const struct atlas *atlas = l->in.surface.atlas;
     double texture = (double)(atlas->width > atlas->height ? atlas->width : atlas->height);
     double side = sqrt((double)by_segment_count(&l->texels, segment)) / PATCHES_A_SIDE;
     return fmaxf(SPECULAR_MIN_PATCH, (float)fmin(side, MAX_PATCH * fmax(1.0, texture / 2048.0)));
@@ -153,12 +153,12 @@ size_t specular_observe(const struct specular_observer *l, size_t segment, struc
     return count;
 }
 
-void specular_observer_init(struct specular_observer *l, const struct reconstruction *r, const struct views *views,
-                            const struct probes *probes, const struct light_field *field) {
-    *l = (struct specular_observer){.r = r, .views = views, .probes = probes, .field = field};
-    l->scratch = mem_array((size_t)parallel_thread_count(r->pool), sizeof *l->scratch);
-    by_segment_sort(&l->texels, &r->segments, &r->inverse);
-    for (size_t i = 0; i < r->segments.count; i++)
+void specular_observer_init(struct specular_observer *l, const struct specular_input *input, int threads) {
+    const struct segments *segments = input->surface.segments;
+    *l = (struct specular_observer){.in = *input};
+    l->scratch = mem_array((size_t)threads, sizeof *l->scratch);
+    by_segment_sort(&l->texels, segments, input->surface.inverse);
+    for (size_t i = 0; i < segments->count; i++)
         l->root_sum += sqrt((double)by_segment_count(&l->texels, i));
 }
 

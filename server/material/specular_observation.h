@@ -35,18 +35,24 @@ struct specular_point {
     struct specular_observation observation[SPECULAR_VIEWS];
 };
 
-struct specular_observer {
-    const struct reconstruction *r; /* borrowed, as the next three */
+/* What the observer reads. Borrowed. */
+struct specular_input {
+    struct surface surface;
+    const struct fused *fused;
     const struct views *views;
     const struct probes *probes;
-    const struct light_field *field;
+    const struct light_field *field; /* light from all surfaces */
+    const struct sun *sun;
+};
+
+struct specular_observer {
+    struct specular_input in;
     struct texels_by_segment texels;
     double root_sum;          /* sum over the segments of the square root of their texel count */
     struct incident *scratch; /* [threads]; owned */
 };
 
-void specular_observer_init(struct specular_observer *l, const struct reconstruction *r, const struct views *views,
-                            const struct probes *probes, const struct light_field *field);
+void specular_observer_init(struct specular_observer *l, const struct specular_input *input, int threads);
 void specular_observer_release(struct specular_observer *l);
 
 /* What a point must fulfil. */

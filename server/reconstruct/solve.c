@@ -163,7 +163,13 @@ static enum status find_detail(struct solve *s, struct error *err) {
     enum status status = STATUS_OK;
     struct detail detail;
     divide_lambert_all(&s->divide, lambert);
-    detail_init(&detail, r, s->views, (const uint16_t(*)[3])lambert, s->divide.measured);
+    detail_init(&detail, &(struct detail_input){.surface = reconstruction_surface(r),
+                                                .views = s->views,
+                                                .noise = &r->noise,
+                                                .is_emitter = r->is_emitter,
+                                                .pool = r->pool,
+                                                .lambert = (const uint16_t(*)[3])lambert,
+                                                .measured = s->divide.measured});
     for (int i = 0; i < steps && status == STATUS_OK; i++) {
         detail_step(&detail);
         status = advance(s, PLAN_DETAIL, (double)r->inverse.valid_count, err);
@@ -303,7 +309,8 @@ static void solve_init(struct solve *s, struct reconstruction *r, const struct v
     s->field = (struct light_field){&r->world, (const uint16_t(*)[3])s->outgoing.unmirrored, s->outgoing.lobe, NULL};
     s->isotropic = (struct light_field){&r->world, (const uint16_t(*)[3])s->outgoing.total, NULL, NULL};
     probes_init(&s->probes, spacing_for(&r->atlas), &r->scene->mesh, &r->atlas, &r->inverse, &r->fused);
-    s->texels_per_pixel = detail_texels_per_pixel(r, views);
+    const struct surface surface = reconstruction_surface(r);
+    s->texels_per_pixel = detail_texels_per_pixel(&surface, views);
     s->divide = (struct divide){.r = r,
                                 .views = views,
                                 .probes = &s->probes,
@@ -349,7 +356,9 @@ static void refit_lamps(struct solve *s, int pass) {
 static enum status fit(struct solve *s, int pass, struct error *err) {
     decide_emitters(s);
     if (pass != PASS_LIGHT) {
-        specular_fit(s->r, s->views, &s->probes, &s->isotropic);
+        specular_fit(&(struct specular_input){reconstruction_surface(s->r), &s->r->fused, s->views, &s->probes,
+                                              &s->isotropic, &s->r->sun},
+                     s->r->is_emitter, &s->r->materials, s->r->pool);
         s->divide.stride = 1;
         sun_refit(&s->divide);
         s->mirrored_share = sun_caustics_add(&s->probes, &s->r->sun, &s->r->world, &s->r->scene->mesh, &s->r->inverse,

@@ -22,7 +22,8 @@ struct observation {
 
 /* The observations of one work item and their paths; used by one thread. */
 struct observation_batch {
-    const struct reconstruction *r; /* borrowed, both */
+    struct surface surface;
+    const struct world *world; /* borrowed, both */
     const struct views *views;
     struct path_settings path;
     int cameras, samples; /* photographs of a texel, paths of an observation */
@@ -36,8 +37,9 @@ struct observation_batch {
 };
 
 /* Room for `texels` texels. */
-void observation_batch_init(struct observation_batch *b, const struct reconstruction *r, const struct views *views,
-                            const struct path_settings *path, int cameras, int samples, size_t texels);
+void observation_batch_init(struct observation_batch *b, const struct surface *surface, const struct world *world,
+                            const struct views *views, const struct path_settings *path, int cameras, int samples,
+                            size_t texels);
 void observation_batch_release(struct observation_batch *b);
 void observation_batch_clear(struct observation_batch *b);
 

@@ -67,7 +67,8 @@ struct optimiser *optimiser_new(struct reconstruction *r, const struct views *vi
         .seed = (uint64_t)settings_number(set, "seed"),
         .least_color = derivatives ? PATH_LEAST_COLOR : 0.0f,
     };
-    pass_init(&o->pass, r, views, &path);
+    const struct surface surface = reconstruction_surface(r);
+    pass_init(&o->pass, &surface, &r->world, views, set, &path, r->pool);
     emission_init(&o->emission, &r->materials);
     keep_common(o);
     return o;

@@ -6,17 +6,18 @@
 #include "common/mem.h"
 #include "server/refine/loss.h"
 
-void pass_init(struct pass *p, const struct reconstruction *r, const struct views *views,
-               const struct path_settings *path) {
-    const struct settings *set = r->settings;
-    *p = (struct pass){.r = r, .views = views};
+void pass_init(struct pass *p, const struct surface *surface, const struct world *world, const struct views *views,
+               const struct settings *set, const struct path_settings *path, struct parallel *pool) {
+    *p = (struct pass){.surface = *surface, .views = views, .pool = pool};
     p->by_pixels = settings_is(set, "choose", "pixels");
     p->one_estimate = settings_is(set, "estimates", "one");
-    chooser_init(&p->chooser, r->inverse.valid_count, (size_t)settings_number(set, "texels_per_iteration"), path->seed);
-    int threads = parallel_thread_count(r->pool);
+    chooser_init(&p->chooser, surface->inverse->valid_count, (size_t)settings_number(set, "texels_per_iteration"),
+                 path->seed);
+    int threads = parallel_thread_count(pool);
     p->batch = mem_calloc((size_t)threads, sizeof *p->batch);
     for (int t = 0; t < threads; t++)
-        observation_batch_init(&p->batch[t], r, views, path, (int)settings_number(set, "cameras_per_texel"),
+        observation_batch_init(&p->batch[t], surface, world, views, path,
+                               (int)settings_number(set, "cameras_per_texel"),
                                (int)settings_number(set, "samples_per_camera"), PASS_CHUNK_TEXELS);
     p->observation_capacity = p->batch[0].observation_capacity;
     p->chunk_count = (p->chooser.stratum_count + PASS_CHUNK_TEXELS - 1) / PASS_CHUNK_TEXELS;
@@ -29,7 +30,7 @@ void pass_release(struct pass *p) {
     for (size_t c = 0; c < p->chunk_count; c++)
         mem_free(p->chunk[c].emission);
     mem_free(p->chunk);
-    for (int t = 0; t < parallel_thread_count(p->r->pool); t++)
+    for (int t = 0; t < parallel_thread_count(p->pool); t++)
         observation_batch_release(&p->batch[t]);
     mem_free(p->batch);
     *p = (struct pass){0};
@@ -50,7 +51,7 @@ static void choose_observations(const struct pass *p, size_t chunk, uint64_t ite
         if (p->by_pixels)
             observation_add_pixels(b, i, iteration);
         else if (item != CHOOSE_NONE)
-            observation_add(b, p->r->inverse.valid[item], iteration);
+            observation_add(b, p->surface.inverse->valid[item], iteration);
     }
 }
 
@@ -85,7 +86,7 @@ static void run_chunk(void *user, size_t number, int thread) {
 
 void pass_run(struct pass *p, uint64_t iteration, pass_visit *visit, void *user) {
     struct pass_job job = {p, iteration, visit, user};
-    parallel_for(p->r->pool, p->chunk_count, run_chunk, &job);
+    parallel_for(p->pool, p->chunk_count, run_chunk, &job);
 }
 
 size_t pass_observation_count(const struct pass *p) {
@@ -104,7 +105,7 @@ double pass_mean_loss(const struct pass *p) {
 }
 
 void pass_d_emission(const struct pass *p, double (*d_radiance)[3]) {
-    memset(d_radiance, 0, p->r->segments.count * sizeof *d_radiance);
+    memset(d_radiance, 0, p->surface.segments->count * sizeof *d_radiance);
     for (size_t c = 0; c < p->chunk_count; c++) {
         const struct pass_chunk *chunk = &p->chunk[c];
         for (size_t k = 0; k < chunk->observation_count; k++) {
@@ -118,7 +119,7 @@ void pass_d_emission(const struct pass *p, double (*d_radiance)[3]) {
 
 void pass_ray_counts(const struct pass *p, uint64_t *ray_count, uint64_t *dropped_count) {
     *ray_count = *dropped_count = 0;
-    for (int t = 0; t < parallel_thread_count(p->r->pool); t++) {
+    for (int t = 0; t < parallel_thread_count(p->pool); t++) {
         uint64_t rays, dropped;
         path_batch_counts(p->batch[t].paths, &rays, &dropped);
         *ray_count += rays;

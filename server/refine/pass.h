@@ -32,19 +32,20 @@ struct pass_chunk {
 };
 
 struct pass {
-    const struct reconstruction *r; /* borrowed, both */
-    const struct views *views;
+    struct surface surface;
+    const struct views *views; /* borrowed, both */
+    struct parallel *pool;
     struct chooser chooser;
     bool by_pixels, one_estimate;    /* settings choose and estimates */
-    struct observation_batch *batch; /* [threads of r->pool] owned */
+    struct observation_batch *batch; /* [threads of the pool] owned */
     size_t observation_capacity;     /* of a chunk */
     size_t chunk_count;
     struct pass_chunk *chunk; /* [chunk_count] owned */
 };
 
-/* The amounts are settings of `r`. */
-void pass_init(struct pass *p, const struct reconstruction *r, const struct views *views,
-               const struct path_settings *path);
+/* Its size and its choices are settings. The world is borrowed, too. */
+void pass_init(struct pass *p, const struct surface *surface, const struct world *world, const struct views *views,
+               const struct settings *set, const struct path_settings *path, struct parallel *pool);
 void pass_release(struct pass *p);
 
 /* Runs the pass of an iteration. visit(user, chunk, batch) is called once a chunk, by any thread, while the batch holds

@@ -11,6 +11,9 @@
 #include "server/scene/rgb_half.h"
 #include "server/scene/texture.h"
 
+/* Base colour of unknown surfaces, and of emitters, whose own light hides it. */
+#define NEUTRAL_BASE_COLOR 0.5f
+
 struct materials {
     struct texture base_color; /* linear reflectance in [0, 1] */
     size_t segment_count;

@@ -1,4 +1,4 @@
-/* surface.h -- the surface point of a texel. */
+/* surface.h -- the parametrised surface of a scene, and the surface point of a texel. */
 #ifndef UNBAKE_SCENE_SURFACE_H
 #define UNBAKE_SCENE_SURFACE_H
 
@@ -9,6 +9,23 @@
 #include "server/scene/atlas.h"
 #include "server/scene/inverse_uv.h"
 #include "server/scene/mesh.h"
+#include "server/scene/segment.h"
+
+/* The mesh, its segments, and the map from its triangles to texels and back. All borrowed. */
+struct surface {
+    const struct mesh *mesh;
+    const struct segments *segments;
+    const struct atlas *atlas;
+    const struct inverse_uv *inverse;
+};
+
+/* The chart and the segment of a valid texel. */
+static inline uint32_t surface_chart(const struct surface *s, uint32_t texel) {
+    return s->atlas->chart_of_triangle[s->inverse->triangle[texel]];
+}
+static inline uint32_t surface_segment(const struct surface *s, uint32_t texel) {
+    return s->segments->of_triangle[s->inverse->triangle[texel]];
+}
 
 struct surface_point {
     uint32_t triangle;

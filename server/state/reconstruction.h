@@ -20,9 +20,6 @@
 #include "server/state/plan.h"
 #include "server/state/state_array.h"
 
-/* Base colour of unknown surfaces, and of emitters, whose own light hides it. */
-#define NEUTRAL_BASE_COLOR 0.5f
-
 struct reconstruction; /* the present state, for previews and outputs */
 struct emitter_evidence;
 
@@ -86,6 +83,11 @@ struct reconstruction {
     struct held_out *held_out; /* [held_out_count]; owned */
     cJSON *report;             /* object, filled by the stages; owned */
 };
+
+/* The surface, for functions that need nothing else of the state; valid as long as r. */
+static inline struct surface reconstruction_surface(const struct reconstruction *r) {
+    return (struct surface){&r->scene->mesh, &r->segments, &r->atlas, &r->inverse};
+}
 
 /* The segment of a valid texel. */
 static inline uint32_t reconstruction_segment(const struct reconstruction *r, uint32_t texel) {

@@ -113,9 +113,20 @@ static void capture_release(struct capture *s) {
     painted_release(&s->room);
 }
 
+static struct detail_input input_of(struct capture *s, const struct views *views) {
+    return (struct detail_input){.surface = reconstruction_surface(&s->r),
+                                 .views = views,
+                                 .noise = &s->r.noise,
+                                 .is_emitter = s->r.is_emitter,
+                                 .pool = s->r.pool,
+                                 .lambert = (const uint16_t(*)[3])s->white,
+                                 .measured = s->measured};
+}
+
 static void find(struct capture *s, const struct views *views) {
+    struct detail_input input = input_of(s, views);
     struct detail detail;
-    detail_init(&detail, &s->r, views, (const uint16_t(*)[3])s->white, s->measured);
+    detail_init(&detail, &input);
     for (int i = 0; i < STEPS; i++)
         detail_step(&detail);
     detail_finish(&detail);
@@ -134,7 +145,8 @@ static void test_paint(bool tiles, int threads, uint32_t *sum) {
     struct capture s;
     capture_init(&s, tiles, threads, 0.0f);
     double before = error_of(&s.room, s.measured), noise = noise_power(&s);
-    CHECK(detail_texels_per_pixel(&s.r, &s.room.views) > 1.0);
+    const struct surface surface = reconstruction_surface(&s.r);
+    CHECK(detail_texels_per_pixel(&surface, &s.room.views) > 1.0);
     find(&s, &s.room.views);
     double after = error_of(&s.room, s.measured);
     printf("%s: error %.4f, after %.4f\n", tiles ? "tiles" : "waves", before, after);
@@ -195,6 +207,7 @@ static void test_few(void) {
 /* Where one photograph is worth ten thousand times as much as any other, the others are counted, too. */
 static void test_count(void) {
     struct capture s;
+    struct detail_input input;
     struct detail d;
     double counted = 0.0, best = 0.0, others = 0.0;
     capture_init(&s, true, 2, 0.0f);
@@ -203,7 +216,8 @@ static void test_count(void) {
         s.room.scene.photograph[s.room.views.train[t]].exposure = bright / 4096.0f;
     for (int octave = 0; octave < NOISE_OCTAVES; octave++) /* of these 12 lie between the two exposures */
         s.r.noise.share[octave] = octave < NOISE_OCTAVES / 2 - 6 ? 1.0f : 0.01f;
-    detail_init(&d, &s.r, &s.room.views, (const uint16_t(*)[3])s.white, s.measured);
+    input = input_of(&s, &s.room.views);
+    detail_init(&d, &input);
     for (size_t i = 0; i < s.texels; i++)
         counted += (double)d.weight_sum[i];
     for (uint32_t t = 0; t < s.room.views.train_count; t++)

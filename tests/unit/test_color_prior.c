@@ -6,6 +6,7 @@
 #include "common/image.h"
 #include "common/mem.h"
 #include "server/material/color_prior.h"
+#include "server/state/reconstruction.h"
 #include "tests/check.h"
 
 #define WALLS 6
@@ -69,7 +70,8 @@ int main(void) {
     show(FRAME, 0.01f, 0.0f);
     show_from(SIDE * SIDE / 10, FRAME, 0.5f, 0.25f);
 
-    struct color_prior *prior = color_priors(&r, measured);
+    const struct surface surface = reconstruction_surface(&r);
+    struct color_prior *prior = color_priors(&surface, is_emitter, measured);
     CHECK_THAT(fabsf(prior[WHITE].mean.g - 0.9f) < 0.01f, "%g", (double)prior[WHITE].mean.g);
     CHECK_THAT(fabsf(prior[BLACK].mean.g - 0.05f) < 0.01f, "%g", (double)prior[BLACK].mean.g);
     CHECK_THAT(prior[BLACK].variance < 0.01f, "%g", (double)prior[BLACK].variance);
@@ -84,17 +86,17 @@ int main(void) {
     measured[HIDDEN * SIDE * SIDE + 1] = (struct measured){.weight = 1.0f};
     CHECK((HIDDEN * SIDE * SIDE + 1) % 3 != 0);
     double share = 1.0 / 1025.0 / 0.003, part = share * share / (1.0 + share * share);
-    prior = color_priors(&r, measured);
+    prior = color_priors(&surface, is_emitter, measured);
     float beside = prior[HIDDEN].mean.g;
     measured[HIDDEN * SIDE * SIDE + 1] = (struct measured){0};
     mem_free(prior);
-    prior = color_priors(&r, measured);
+    prior = color_priors(&surface, is_emitter, measured);
     CHECK_NEAR(beside / prior[HIDDEN].mean.g, 1.0 - part, 0.01);
 
     /* Where nothing is known at all, grey; and nothing is known well. */
     mem_free(prior);
     memset(measured, 0, sizeof measured);
-    prior = color_priors(&r, measured);
+    prior = color_priors(&surface, is_emitter, measured);
     for (int w = 0; w < WALLS; w++)
         CHECK_THAT(prior[w].mean.r > 0.3f && prior[w].mean.r < 0.7f && prior[w].variance > 0.1f, "%d", w);
     mem_free(prior);

@@ -77,7 +77,8 @@ static void test_fit(const struct image *sky, const struct disc *disc, float rou
                            rgb_gray(RADIANCE * disc->angle[k]));
     uint16_t(*sent)[3] = mem_calloc(PLANE_TEXELS, sizeof *sent);
     struct light_field field = {&r->world, (const uint16_t(*)[3])sent, NULL, NULL};
-    specular_fit(r, &rig.views, &probes, &field);
+    const struct specular_input input = {reconstruction_surface(r), &r->fused, &rig.views, &probes, &field, &r->sun};
+    specular_fit(&input, r->is_emitter, &r->materials, r->pool);
     printf("roughness %.3f specular %.3f, true %.3f %.3f\n", (double)r->materials.roughness[0],
            (double)r->materials.specular[0], (double)roughness, (double)specular);
     CHECK_NEAR(r->materials.specular[0], specular, 0.06f);
