@@ -112,6 +112,8 @@ static enum status read_verb(const struct options *o, const struct collection *w
     nearest_init(&nearest, word);
     for (*verb = VERB_LIST; *verb < VERB_COUNT && strcmp(verbs[*verb], word) != 0; ++*verb)
         nearest_offer(&nearest, verbs[*verb]);
+    if (what->further)
+        nearest_offer(&nearest, what->further);
     if (*verb == VERB_LIST && o->word_count > 1)
         return error_set(err, STATUS_INPUT, "unexpected argument \"%.100s\"", o->word[1]);
     if (*verb < VERB_COUNT && *verb != VERB_LIST && o->word_count == 1)
@@ -120,7 +122,8 @@ static enum status read_verb(const struct options *o, const struct collection *w
         return STATUS_OK;
     error_set(err, STATUS_INPUT, "unknown action \"%.100s\" of %s", word, what->name);
     return nearest.best ? error_hint(err, "did you mean `unbake %s %s`?", what->name, nearest.best)
-                        : error_hint(err, "list, show %s..., keep %s..., rm %s...", argument, argument, argument);
+                        : error_hint(err, "list, show %s..., keep %s..., rm %s...%s%s", argument, argument, argument,
+                                     what->further ? ", " : "", what->further ? what->further : "");
 }
 
 /* Refuses options that the verb does not take. */

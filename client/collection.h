@@ -10,6 +10,7 @@ struct collection {
     const char *path;                                        /* "/v1/scenes" */
     void (*print_all)(struct client *c, const cJSON *items); /* at least one */
     void (*print_one)(struct client *c, const cJSON *thing);
+    const char *further; /* an action that only this command has, elsewhere; NULL: none */
 };
 
 extern const struct client_option collection_options[];

@@ -27,11 +27,17 @@ static const struct command table[] = {
     {"submit", "ROOM", "upload a room and queue a job on it",
      "ROOM is a folder or an archive (.zip, .tar, .tar.gz, .tar.zst) with a mesh, photographs and\n"
      "their cameras. A folder is packed on the fly; hidden files are left out. A room that the\n"
-     "server has already is not sent again. With --scene no ROOM is needed.\n",
+     "server has already is not sent again. With --scene no ROOM is needed. The server checks the room first; a job\n"
+     "on one whose mesh and photographs do not fit is refused, unless it is told --set fit=ignore.\n",
      "  unbake submit living-room/ --watch\n"
      "  unbake submit room.zip --name kitchen --set texture_size=4096 --set seed=7\n"
      "  unbake submit --scene 3f2a91c0 --set quality=fine --priority 5\n",
      0, 1, submit_options, submit_run},
+    {"check", "ROOM", "tell whether the server can work with a room, before any job",
+     "The room is sent, once; its content is kept. Shows what was found, whether mesh and photographs fit and,\n"
+     "where they do not, how they would. Ends with 4 when the room is rejected, with 6 when it does not fit.\n",
+     "  unbake check living-room/ --pictures check\n  unbake check living-room/ --scene-set mesh_axes='x -z y'\n", 0, 1,
+     check_options, check_run},
     {"list", "", "list jobs, newest first", "", "  unbake list\n  unbake list --state failed --limit 5\n", 0, 0,
      list_options, list_run},
     {"show", "JOB", "show one job: state, settings, outputs", "",
@@ -72,11 +78,12 @@ static const struct command table[] = {
      edit_options, edit_run},
     {"rm", "JOB...", "remove jobs that do not run, with their outputs", "",
      "  unbake rm 12 13\n  unbake rm 12 --dry-run\n", 1, ANY_NUMBER, rm_options, rm_run},
-    {"scenes", "[show|keep|rm SCENE...]", "list uploaded rooms, show, keep or remove them",
+    {"scenes", "[show|keep|rm SCENE...|set SCENE KEY=VALUE...]", "list uploaded rooms, show, keep or remove them",
      "A SCENE is an id or its beginning, 8 digits or more. What the server removes by itself, and when,\n"
-     "is in the column `expires`.\n",
+     "is in the column `expires`. `set` says how a room is to be read, in place of what was said before (without\n"
+     "KEY=VALUE: as its files say), and has it checked again; see --scene-set of `submit`.\n",
      "  unbake scenes\n  unbake scenes show 3f2a91c0\n  unbake scenes keep 3f2a91c0 --pin\n"
-     "  unbake scenes rm 3f2a91c0 --dry-run\n",
+     "  unbake scenes rm 3f2a91c0 --dry-run\n  unbake scenes set 3f2a91c0 axes=opencv scale=0.001\n",
      0, ANY_NUMBER, collection_options, scenes_run},
     {"uploads", "[show|keep|rm UPLOAD...]", "list uploads, show, keep or give them up",
      "`unbake submit` of the same room goes on where an upload stopped. One that is whole has become\n"

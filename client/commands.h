@@ -10,6 +10,11 @@ int submit_run(struct client *c, const struct options *o);
 /* Adds "key=value" to an object of labels. */
 enum status label_add(cJSON *labels, const char *text, struct error *err);
 
+/* check.c */
+extern const struct client_option check_options[];
+int check_run(struct client *c, const struct options *o);
+int check_set_run(struct client *c, const struct options *o); /* `scenes set` */
+
 /* watch.c */
 extern const struct client_option watch_options[], logs_options[];
 int watch_run(struct client *c, const struct options *o);
@@ -41,8 +46,6 @@ bool get_name_is_safe(const char *name);
 
 /* scenes.c */
 int scenes_run(struct client *c, const struct options *o);
-/* Prints a rejected scene's problems, each with its file. */
-void scenes_print_problems(struct client *c, const cJSON *scene, FILE *out);
 
 /* uploads.c */
 extern const struct client_option collect_options[];

@@ -5,6 +5,7 @@
 #include "client/commands.h"
 #include "common/manual.h"
 #include "common/protocol.h"
+#include "common/reading.h"
 #include "common/settings.h"
 
 static void option_list(const struct client_option *option) {
@@ -97,6 +98,10 @@ static void completion(bool zsh) {
     completion_words(stdout, "--set");
     cJSON_ArrayForEach(setting, settings)
         completion_word(stdout, member_text(setting, "name"), "=");
+    completion_words_end(stdout);
+    completion_words(stdout, "--scene-set");
+    for (size_t i = 0; reading_keys[i]; i++)
+        completion_word(stdout, reading_keys[i], "=");
     completion_words_end(stdout);
     completion_words(stdout, "--state");
     for (size_t i = 0; command_job_states[i]; i++)

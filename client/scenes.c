@@ -3,6 +3,7 @@
 
 #include "client/collection.h"
 #include "client/commands.h"
+#include "client/findings.h"
 #include "client/retention.h"
 #include "client/table.h"
 #include "client/view.h"
@@ -10,10 +11,10 @@
 #include "common/protocol.h"
 
 static void print_scenes(struct client *c, const cJSON *items) {
-    static const char *const headings[] = {"scene", "state", ">size", ">age", ">expires", "?owner", "name"};
+    static const char *const headings[] = {"scene", "state", "?fit", ">size", ">age", ">expires", "?owner", "name"};
     struct table t;
     const cJSON *scene;
-    table_init(&t, 7, headings);
+    table_init(&t, 8, headings);
     cJSON_ArrayForEach(scene, items) {
         char size[16], age[16], expires[16];
         const char *state = member_text(scene, "state");
@@ -22,30 +23,25 @@ static void print_scenes(struct client *c, const cJSON *items) {
         table_row(&t);
         table_set(&t, 0, COLOUR_NONE, "%.12s", member_text(scene, "id"));
         table_set(&t, 1, state_colour(state), "%s", state);
-        table_set(&t, 2, COLOUR_NONE, "%s", size);
-        table_set(&t, 3, COLOUR_NONE, "%s", age);
+        table_set(&t, 2, COLOUR_NONE, "%s", findings_fit(scene));
+        table_set(&t, 3, COLOUR_NONE, "%s", size);
+        table_set(&t, 4, COLOUR_NONE, "%s", age);
         retention_text(expires, scene);
-        table_set(&t, 4, COLOUR_NONE, "%s", expires);
-        table_set(&t, 5, COLOUR_NONE, "%s", member_text(scene, "owner"));
-        table_set(&t, 6, COLOUR_NONE, "%s", member_text(scene, "name"));
+        table_set(&t, 5, COLOUR_NONE, "%s", expires);
+        table_set(&t, 6, COLOUR_NONE, "%s", member_text(scene, "owner"));
+        table_set(&t, 7, COLOUR_NONE, "%s", member_text(scene, "name"));
     }
     table_print(&t, &c->out);
     table_release(&t);
 }
 
-void scenes_print_problems(struct client *c, const cJSON *scene, FILE *out) {
-    const cJSON *problem;
-    cJSON_ArrayForEach(problem, member_items(scene, "problems")) {
-        struct buf line;
-        buf_init(&line, 1 << 16);
-        buf_puts(&line, terminal_colour(&c->out, COLOUR_YELLOW));
-        terminal_clean(&line, member_text(problem, "file"));
-        buf_puts(&line, terminal_colour(&c->out, COLOUR_NONE));
-        buf_puts(&line, *member_text(problem, "file") ? ": " : "");
-        terminal_clean(&line, member_text(problem, "reason"));
-        fprintf(out, "  %s\n", buf_text(&line));
-        buf_release(&line);
-    }
+/* What findings_print shows in its own way. */
+static bool is_finding(const char *fact) {
+    static const char *const names[] = {"fit", "reading", "previews", "table", "warnings"};
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+        if (strcmp(fact, names[i]) == 0)
+            return true;
+    return false;
 }
 
 static void print_scene(struct client *c, const cJSON *scene) {
@@ -62,14 +58,18 @@ static void print_scene(struct client *c, const cJSON *scene) {
     field_print(c, "created", member_text(scene, "created_at"));
     field_print(c, "expires", retention_time(scene));
     cJSON_ArrayForEach(fact, cJSON_GetObjectItemCaseSensitive(scene, "facts")) {
+        if (is_finding(member_name(fact)))
+            continue;
         char *text = cJSON_IsString(fact) ? mem_strdup(fact->valuestring) : json_text(fact);
         field_print(c, member_name(fact), text);
         mem_free(text);
     }
-    scenes_print_problems(c, scene, c->out.out);
+    findings_print(c, scene);
 }
 
 int scenes_run(struct client *c, const struct options *o) {
-    static const struct collection scenes = {"scenes", "scene", "/v1/scenes", print_scenes, print_scene};
+    if (o->word_count > 0 && strcmp(o->word[0], "set") == 0)
+        return check_set_run(c, o);
+    static const struct collection scenes = {"scenes", "scene", "/v1/scenes", print_scenes, print_scene, "set"};
     return collection_run(c, o, &scenes);
 }

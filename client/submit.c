@@ -13,9 +13,8 @@
 #include <sys/random.h>
 
 #include "client/commands.h"
-#include "client/meter.h"
-#include "client/pack.h"
-#include "client/upload.h"
+#include "client/findings.h"
+#include "client/client_room.h"
 #include "common/mem.h"
 #include "common/protocol.h"
 #include "common/settings.h"
@@ -25,24 +24,19 @@ const struct client_option submit_options[] = {
     {"set", 's', OPTION_LIST, "KEY=VALUE", "a setting; `unbake settings` lists them"},
     {"priority", 'p', OPTION_WHOLE, "N", "-100 to 100, larger goes first (0)"},
     {"label", 'l', OPTION_LIST, "KEY=VALUE", "a label of your own"},
-    {"scene", 0, OPTION_TEXT, "SCENE", "a room that is there already, instead of ROOM"},
+    ROOM_OPTIONS,
     {"share", 0, OPTION_FLAG, NULL, "let every user of the server look at the job and its room"},
     {"webhook", 0, OPTION_TEXT, "URL",
      "is told of the job's states, signed with $UNBAKE_WEBHOOK_SECRET (whsec_ and base64)"},
     {"watch", 'w', OPTION_FLAG, NULL, "follow the job to its end, as `unbake watch` does"},
-    {"dry-run", 0, OPTION_FLAG, NULL, "check the settings and the room; send and queue nothing"},
+    {"dry-run", 0, OPTION_FLAG, NULL, "check the settings and the room, which is sent for that; queue nothing"},
     {0},
 };
 
 struct submission {
     struct client *client;
-    struct pack *pack; /* NULL with --scene */
-    char *name;        /* of the room; owned */
-    char *scene;       /* id, or what --scene says; owned */
-    uint64_t length;   /* of the upload */
-    cJSON *job;        /* the body of POST /v1/jobs; owned */
-    bool present;      /* the server has the scene, and has not rejected it */
-    struct meter meter;
+    struct client_room room;
+    cJSON *job; /* the body of POST /v1/jobs; owned */
 };
 
 /* --- the job ------------------------------------------------------------------------------- */
@@ -77,7 +71,7 @@ static enum status describe_job(struct submission *s, const struct options *o, s
     if (options_flag(o, "share"))
         json_add_bool(s->job, "shared", true);
     json_add_int(s->job, "priority", options_whole(o, "priority", 0));
-    const char *name = options_text(o, "name", s->name), *url = options_text(o, "webhook", NULL);
+    const char *name = options_text(o, "name", NULL), *url = options_text(o, "webhook", NULL);
     const char *secret = getenv("UNBAKE_WEBHOOK_SECRET"); /* a command line is for all to read */
     if (name)
         json_add_string(s->job, "name", name);
@@ -89,75 +83,6 @@ static enum status describe_job(struct submission *s, const struct options *o, s
         json_add_string(webhook, "url", url);
         json_add_string(webhook, "secret", secret);
     }
-    return status;
-}
-
-/* --- the room ------------------------------------------------------------------------------ */
-
-/* "photos/living-room.tar.gz" -> "living-room"; "." -> the folder's own name. */
-static char *room_name(const char *path) {
-    static const char *const endings[] = {".zip", ".tar", ".tar.gz", ".tgz", ".tar.zst"};
-    char *whole = realpath(path, NULL);
-    const char *base = whole ? strrchr(whole, '/') + 1 : path;
-    size_t length = strlen(base);
-    for (size_t i = 0; i < sizeof endings / sizeof *endings; i++) {
-        size_t ending = strlen(endings[i]);
-        if (length > ending && strcmp(base + length - ending, endings[i]) == 0) {
-            length -= ending;
-            break;
-        }
-    }
-    char *name = mem_strndup(base, length > 200 ? 200 : length);
-    free(whole);
-    return *name ? name : (mem_free(name), mem_strdup("room"));
-}
-
-static bool on_measured(void *user, uint64_t done) {
-    struct submission *s = user;
-    meter_update(&s->meter, (double)done);
-    return !request_interrupted(s->client->request);
-}
-
-static struct terminal *meter_terminal(struct client *c) { return c->quiet || c->json ? NULL : &c->err; }
-
-static enum status measure(struct submission *s, const char *room, struct error *err) {
-    char sha256[SHA256_HEX_SIZE];
-    enum status status = pack_open(&s->pack, room, err);
-    if (status == STATUS_NOT_FOUND || status == STATUS_INPUT) {
-        err->status = STATUS_INPUT;
-        return error_hint(err, "ROOM is a folder or an archive");
-    }
-    if (status != STATUS_OK)
-        return status;
-    s->name = room_name(room);
-    meter_begin(&s->meter, meter_terminal(s->client), "reading", 0.0, (double)pack_content_bytes(s->pack));
-    status = pack_measure(s->pack, on_measured, s, &s->length, sha256, err);
-    meter_end(&s->meter);
-    if (status == STATUS_OK)
-        s->scene = mem_strdup(sha256);
-    return status;
-}
-
-static enum status ask_for_scene(struct submission *s, struct reply *reply, struct error *err) {
-    char *path = mem_printf("/v1/scenes/%s", s->scene);
-    enum status status = request_get(s->client->request, path, reply, err);
-    mem_free(path);
-    if (status == STATUS_NOT_FOUND && reply->code == 404)
-        return STATUS_OK;
-    if (status == STATUS_OK) /* a rejected one is sent again: it is then checked again */
-        s->present = strcmp(member_text(reply->json, "state"), SCENE_STATE_REJECTED) != 0;
-    return status;
-}
-
-static enum status upload(struct submission *s, struct reply *reply, struct error *err) {
-    struct client_upload u = {
-        .client = s->client, .pack = s->pack, .name = s->name, .sha256 = s->scene, .length = s->length};
-    char size[16];
-    enum status status = upload_send(&u, reply, err);
-    format_bytes(size, (double)s->length);
-    if (status == STATUS_OK)
-        client_note(s->client, "sent %s (%zu file%s, %s)", s->name, pack_file_count(s->pack),
-                    pack_file_count(s->pack) == 1 ? "" : "s", size);
     return status;
 }
 
@@ -173,13 +98,14 @@ static bool only_scene_is_missing(struct reply *reply) {
     return count > 0 && cJSON_GetArraySize(faults) == 0;
 }
 
-static enum status check(struct submission *s, struct reply *reply, struct error *err) {
+/* Has the server check the job. What is wrong with a scene that is about to be sent, or read otherwise, is no fault yet. */
+static enum status check(struct submission *s, bool is_to_change, struct reply *reply, struct error *err) {
     struct request_call call = {.method = "POST", .path = "/v1/jobs?dry_run=1", .body = s->job, .same_twice = true};
     enum status status = request_run(s->client->request, &call, reply, err);
-    bool to_be_sent = s->pack && !s->present;
-    if (status != STATUS_OK && reply->code == 422 && to_be_sent && only_scene_is_missing(reply))
-        return STATUS_OK;
-    return status;
+    if (status == STATUS_OK || !is_to_change)
+        return status;
+    bool does_not_fit = reply->code == 409;
+    return does_not_fit || (reply->code == 422 && only_scene_is_missing(reply)) ? STATUS_OK : status;
 }
 
 static enum status queue(struct submission *s, struct reply *reply, struct error *err) {
@@ -196,29 +122,20 @@ static enum status queue(struct submission *s, struct reply *reply, struct error
 
 static void print_dry_run(struct submission *s, const struct reply *reply) {
     struct client *c = s->client;
-    bool checked = reply->code == 200;
+    const struct client_room *room = &s->room;
     if (c->json) {
-        cJSON *object = checked ? cJSON_Duplicate(reply->json, true) : cJSON_CreateObject();
-        if (!checked) {
-            json_add_bool(object, "dry_run", true);
-            json_add_string(object, "scene", s->scene);
-            json_add_string(object, "scene_state", NULL);
-            json_add(object, "settings", cJSON_Duplicate(cJSON_GetObjectItemCaseSensitive(s->job, "settings"), true));
-        }
-        json_add_int(object, "upload_bytes", s->pack && !s->present ? (int64_t)s->length : 0);
+        cJSON *object = cJSON_Duplicate(reply->json, true);
+        const cJSON *fit =
+            cJSON_GetObjectItemCaseSensitive(cJSON_GetObjectItemCaseSensitive(room->found, "facts"), "fit");
+        json_add_int(object, "upload_bytes", room->was_sent ? (int64_t)room->length : 0);
+        json_add(object, "fit", fit ? cJSON_Duplicate(fit, true) : cJSON_CreateNull());
+        findings_add(object, room->found);
         client_print_json(c, object);
         cJSON_Delete(object);
-        return;
+    } else if (!c->quiet) {
+        printf("the settings are accepted\n");
+        client_say(c, "scene %.12s is on the server (%s)", room->scene, member_text(reply->json, "scene_state"));
     }
-    if (c->quiet)
-        return;
-    char size[16];
-    format_bytes(size, (double)s->length);
-    printf("the settings are accepted\n");
-    if (s->pack && !s->present)
-        printf("scene %.12s is not on the server: %s would be sent\n", s->scene, size);
-    else
-        client_say(c, "scene %.12s is on the server (%s)", s->scene, member_text(reply->json, "scene_state"));
 }
 
 static void print_job(struct submission *s, const cJSON *job) {
@@ -239,32 +156,40 @@ static void print_job(struct submission *s, const cJSON *job) {
 }
 
 static enum status submit(struct submission *s, const struct options *o, struct reply *reply, struct error *err) {
-    const char *scene = options_text(o, "scene", NULL);
-    if ((scene != NULL) == (o->word_count == 1)) {
-        error_set(err, STATUS_INPUT, scene ? "ROOM and --scene exclude each other" : "missing argument ROOM");
-        return error_hint(err, "an example: unbake submit living-room/ --watch");
-    }
-    s->scene = scene ? mem_strdup(scene) : NULL;
-    s->present = scene != NULL;
+    struct client_room *room = &s->room;
+    bool dry_run = options_flag(o, "dry-run");
     enum status status = describe_job(s, o, err);
-    if (status == STATUS_OK && !scene)
-        status = measure(s, o->word[0], err);
+    if (status == STATUS_OK)
+        status = client_room_open(room, s->client, o, reply, err);
     if (status != STATUS_OK)
         return status;
-    if (s->name && !cJSON_HasObjectItem(s->job, "name"))
-        json_add_string(s->job, "name", s->name);
-    json_add_string(s->job, "scene", s->scene);
-    if (!scene)
-        status = ask_for_scene(s, reply, err);
-    if (status == STATUS_OK)
-        status = check(s, reply, err);
-    if (status != STATUS_OK || options_flag(o, "dry-run"))
+    if (room->name && !cJSON_HasObjectItem(s->job, "name"))
+        json_add_string(s->job, "name", room->name);
+    json_add_string(s->job, "scene", room->scene);
+    bool is_to_change = client_room_is_to_change(room),
+         is_checked = strcmp(client_room_state(room), SCENE_STATE_READY) == 0;
+    status = check(s, is_to_change && (room->pack || room->found), reply, err);
+    if (dry_run && status == STATUS_OK && is_checked && !is_to_change)
+        findings_note(s->client, room->found);
+    if (status != STATUS_OK || (dry_run && is_checked && !is_to_change))
         return status;
-    if (!s->present)
-        status = upload(s, reply, err);
-    else if (!scene)
-        client_note(s->client, "the server has this room already");
-    return status == STATUS_OK ? queue(s, reply, err) : status;
+    status = client_room_send(room, reply, err);
+    if (status == STATUS_OK)
+        status = client_room_wait(room, reply, err);
+    if (status == STATUS_OK)
+        findings_note(s->client, room->found);
+    if (status != STATUS_OK)
+        return status;
+    return dry_run ? check(s, false, reply, err) : queue(s, reply, err);
+}
+
+/* A refusal's JSON tells what the check has found, too. */
+static int fail(struct submission *s, struct reply *reply, struct error *err) {
+    if (err->status == STATUS_CANCELLED)
+        error_hint(err, "no job was queued; the same command continues where this one stopped");
+    if (reply->code >= 400 && cJSON_IsObject(reply->json) && s->room.found)
+        findings_add(reply->json, s->room.found);
+    return client_fail(s->client, reply, err);
 }
 
 int submit_run(struct client *c, const struct options *o) {
@@ -275,19 +200,15 @@ int submit_run(struct client *c, const struct options *o) {
     int code = CLIENT_OK;
     int64_t job = 0;
     enum status status = submit(&s, o, &reply, &err);
-    if (status == STATUS_CANCELLED)
-        error_hint(&err, "no job was queued; the same command continues where this one stopped");
-    if (status != STATUS_OK)
-        code = client_fail(c, &reply, &err);
-    else if (options_flag(o, "dry-run"))
+    if (status != STATUS_OK) {
+        code = fail(&s, &reply, &err);
+    } else if (options_flag(o, "dry-run")) {
         print_dry_run(&s, &reply);
-    else {
+    } else {
         job = member_whole(reply.json, "id", 0);
         print_job(&s, reply.json);
     }
-    pack_close(s.pack);
-    mem_free(s.name);
-    mem_free(s.scene);
+    client_room_release(&s.room);
     cJSON_Delete(s.job);
     reply_release(&reply);
     return job && options_flag(o, "watch") ? watch_job(c, job, true) : code;

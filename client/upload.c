@@ -15,6 +15,7 @@
 #include "common/protocol.h"
 
 #define PATIENCE_SEC 600.0
+#define READING_MAX 400  /* bytes; what the server takes of Upload-Metadata is 1000, a longer one comes by PATCH */
 #define SILENCE_SEC 60.0 /* the connection is dead after this long without traffic */
 #define VERSION_FIELD "Tus-Resumable: " TUS_VERSION
 
@@ -67,6 +68,10 @@ static enum status create(struct upload_sending *s, struct reply *reply, struct 
     put_base64(&metadata, s->u->name);
     buf_puts(&metadata, ",sha256 ");
     put_base64(&metadata, s->u->sha256);
+    if (s->u->reading && strlen(s->u->reading) <= READING_MAX) {
+        buf_puts(&metadata, ",reading ");
+        put_base64(&metadata, s->u->reading);
+    }
     snprintf(length, sizeof length, "Upload-Length: %llu", (unsigned long long)s->u->length);
     struct request_call call = {
         .method = "POST", .path = "/v1/uploads", .once = true, .header = {VERSION_FIELD, length, buf_text(&metadata)}};

@@ -11,6 +11,7 @@ struct client_upload {
     struct client *client;
     struct pack *pack;
     const char *name, *sha256; /* name of the room; SHA-256 of the whole stream */
+    const char *reading;       /* how the room is to be read, JSON; NULL: not given */
     uint64_t length;           /* of the stream, bytes */
 };
 

@@ -50,7 +50,7 @@ static void print_upload(struct client *c, const cJSON *upload) {
 }
 
 int uploads_run(struct client *c, const struct options *o) {
-    static const struct collection uploads = {"uploads", "upload", "/v1/uploads", print_uploads, print_upload};
+    static const struct collection uploads = {"uploads", "upload", "/v1/uploads", print_uploads, print_upload, NULL};
     return collection_run(c, o, &uploads);
 }
 

@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "client/commands.h"
+#include "client/findings.h"
 #include "client/meter.h"
 #include "client/sse.h"
 #include "client/view.h"
@@ -210,7 +211,7 @@ static void print_rejection(struct client *c, const cJSON *job) {
     reply_init(&reply);
     char *path = mem_printf("/v1/scenes/%s", member_text(job, "scene"));
     if (request_get(c->request, path, &reply, NULL) == STATUS_OK)
-        scenes_print_problems(c, reply.json, c->out.out);
+        findings_print_faults(c, reply.json);
     mem_free(path);
     reply_release(&reply);
 }

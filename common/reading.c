@@ -22,6 +22,8 @@ static const char *const axes_name[] = {
 };
 #define AXES_COUNT (sizeof axes_name / sizeof *axes_name)
 
+const char *const reading_keys[] = {"transforms", "mesh", "axes", "mesh_axes", "scale", "shift", "exposures", NULL};
+
 struct reading reading_default(void) {
     return (struct reading){.mesh_axes = {.axis = {0, 1, 2}, .sign = {1.0f, 1.0f, 1.0f}}, .scale = 1.0};
 }

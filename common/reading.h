@@ -45,6 +45,8 @@ struct reading {
     bool ignores_exposures;
 };
 
+extern const char *const reading_keys[]; /* the members' names; ends with NULL */
+
 /* As the bundle says. */
 struct reading reading_default(void);
 void reading_release(struct reading *reading);

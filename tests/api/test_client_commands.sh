@@ -26,13 +26,13 @@ run 2 --server
 # --- a whole job ---------------------------------------------------------------------------------
 
 run 0 submit "$work/room" $quick --dry-run
-has "$out" "is not on the server"
+has "$out" "is on the server (ready)"
 run 0 list --json
 so '. == []'
 run 0 submit "$work/room" $quick --name 'my room' --label who=me --priority 3 --watch
 has "$out" "job 1 is queued: my room"
 has "$out" "job 1 succeeded"
-has "$err" "sent room (8 files"
+has "$err" "the server has this room already"
 run 0 show last --json
 so '.id == 1 and .state == "succeeded" and .name == "my room" and .labels.who == "me" and .priority == 3'
 so '.settings.texture_size == 64 and (.outputs | length) > 5'
@@ -232,15 +232,21 @@ equal "$out" ""
 jq -e '.status == 422 and (.invalid_params | length) == 1' <<<"$err" >/dev/null || fail "no invalid_params: $err"
 
 echo "this is no archive" >"$work/bad.zip"
-run 1 submit "$work/bad.zip" --watch
-has "$out" "failed"
+run 4 submit "$work/bad.zip" --watch
+has "$err" "was rejected"
 bad=$("$build/unbake" scenes -q | head -n 1)
 run 0 scenes show "$bad" --json
 so '.state == "rejected" and (.problems | length) > 0'
 make_room "$work/broken"
 head -c 60 "$work/room/images/1.png" >"$work/broken/images/1.png"
-run 1 submit "$work/broken" --watch
-has "$out" "images/1.png"
+run 4 submit "$work/broken" --watch
+has "$err" "images/1.png"
+run 4 submit "$work/broken" --json
+jq -e '.exit_status == 4 and (.problems | length) > 0' <<<"$err" >/dev/null || fail "no problems in JSON: $err"
+mkdir "$work/text"
+echo "nothing but text" >"$work/text/readme.txt"
+run 4 submit "$work/text" --dry-run
+has "$err" "was rejected"
 
 run 2 submit "$work/nothing-here"
 run 2 submit "$work/room" --set novalue
@@ -282,5 +288,5 @@ interrupt $!
 equal $? 130
 has "$(cat "$work/interrupted")" "no job was queued"
 run 0 scenes --json
-so 'length == 4'
+so 'length == 5'
 finish

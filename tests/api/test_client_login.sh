@@ -100,6 +100,7 @@ offered() { # what bash would offer for the last word
 equal "$(offered sub)" submit "completion of a command"
 equal "$(offered submit --wat)" --watch "completion of an option"
 equal "$(offered submit --set texture_)" texture_size= "completion of a setting"
+equal "$(offered check --scene-set mesh_)" mesh_axes= "completion of how a scene is read"
 equal "$(offered list --state fail)" failed "completion of a state"
 run 2 manual nothing
 finish

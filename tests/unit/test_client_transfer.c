@@ -168,12 +168,17 @@ static void test_submit(void) {
     add_reply(&s, "200 OK", "Upload-Offset: 2000\r\n", "", "HEAD /v1/uploads/ab ", NULL, NULL);
     add_step(&s, "", "PATCH", "Upload-Offset: 2000\r\n", "Content-Length: 1072\r\n"); /* only the reply is lost */
     add_reply(&s, "200 OK", "Upload-Offset: 3072\r\n", "", "HEAD /v1/uploads/ab ", NULL, NULL);
+    add_reply(&s, "200 OK", "", "{\"state\":\"checking\",\"problems\":[]}", "GET /v1/scenes/", NULL, NULL);
+    add_step(&s, "", "GET /v1/scenes/", NULL, NULL); /* away for a moment */
+    add_reply(&s, "200 OK", "", "{\"state\":\"ready\",\"facts\":{\"warnings\":[\"it is dim\"]}}", "GET /v1/scenes/",
+              NULL, NULL);
     add_reply(&s, "201 Created", "", "{\"id\":7,\"name\":\"room\",\"scene\":\"abcdef\"}", "POST /v1/jobs ",
               "Idempotency-Key: ", NULL);
     script_start(&s);
     CHECK_EXIT(client(&s, "submit %s/got/room/ --set texture_size=256 --label a=b", root), 0);
     CHECK_STRING(out_text, "job 7 is queued: room (scene abcdef)\n");
     CHECK_PART(err_text, "sent room (2 files");
+    CHECK_PART(err_text, "warning: it is dim");
     script_end(&s, "submit");
 
     /* Another process had begun: this one finds it and goes on; that it is gone is no end either. */
@@ -189,6 +194,7 @@ static void test_submit(void) {
     add_reply(&s, "200 OK", "", "{\"items\":[]}", "GET /v1/uploads?sha256=", NULL, NULL);
     add_reply(&s, "201 Created", "Location: /v1/uploads/3\r\n", "", "POST /v1/uploads ", NULL, NULL);
     add_reply(&s, "204 No Content", "Upload-Offset: 3072\r\n", "", "PATCH /v1/uploads/3", "Upload-Offset: 0\r\n", NULL);
+    add_reply(&s, "200 OK", "", "{\"state\":\"ready\"}", "GET /v1/scenes/", NULL, NULL);
     add_reply(&s, "201 Created", "", "{\"id\":8,\"name\":\"room\",\"scene\":\"abcdef\"}", "POST /v1/jobs ", NULL, NULL);
     script_start(&s);
     CHECK_EXIT(client(&s, "submit %s/got/room/", root), 0);
