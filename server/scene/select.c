@@ -52,8 +52,10 @@ enum status scene_exclude(struct scene *scene, const char *patterns, size_t *lef
     return status;
 }
 
-static bool is_inside(vec3 p, const double lower[3], const double upper[3]) {
-    const double c[3] = {(double)p.x, (double)p.y, (double)p.z};
+/* Whether a triangle's centre is in the box, which has the input's coordinates. */
+static bool is_inside(const struct mesh *mesh, size_t triangle, const double lower[3], const double upper[3]) {
+    vec3 p = mesh_point(mesh, triangle, 1.0f / 3.0f, 1.0f / 3.0f);
+    const double c[3] = {(double)p.x + mesh->offset[0], (double)p.y + mesh->offset[1], (double)p.z + mesh->offset[2]};
     for (int i = 0; i < 3; i++)
         if (!(c[i] >= lower[i] && c[i] <= upper[i]))
             return false;
@@ -65,13 +67,13 @@ enum status scene_crop(struct scene *scene, const double lower[3], const double 
     struct mesh *mesh = &scene->mesh;
     size_t kept = 0;
     for (size_t t = 0; t < mesh->triangle_count; t++)
-        kept += is_inside(mesh_point(mesh, t, 1.0f / 3.0f, 1.0f / 3.0f), lower, upper);
+        kept += is_inside(mesh, t, lower, upper);
     *left_out = mesh->triangle_count - kept;
     if (kept == 0)
         return error_set(err, STATUS_INPUT, "crop: no triangle of the mesh has its centre in the box");
     kept = 0;
     for (size_t t = 0; t < mesh->triangle_count; t++) {
-        if (!is_inside(mesh_point(mesh, t, 1.0f / 3.0f, 1.0f / 3.0f), lower, upper))
+        if (!is_inside(mesh, t, lower, upper))
             continue;
         memmove(mesh->index[kept], mesh->index[t], sizeof *mesh->index);
         mesh->face[kept] = mesh->face[t];

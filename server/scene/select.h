@@ -11,8 +11,8 @@
  * "" leaves out none); *left_out counts them. STATUS_INPUT when a pattern matches none. */
 enum status scene_exclude(struct scene *scene, const char *patterns, size_t *left_out, struct error *err);
 
-/* Leaves out the triangles whose centre lies outside of the box, in the mesh's coordinates (metres); *left_out counts
- * them. Vertices stay. STATUS_INPUT when no triangle is left. */
+/* Leaves out the triangles whose centre lies outside of the box, in the input's coordinates (metres; mesh.h:
+ * offset); *left_out counts them. Vertices stay. STATUS_INPUT when no triangle is left. */
 enum status scene_crop(struct scene *scene, const double lower[3], const double upper[3], size_t *left_out,
                        struct error *err);
 

@@ -1,5 +1,6 @@
 /* test_corrections.c -- what a user puts right of a job: photographs left out, a part of the mesh kept, a segment that
  * emits or does not. */
+#include "server/scene/select.h"
 #include "tests/unit/tiny_scene.h"
 
 #define SETTINGS TINY_SETTINGS ",\"quality\":\"draft\""
@@ -46,6 +47,20 @@ static void check_mesh(void) {
     refused("{" SETTINGS ",\"crop\":\"1 0 0 0 1 1\"}", "six numbers");
     cJSON_Delete(whole);
     cJSON_Delete(part);
+
+    /* The same triangle of a mesh that was recentred. */
+    vec3 position[4] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
+    uint32_t index[2][3] = {{0, 1, 2}, {1, 3, 2}}, face[2] = {0, 1};
+    struct scene far = {.mesh = {.vertex_count = 4,
+                                 .position = position,
+                                 .triangle_count = 2,
+                                 .index = index,
+                                 .face = face,
+                                 .offset = {600000.0, 5000000.0, 0.0}}};
+    size_t left_out;
+    const double lower[3] = {600000.0, 5000000.0, -1.0}, upper[3] = {600000.5, 5000000.5, 1.0};
+    OK(scene_crop(&far, lower, upper, &left_out, &err));
+    CHECK(left_out == 1 && index[0][1] == 1);
 }
 
 static void check_emitters(void) {
