@@ -28,6 +28,9 @@ struct response *scenes_get(struct api *api, struct request *r);
 struct response *scenes_patch(struct api *api, struct request *r);
 struct response *scenes_delete(struct api *api, struct request *r);
 
+/* previews.c */
+struct response *previews_get(struct api *api, struct request *r);
+
 /* collect.c */
 struct response *collect_now(struct api *api, struct request *r);
 

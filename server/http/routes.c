@@ -31,6 +31,7 @@ static const struct route table[] = {
     {METHOD_GET, "/v1/scenes/{scene}", ROUTE_VIEWER, scenes_get, 0, ROUTE_QUICK, ""},
     {METHOD_PATCH, "/v1/scenes/{scene}", ROUTE_USER, scenes_patch, ROUTE_BODY_JSON, ROUTE_QUICK, ""},
     {METHOD_DELETE, "/v1/scenes/{scene}", ROUTE_USER, scenes_delete, 0, ROUTE_SLOW, "dry_run"},
+    {METHOD_GET, "/v1/scenes/{scene}/preview/{name}", ROUTE_VIEWER, previews_get, 0, ROUTE_QUICK, ""},
     {METHOD_OPTIONS, "/v1/uploads", ROUTE_PUBLIC, uploads_options, 0, ROUTE_AT_ONCE, ""},
     {METHOD_GET, "/v1/uploads", ROUTE_VIEWER, uploads_list, 0, ROUTE_QUICK, "sha256 limit cursor"},
     {METHOD_POST, "/v1/uploads", ROUTE_USER, uploads_add, 0, ROUTE_SLOW, ""},

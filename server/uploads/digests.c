@@ -11,7 +11,7 @@
 
 #include "common/log.h"
 #include "common/mem.h"
-#include "server/data/job_file.h"
+#include "server/data/work_file.h"
 
 #define CHUNK_BYTES ((size_t)256 << 10)
 #define RETRY_SEC 10 /* after the store could not be read or written */
@@ -89,9 +89,9 @@ enum status digests_hash(int fd, const atomic_bool *stopping, struct file_versio
 }
 
 /* A hash: the numbers themselves (the inode) are not for the public. */
-static void make_tag(int64_t job_id, const char *name, const struct file_version *v, char tag[33]) {
+static void make_tag(const char *thing, const char *name, const struct file_version *v, char tag[33]) {
     char hex[SHA256_HEX_SIZE];
-    char *text = mem_printf("%lld %s %llu %llu %lld %lld", (long long)job_id, name, (unsigned long long)v->inode,
+    char *text = mem_printf("%s %s %llu %llu %lld %lld", thing, name, (unsigned long long)v->inode,
                             (unsigned long long)v->bytes, (long long)v->modified_ns, (long long)v->changed_ns);
     sha256_of(text, strlen(text), hex);
     snprintf(tag, 33, "%.32s", hex);
@@ -115,8 +115,21 @@ enum status digests_look(struct digests *d, int64_t job_id, const struct output_
         if (store_output_want_digest(d->store, job_id, row->name, &why) != STATUS_OK)
             log_debug("job %lld: %s is not hashed: %s", (long long)job_id, row->name, why.message);
     }
+    char job[24];
+    snprintf(job, sizeof job, "%lld", (long long)job_id);
     file->bytes = v.bytes;
-    make_tag(job_id, row->name, &v, file->tag);
+    make_tag(job, row->name, &v, file->tag);
+    return status;
+}
+
+enum status digests_look_at(int fd, const char *thing, const char *name, struct digests_file *file, struct error *err) {
+    struct file_version v;
+    *file = (struct digests_file){0};
+    enum status status = look(fd, &v, err);
+    if (status == STATUS_OK && v.bytes <= DIGESTS_AT_ONCE)
+        status = digests_hash(fd, NULL, &v, file->hex, err);
+    file->bytes = v.bytes;
+    make_tag(thing, name, &v, file->tag);
     return status;
 }
 
@@ -127,7 +140,7 @@ static bool compute(struct digests *d, int64_t job_id, const struct output_row *
                     char hex[SHA256_HEX_SIZE], bool *is_had) {
     struct error err;
     int fd;
-    enum status status = job_file_open_output(d->data_dir, job_id, row->name, &fd, &err);
+    enum status status = work_file_open_output(d->data_dir, job_id, row->name, &fd, &err);
     if (status == STATUS_OK) {
         status = digests_hash(fd, &d->stopping, version, hex, &err);
         close(fd);

@@ -158,7 +158,7 @@ static void test_matrix(void) {
                 const char *body = table[i].body == ROUTE_BODY_JSON ? "{}" : "";
                 int found = status_of((enum who)who, methods[table[i].method], path, body);
                 int wanted = wanted_refusal(&table[i], (enum who)who, (enum thing)thing, names_thing);
-                bool is_file = strstr(table[i].pattern, "{name...}") != NULL; /* there is none: 404 */
+                bool is_file = strstr(table[i].pattern, "{name") != NULL; /* there is none: 404 */
                 bool good = wanted ? found == wanted : found != 401 && found != 403 && (is_file || found != 404);
                 if (strcmp(table[i].pattern, "/v1/session") == 0 && table[i].method == METHOD_POST)
                     good = found == 400; /* {} has no token */

@@ -34,6 +34,20 @@ for path in '/v1/jobs' '/v1/jobs?dry_run=1'; do
     field .hint | grep -q "the mesh is y-up: .unbake scenes set" || fail "no remedy: $(cat "$work/body")"
     equal "$(field '.remedy | tojson')" '{"mesh_axes":"x -z y"}' "the remedy to PATCH"
 done
+# --- its pictures ---
+mkdir -p "$idle_dir/scenes/$scene/previews"
+printf '\x89PNG and so on' >"$idle_dir/scenes/$scene/previews/plan.png"
+cp "$idle_dir/scenes/$scene/previews/plan.png" "$idle_dir/scenes/$scene/previews/other.png"
+preview=/v1/scenes/${scene:0:10}/preview
+call GET "$preview/plan.png"; expect 200; equal "$(header content-type)" image/png; equal "$(wc -c <"$work/body")" 14 "bytes"
+equal "$(header content-security-policy)" "sandbox allow-same-origin; script-src 'none'"
+etag=$(header etag); equal "$etag" "\"sha256-$(sha256sum <"$work/body" | cut -c 1-64)\"" ETag
+call GET "$preview/plan.png" -H "If-None-Match: $etag"; expect 304
+call GET "$preview/plan.png" -H 'Range: bytes=1-3'; expect 206; equal "$(cat "$work/body")" PNG
+call HEAD "$preview/plan.png"; expect 200
+for name in other.png plan.pn archive ..%2Farchive .. overlay.png; do call GET "$preview/$name"; [[ $status = 40[04] ]] || fail "$name: $status"; done
+call GET /v1/scenes/ffffffff/preview/plan.png; expect 404
+
 post /v1/jobs "{\"scene\":\"$scene\",\"settings\":{\"fit\":\"ignore\"}}"; expect 201 "one that was told to take it"; job=$(field .id)
 for verdict in yes doubtful; do
     patch "/v1/scenes/$scene" '{"reading":null}'; expect 200; equal "$(field '.reading | tojson')" '{}' "null takes it back"

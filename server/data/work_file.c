@@ -1,5 +1,5 @@
-/* job_file.c -- see job_file.h. */
-#include "server/data/job_file.h"
+/* work_file.c -- see work_file.h. */
+#include "server/data/work_file.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -11,10 +11,9 @@
 #include "common/mem.h"
 #include "server/data/layout.h"
 
-/* Opens `path`, which is relative to the data folder and begins with jobs/. That folder itself may be a link: only
- * an administrator can have made it. */
-static enum status open_in_jobs(const char *data_dir, const char *path, int *out, struct error *err) {
-    char *root = layout_jobs(data_dir);
+/* Opens `path`, which is relative to the data folder and begins with the name of the folder `root` (taken): jobs/ or
+ * scenes/. That folder itself may be a link: only an administrator can have made it. */
+static enum status open_in(char *root, const char *path, int *out, struct error *err) {
     int fd = open(root, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     mem_free(root);
     for (const char *at = strchr(path, '/') + 1; fd >= 0 && *at;) {
@@ -38,17 +37,26 @@ static enum status open_in_jobs(const char *data_dir, const char *path, int *out
     return fd >= 0 ? STATUS_OK : error_set_errno(err, errno, "cannot open %s", path);
 }
 
-enum status job_file_open_output(const char *data_dir, int64_t job_id, const char *name, int *fd, struct error *err) {
+enum status work_file_open_output(const char *data_dir, int64_t job_id, const char *name, int *fd, struct error *err) {
     char *folder = layout_job(NULL, job_id), *path = layout_output(folder, name);
-    enum status status = open_in_jobs(data_dir, path, fd, err);
+    enum status status = open_in(layout_jobs(data_dir), path, fd, err);
     mem_free(path);
     mem_free(folder);
     return status;
 }
 
-enum status job_file_open_log(const char *data_dir, int64_t job_id, int *fd, struct error *err) {
+enum status work_file_open_log(const char *data_dir, int64_t job_id, int *fd, struct error *err) {
     char *folder = layout_job(NULL, job_id), *path = layout_log(folder);
-    enum status status = open_in_jobs(data_dir, path, fd, err);
+    enum status status = open_in(layout_jobs(data_dir), path, fd, err);
+    mem_free(path);
+    mem_free(folder);
+    return status;
+}
+
+enum status work_file_open_preview(const char *data_dir, const char *scene_id, const char *name, int *fd,
+                                   struct error *err) {
+    char *folder = layout_scene(NULL, scene_id), *path = layout_preview(folder, name);
+    enum status status = open_in(layout_scenes(data_dir), path, fd, err);
     mem_free(path);
     mem_free(folder);
     return status;
