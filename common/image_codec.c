@@ -71,8 +71,8 @@ void image_convert(struct image *image, struct image_info *info, struct color *c
 }
 
 size_t image_source_read(struct image_source *source, uint64_t offset, void *buffer, size_t length) {
-    if (offset >= source->size)
-        return 0;
+    if (offset >= source->size || length == 0)
+        return 0; /* libraries ask for nothing, too, into a NULL buffer */
     if (length > source->size - offset)
         length = (size_t)(source->size - offset);
     if (source->memory) {

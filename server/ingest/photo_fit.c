@@ -39,17 +39,30 @@ static void scale_lens(struct lens *lens, double x, double y) {
     lens->cy *= y;
 }
 
-/* The picture of the fit's size after `turn`, if the stated size is that or a multiple of it. */
+/* Whether the principal point is at the centre of such a picture. */
+static bool is_centred(const struct lens *lens, double factor, uint32_t width, uint32_t height) {
+    return fabs(2.0 * lens->cx / (factor * width) - 1.0) < CENTRE_TOLERANCE &&
+           fabs(2.0 * lens->cy / (factor * height) - 1.0) < CENTRE_TOLERANCE;
+}
+
+static bool has_no_size(const struct lens *lens) { return isnan(lens->width) && isnan(lens->height); }
+
+/* The picture of the fit's size after `turn`, if the stated size is that or a multiple of it or, where none is stated,
+ * if only that has the principal point at its centre. */
 static bool try_turn(struct photo_fit *fit, const struct lens *stated, int turn) {
     bool swaps = image_orientation_swaps(turn);
     uint32_t width = swaps ? fit->height : fit->width, height = swaps ? fit->width : fit->height;
-    if (!is_size(stated, width, height) && !is_scaled(stated, width, height))
+    bool is_told = has_no_size(stated)
+                       ? is_centred(stated, 1.0, width, height) && !is_centred(stated, 1.0, height, width)
+                       : is_size(stated, width, height) || is_scaled(stated, width, height);
+    if (!is_told)
         return false;
     fit->turn = turn;
     fit->lens = *stated;
-    fit->scale = width / stated->width;
-    if (!is_size(stated, width, height))
+    if (!has_no_size(stated) && !is_size(stated, width, height)) {
+        fit->scale = width / stated->width;
         scale_lens(&fit->lens, fit->scale, height / stated->height);
+    }
     fit->lens.width = width;
     fit->lens.height = height;
     return true;
@@ -102,18 +115,17 @@ static void turn_alike(const struct transforms *t, struct photo_fit *fit, struct
             turned++;
     if (turned > 0)
         findings_warning(f,
-                         "%zu photographs were turned by their EXIF orientation: the sizes that are stated for them are "
-                         "those of the upright pictures",
+                         "%zu photographs were turned by their EXIF orientation: the size or principal point that is "
+                         "stated for them is that of the upright picture",
                          turned);
 }
 
 /* n or 1 / n, by which the principal point's picture is larger than the frame's; 0: neither. */
 static double factor_of(const struct photo_fit *fit) {
-    double x = 2.0 * fit->lens.cx / fit->width, y = 2.0 * fit->lens.cy / fit->height;
     for (int n = 2; n <= MAX_FACTOR; n++)
         for (int k = 0; k < 2; k++) {
             double factor = k == 0 ? n : 1.0 / n;
-            if (fabs(x / factor - 1.0) < CENTRE_TOLERANCE && fabs(y / factor - 1.0) < CENTRE_TOLERANCE)
+            if (is_centred(&fit->lens, factor, fit->width, fit->height))
                 return factor;
         }
     return 0.0;
@@ -127,7 +139,7 @@ static void scale_by_centres(const char *name, const struct transforms *t, struc
         if (fit[i].status != STATUS_OK)
             continue;
         const struct lens *lens = &fit[i].lens;
-        double own = isnan(lens->width) && isnan(lens->height) && !isnan(lens->cx + lens->cy) ? factor_of(&fit[i]) : 0.0;
+        double own = has_no_size(lens) ? factor_of(&fit[i]) : 0.0;
         if (own == 0.0 || (count > 0 && own != factor))
             return;
         first = count == 0 ? i : first;

@@ -347,7 +347,7 @@ static enum status collect(struct loading *l, const char *name, struct findings 
             continue;
         make_relative(&o->err, l->dir);
         if (o->is_broken && leaves_out) {
-            findings_warning(f, "%s was left out: %s", l->path[i], o->err.message);
+            findings_warning(f, "%s; %s was left out", o->err.message, o->mask_failed ? l->path[i] : "it");
         } else if (o->status == STATUS_INPUT || o->status == STATUS_LIMIT) {
             findings_error(f, o->mask_failed ? frame->mask : l->path[i], &o->err);
         } else if (status == STATUS_OK) {

@@ -102,6 +102,10 @@ static void turned(void) {
     CHECK(load_copies(JPEG, "\"w\":32,\"h\":48,\"fl_x\":40,\"cx\":16,\"cy\":24"));
     CHECK(scene.photograph[0].camera.width == 16 && strstr(told, "multiplied by 0.5"));
     check_lens(20, 20, 8, 12);
+    CHECK(load_copies(JPEG, "\"fl_x\":20,\"cx\":7.9,\"cy\":12.1")); /* no size: by the principal point */
+    CHECK_THAT(scene.photograph[0].camera.width == 16 && strstr(told, "turned by"), "%s", told);
+    CHECK(load_copies(JPEG, "\"fl_x\":20,\"cx\":12,\"cy\":8") && scene.photograph[0].camera.width == 24);
+    CHECK(load_copies(JPEG, "\"fl_x\":20") && scene.photograph[0].camera.width == 24);
 }
 
 /* All eight orientations against the definition of each: where the stored first row and first column are seen. */
@@ -156,7 +160,7 @@ static void broken(void) {
     put_copy("1.jpg", PLAIN, 300);
     put("3.jpg", "<html>404</html>", 16);
     CHECK_THAT(load(work) && scene.photograph_count == 3, "%s", told);
-    CHECK_THAT(strstr(told, "1.jpg was left out: 1.jpg: damaged JPEG") && strstr(told, "3.jpg was left out"), "%s", told);
+    CHECK_THAT(strstr(told, "1.jpg: damaged JPEG: the file is cut short; it was left out") && strstr(told, "3.jpg: not a picture"), "%s", told);
     put("0.jpg", "", 0);
     CHECK(!load(work));
     CHECK_THAT(strstr(told, "file: 0.jpg") && strstr(told, "file: 1.jpg") && strstr(told, "file: 3.jpg"), "%s", told);
