@@ -9,7 +9,7 @@
 #include "server/capture/overlap.h"
 #include "server/capture/validation.h"
 
-/* Surface points compared: so many a photograph, within these bounds (time and memory); by hand. */
+/* Surface points compared: their number a photograph, and bounds of all (time and memory); by hand. */
 #define POINTS_PER_FRAME 60
 #define POINTS_MIN 4000
 #define POINTS_MAX 24000

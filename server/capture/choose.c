@@ -2,6 +2,7 @@
 #include "server/capture/choose.h"
 
 #include "common/rng.h"
+#include "common/spaced.h"
 
 uint32_t choose_permute(uint32_t index, uint32_t count, uint32_t key) {
     uint32_t mask = count - 1;
@@ -45,8 +46,8 @@ void chooser_init(struct chooser *c, size_t item_count, size_t per_iteration, ui
 size_t chooser_item(const struct chooser *c, uint64_t iteration, size_t stratum) {
     uint64_t epoch = iteration / c->epoch_length;
     uint32_t turn = (uint32_t)(iteration % c->epoch_length);
-    size_t first = stratum * c->item_count / c->stratum_count;
-    size_t end = (stratum + 1) * c->item_count / c->stratum_count;
+    size_t first = spaced(stratum, c->item_count, c->stratum_count);
+    size_t end = spaced(stratum + 1, c->item_count, c->stratum_count);
     uint32_t key = (uint32_t)rng_key(c->seed, epoch, stratum);
     uint32_t place = choose_permute(turn, (uint32_t)c->epoch_length, key);
     return first + place < end ? first + place : CHOOSE_NONE;

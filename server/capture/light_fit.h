@@ -12,7 +12,7 @@
 #include "server/capture/overlap.h"
 #include "server/capture/views.h"
 
-#define LIGHT_HELD_OUT_EVERY 4 /* one point in so many is held out; by hand */
+#define LIGHT_HELD_OUT_EVERY 4 /* one point in four is held out; by hand */
 
 #define LIGHT_CAUCHY 0.25 /* inverse square of the Cauchy scale: two standard deviations; by hand */
 

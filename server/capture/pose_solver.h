@@ -27,7 +27,7 @@
 #define POSE_CELL_ROWS 6
 #define POSE_CELLS (POSE_CELL_COLUMNS * POSE_CELL_ROWS)
 #define POSE_OBSERVATIONS_MAX (TRACK_OTHERS + 1)
-#define POSE_HELD_OUT_EVERY 3    /* one track in so many is held out; by hand */
+#define POSE_HELD_OUT_EVERY 3    /* one track in three is held out; by hand */
 #define POSE_MIN_OBSERVATIONS 60 /* finite ones, for a photograph to be moved: ten an unknown */
 #define POSE_ROUNDS 12           /* Gauss-Newton steps at each level; by hand */
 #define POSE_STEP_PX 1.5         /* pixels of a level: largest step; by hand */

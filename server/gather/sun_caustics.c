@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "common/mem.h"
+#include "common/spaced.h"
 #include "server/render/bsdf.h"
 #include "server/render/sampler.h"
 #include "server/scene/surface.h"
@@ -71,7 +72,7 @@ static void choose_texels(struct caustics *m) {
     size_t wanted = lit < MAX_PHOTONS ? lit : MAX_PHOTONS;
     m->texel = mem_array(wanted + 1, sizeof *m->texel);
     for (size_t i = 0; i < m->inverse->valid_count && m->count < wanted; i++) {
-        if (m->lit[i] && met++ == m->count * lit / wanted)
+        if (m->lit[i] && met++ == spaced(m->count, lit, wanted))
             m->texel[m->count++] = m->inverse->valid[i];
     }
     if (m->count == 0)

@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "common/rng.h"
+#include "common/spaced.h"
 #include "server/capture/best.h"
 #include "server/gather/highlight.h"
 #include "server/render/sampler.h"
@@ -108,7 +109,7 @@ float changing_light(const struct divide *d, const uint32_t *texel, size_t count
     uint32_t place[PLACES];
     size_t places = 0, spread = 0, changes = 0;
     for (size_t i = 0; i < PLACES && count >= PLACES; i++) {
-        uint32_t at = texel[i * count / PLACES];
+        uint32_t at = texel[spaced(i, count, PLACES)];
         if (fused->count[at] < PHOTOGRAPHS_LEAST)
             continue;
         spread += fused->spread[at] > SPREAD_LEAST;

@@ -5,6 +5,7 @@
 #include <math.h>
 
 #include "common/mem.h"
+#include "common/spaced.h"
 #include "server/gather/incident.h"
 #include "server/render/sampler.h"
 #include "server/state/evidence.h"
@@ -152,7 +153,7 @@ bool lamps_is_open(const struct lamps *l) {
     const struct reconstruction *r = l->r;
     size_t out = 0, wanted = l->places.count < OPEN_PLACES ? l->places.count : OPEN_PLACES;
     for (size_t i = 0; i < wanted; i++) {
-        const struct surface_point *at = &l->places.place[i * l->places.count / wanted].at;
+        const struct surface_point *at = &l->places.place[spaced(i, l->places.count, wanted)].at;
         vec3 frame[3] = {[2] = at->shading};
         vec3_frame(at->shading, &frame[0], &frame[1]);
         for (uint32_t k = 0; k < OPEN_RAYS; k++) {

@@ -6,6 +6,7 @@
 
 #include "common/mem.h"
 #include "common/quantile.h"
+#include "common/spaced.h"
 #include "server/gather/sun.h"
 #include "server/render/sampler.h"
 
@@ -128,7 +129,7 @@ void light_places_thin(struct light_places *thin, const struct light_places *s, 
     size_t wanted = s->count < most ? s->count : most;
     *thin = (struct light_places){.count = wanted, .place = mem_array(wanted + 1, sizeof *thin->place)};
     for (size_t i = 0; i < wanted; i++)
-        thin->place[i] = s->place[i * s->count / wanted];
+        thin->place[i] = s->place[spaced(i, s->count, wanted)];
 }
 
 void light_places_release(struct light_places *s) {

@@ -60,10 +60,10 @@ static void light_place(void *user, size_t index, int thread) {
 void segment_light_places(const struct segment_light *l, struct light_places *places, uint32_t segment, size_t points) {
     const struct reconstruction *r = l->r;
     struct lighting job = {.accel = r->world.accel, .place = places->place};
-    size_t first = l->texels.first[segment], count = l->texels.first[segment + 1] - first;
+    size_t count = by_segment_count(&l->texels, segment);
     size_t wanted = count < points ? count : points;
     for (size_t i = 0; i < wanted; i++) {
-        uint32_t texel = l->texels.texel[first + i * count / wanted];
+        uint32_t texel = by_segment_spaced(&l->texels, segment, i, wanted);
         job.point_count +=
             surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &job.point[job.point_count]);
     }

@@ -33,10 +33,10 @@ struct divide {
     struct measured *measured; /* [height][width] base colour by the photographs */
 };
 
-/* Directions of one highlight where a pixel covers so many texels. */
+/* Directions of one highlight where a pixel covers that many texels. */
 size_t divide_highlight_samples(double texels_per_pixel);
 
-/* Measures so many valid texels. Emitters, whose own light hides it, get a neutral base colour. */
+/* Measures texel[count], which are valid. Emitters, whose own light hides it, get a neutral base colour. */
 void divide_texels(struct divide *d, const uint32_t *texel, size_t count);
 
 /* *diffuse: radiance of the measured texels towards their normals, without highlights; count is 0 for all others. Its

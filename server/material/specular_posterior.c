@@ -13,8 +13,8 @@
 /* Prior probability of a diffuse segment: of small ones, and of those that are at least LARGE_PART of the surface, most
  * of which are painted walls and ceilings. The others are dielectrics, most with an index of refraction near 1.5
  * (specular .5), and likelier the smoother: what has a highlight is varnished or polished. By hand. */
-#define MATT_PRIOR 0.35
-#define MATT_PRIOR_LARGE 0.65
+#define DIFFUSE_PRIOR 0.35
+#define DIFFUSE_PRIOR_LARGE 0.65
 #define LARGE_PART 0.05
 /* Probability that two segments of the same colour share a material. It falls as a normal distribution of the
  * difference of the cube roots of the colours (a perceptual scale), whose deviation is that of base colour errors. */
@@ -26,7 +26,7 @@ static const double specular_prior[HIGHLIGHT_SPECULARS] = {0.05, 0.15, 0.5, 0.15
 
 /* Prior of each candidate for a segment that has this part of the surface. */
 static void prior_of(double part, double prior[SPECULAR_CANDIDATES]) {
-    double diffuse = MATT_PRIOR + (MATT_PRIOR_LARGE - MATT_PRIOR) * fmin(part / LARGE_PART, 1.0), sum = 0.0;
+    double diffuse = DIFFUSE_PRIOR + (DIFFUSE_PRIOR_LARGE - DIFFUSE_PRIOR) * fmin(part / LARGE_PART, 1.0), sum = 0.0;
     for (size_t k = 0; k < HIGHLIGHT_ROUGHNESSES; k++) {
         for (size_t m = 0; m < HIGHLIGHT_SPECULARS; m++) {
             float roughness = specular_levels.roughness[k];

@@ -11,7 +11,7 @@
 /* Lower bound of scaled base colour: no factor could raise 0 again. */
 #define BLOCKS_LEAST_COLOR 0.002f
 
-/* Blocks that lie across so many texels. */
+/* Number of blocks across that many texels. */
 static inline size_t blocks_across(uint32_t texels, int level) {
     return ((size_t)texels + ((size_t)1 << level) - 1) >> level;
 }

@@ -16,7 +16,7 @@ static const double difference_deviation[CORRECTION_KINDS] = {0.02, 0.006};
 /* Observations with the room's mean variance that are added to a cell's own, which are too few for a variance. */
 #define ROOM_OBSERVATIONS 64.0f
 #define MAX_LOG_FACTOR 0.1f /* bound of a logarithm */
-/* Conjugate gradients end at this part of the squared residual, or after so many steps. The wide prior on factors makes
+/* Conjugate gradients end at this part of the squared residual, or after MAX_STEPS steps. The wide prior on factors makes
  * the system ill-conditioned. */
 #define RESIDUAL_PART 1e-8
 #define MAX_STEPS 2000

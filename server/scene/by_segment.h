@@ -5,6 +5,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "common/spaced.h"
 #include "server/scene/inverse_uv.h"
 #include "server/scene/segment.h"
 
@@ -23,7 +24,7 @@ static inline size_t by_segment_count(const struct texels_by_segment *t, size_t 
 
 /* The i-th of `wanted` evenly spaced texels of a segment; 1 <= wanted <= by_segment_count. */
 static inline uint32_t by_segment_spaced(const struct texels_by_segment *t, size_t segment, size_t i, size_t wanted) {
-    return t->texel[t->first[segment] + i * by_segment_count(t, segment) / wanted];
+    return t->texel[t->first[segment] + spaced(i, by_segment_count(t, segment), wanted)];
 }
 
 #endif
