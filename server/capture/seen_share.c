@@ -1,43 +1,23 @@
 /* seen_share.c -- see seen_share.h. */
 #include "server/capture/seen_share.h"
 
-#include <math.h>
 #include <stdio.h>
 
 #include "common/mem.h"
-#include "common/rng.h"
+#include "server/scene/area_sample.h"
 
 #define OPEN_MOST 0.5 /* share of the pixels beyond which the poses are suspected rather than the mesh; by hand */
 
 struct seen_job {
     const struct views *views;
-    const double *area_until; /* [triangle_count] sum of the triangles' areas up to this one */
-    bool *is_seen;            /* [SEEN_SHARE_POINTS] */
+    struct area_sampler sampler;
+    bool *is_seen; /* [SEEN_SHARE_POINTS] */
 };
-
-/* The triangle that holds this much of the area. */
-static size_t triangle_at(const double *area_until, size_t count, double area) {
-    size_t low = 0, high = count - 1;
-    while (low < high) {
-        size_t middle = (low + high) / 2;
-        if (area_until[middle] > area)
-            high = middle;
-        else
-            low = middle + 1;
-    }
-    return low;
-}
 
 static void look(void *user, size_t number, int thread) {
     const struct seen_job *job = user;
-    const struct mesh *mesh = &job->views->scene->mesh;
-    uint64_t bits = rng_key(0x5ee5, number, 0);
-    double total = job->area_until[mesh->triangle_count - 1];
-    size_t t = triangle_at(job->area_until, mesh->triangle_count,
-                           total * ((double)number + (double)rng_to_float((uint32_t)bits)) / SEEN_SHARE_POINTS);
-    float root = sqrtf(rng_to_float((uint32_t)(bits >> 32))), v = rng_to_float(rng_mix32((uint32_t)(bits >> 16)));
-    vec3 point = mesh_point(mesh, t, root * (1.0f - v), root * v);
-    vec3 normal = vec3_normalize(mesh_cross(mesh, t));
+    vec3 point, normal;
+    area_sampler_point(&job->sampler, 0x5ee5, number, SEEN_SHARE_POINTS, &point, &normal);
     (void)thread;
     for (uint32_t i = 0; i < job->views->train_count && !job->is_seen[number]; i++) {
         struct view view;
@@ -58,17 +38,13 @@ static double open_share(const struct views *views) {
 }
 
 struct seen_share seen_share_measure(const struct views *views, struct parallel *pool) {
-    const struct mesh *mesh = &views->scene->mesh;
     struct seen_job job = {.views = views, .is_seen = mem_calloc(SEEN_SHARE_POINTS, sizeof *job.is_seen)};
-    double *area_until = mem_array(mesh->triangle_count, sizeof *area_until), sum = 0.0;
     size_t seen = 0;
-    for (size_t t = 0; t < mesh->triangle_count; t++)
-        area_until[t] = sum += 0.5 * (double)vec3_length(mesh_cross(mesh, t));
-    job.area_until = area_until;
+    area_sampler_init(&job.sampler, &views->scene->mesh);
     parallel_for(pool, SEEN_SHARE_POINTS, look, &job);
     for (size_t i = 0; i < SEEN_SHARE_POINTS; i++)
         seen += job.is_seen[i];
-    mem_free(area_until);
+    area_sampler_release(&job.sampler);
     mem_free(job.is_seen);
     return (struct seen_share){(double)seen / SEEN_SHARE_POINTS, open_share(views)};
 }

@@ -5,15 +5,18 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/clock.h"
+#include "common/file.h"
 #include "common/mem.h"
 #include "common/settings.h"
-#include "server/check/scene_check.h"
+#include "server/check/check_pictures.h"
 #include "server/ingest/facts.h"
 
 const struct flag check_flags[] = {
     {"--scene-set", "KEY=VALUE",
      "how the bundle is to be read: transforms, mesh, axes, mesh_axes, scale, shift, exposures"},
     {"--set", "NAME=VALUE", "a setting of the job that memory and time are estimated for"},
+    {"--pictures", "DIR", "draw the mesh's edges over photographs, a plan, and exposures there"},
     {"--json", NULL, "print the facts as JSON"},
     {"--threads", "N", "0: one per processor (0)"},
     COMMAND_HELP_FLAG,
@@ -69,6 +72,22 @@ static void print_json(const cJSON *json) {
     mem_free(text);
 }
 
+/* Everything that is known of the room; the caller's. */
+static enum status find_facts(const struct arguments *a, const struct scene_check *room, struct parallel *pool,
+                              cJSON **facts, struct error *err) {
+    const char *dir = arguments_value(a, "--pictures", NULL);
+    double begin = clock_sec();
+    *facts = facts_of(&room->scene);
+    scene_check_facts(room, *facts);
+    enum status status = dir ? file_make_dirs(dir, err) : STATUS_OK;
+    if (dir && status == STATUS_OK)
+        status = check_pictures_write(room, dir, pool, cJSON_AddArrayToObject(*facts, "previews"), err);
+    json_add_number(*facts, "load_sec", room->load_sec);
+    json_add_number(*facts, "fit_sec", room->fit_sec);
+    json_add_number(*facts, "pictures_sec", clock_sec() - begin);
+    return status;
+}
+
 /* Checks the room and prints what was found. */
 static enum status check(const struct arguments *a, const struct reading *reading, const cJSON *settings,
                          struct parallel *pool, bool *fits, struct error *err) {
@@ -80,10 +99,7 @@ static enum status check(const struct arguments *a, const struct reading *readin
     enum status status = scene_check(&room, a->words[0], reading, &limits, pool, problems, err);
     *fits = status == STATUS_OK && room.fit.verdict != FIT_NO;
     if (status == STATUS_OK) {
-        facts = facts_of(&room.scene);
-        scene_check_facts(&room, facts);
-        json_add_number(facts, "load_sec", room.load_sec);
-        json_add_number(facts, "fit_sec", room.fit_sec);
+        status = find_facts(a, &room, pool, &facts, err);
     } else if (as_json) {
         facts = cJSON_CreateObject();
         json_add(facts, "problems", cJSON_Duplicate(problems, true));

@@ -136,6 +136,9 @@ static void judge(struct fit_result *fit) {
 void fit_judge(struct fit_result *fit, const struct scene *scene, const struct accel *accel, struct parallel *pool) {
     struct consistency *c = consistency_new(scene, accel, pool);
     *fit = (struct fit_result){.detail = consistency_detail(c)};
+    fit->brightness = mem_array(scene->photograph_count + 1, sizeof *fit->brightness);
+    for (size_t i = 0; i < scene->photograph_count; i++)
+        fit->brightness[i] = consistency_thumbnail(c, i)->brightness;
     search_run(c, scene, &fit->search);
     tell_rays(fit);
     tell_agreement(fit);
@@ -146,6 +149,7 @@ void fit_judge(struct fit_result *fit, const struct scene *scene, const struct a
 void fit_release(struct fit_result *fit) {
     for (size_t i = 0; i < fit->evidence_count; i++)
         mem_free(fit->evidence[i]);
+    mem_free(fit->brightness);
     *fit = (struct fit_result){0};
 }
 

@@ -24,6 +24,7 @@ struct fit_result {
     enum fit_verdict verdict;
     struct search_result search;
     double detail;        /* share of the photographs' area that shows detail */
+    float *brightness;    /* [photograph_count] median luminance of the stored pixels; owned */
     bool has_remedy;      /* search.best is significantly better */
     bool is_overwhelming; /* beyond doubt, and a reading can say it */
     size_t evidence_count;

@@ -10,7 +10,7 @@
 #include "common/mem.h"
 #include "common/parallel.h"
 #include "server/data/layout.h"
-#include "server/check/scene_check.h"
+#include "server/check/check_pictures.h"
 #include "server/ingest/facts.h"
 #include "server/worker/tasks.h"
 
@@ -36,10 +36,23 @@ static void tell_problems(struct progress *progress, const cJSON *problems) {
         progress_problem(progress, text_of(problem, "file"), text_of(problem, "reason"), text_of(problem, "hint"));
 }
 
-static void tell_facts(struct progress *progress, const struct scene_check *room) {
+/* The facts, with the pictures that were drawn of them. */
+static enum status tell_facts(struct progress *progress, const struct order *order, const struct scene_check *room,
+                              struct parallel *pool, struct error *err) {
+    char *previews = layout_previews(order->dir);
     cJSON *facts = facts_of(&room->scene);
     scene_check_facts(room, facts);
-    progress_scene(progress, facts);
+    enum status status = file_make_dirs(previews, err);
+    if (status == STATUS_OK)
+        status = check_pictures_write(room, previews, pool, cJSON_AddArrayToObject(facts, "previews"), err);
+    if (status == STATUS_OK)
+        status = flush(order->dir, err);
+    if (status == STATUS_OK)
+        progress_scene(progress, facts);
+    else
+        cJSON_Delete(facts);
+    mem_free(previews);
+    return status;
 }
 
 enum status task_check(const struct order *order, struct progress *progress, struct error *err) {
@@ -59,9 +72,7 @@ enum status task_check(const struct order *order, struct progress *progress, str
         status = scene_check(&room, files, &reading, &limits, pool, problems, err);
         tell_problems(progress, problems);
         if (status == STATUS_OK)
-            status = flush(order->dir, err);
-        if (status == STATUS_OK)
-            tell_facts(progress, &room);
+            status = tell_facts(progress, order, &room, pool, err);
         if (status != STATUS_OK)
             file_remove_tree(files, NULL); /* a rejected scene keeps only its archive */
         scene_check_release(&room);
