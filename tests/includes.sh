@@ -78,6 +78,7 @@ own 'libheif/' common/heif.c
 own 'tiffio\.h' common/tiff.h
 own 'webp/' common/webp.c
 own 'meshoptimizer' server/ingest/gltf_meshopt.c
+own 'expat\.h' server/ingest/source/xml.c
 own 'seccomp\.h' server/worker/confine_calls.c
 
 # Paths in the data folder are made in one place. (Of the engine's files only worker knows the names.)

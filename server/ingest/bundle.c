@@ -7,14 +7,18 @@
 #include <string.h>
 #include <strings.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "common/file.h"
 #include "common/mem.h"
 #include "server/ingest/archive.h"
+#include "server/ingest/applied.h"
+#include "server/ingest/mesh_choice.h"
 #include "server/ingest/mesh_file.h"
 #include "server/ingest/path.h"
 #include "server/ingest/photos.h"
 #include "server/ingest/reading_apply.h"
+#include "server/ingest/source/missing.h"
 #include "server/ingest/source/sources.h"
 #include "server/ingest/transforms.h"
 
@@ -50,33 +54,31 @@ static enum status list_folder(const char *dir, char ***names, size_t *count, st
     return status;
 }
 
-/* The bundle's root: `dir`, or the single folder in it; the caller's. */
+/* The bundle's root: `dir`, or below it as long as a folder holds nothing but one folder; the caller's. */
 static enum status find_root(const char *dir, char **root, struct error *err) {
-    char **names;
-    size_t count;
-    struct stat info;
-    enum status status = list_folder(dir, &names, &count, err);
-    *root = NULL;
-    if (status != STATUS_OK)
-        return status;
-    char *inner = count == 1 ? file_join(dir, names[0]) : NULL;
-    if (inner && lstat(inner, &info) != 0)
-        status = error_set_errno(err, errno, "cannot look at %s", inner);
-    else
-        *root = mem_strdup(inner && S_ISDIR(info.st_mode) ? inner : dir);
-    mem_free(inner);
-    file_free_names(names, count);
-    return status;
+    *root = mem_strdup(dir);
+    for (int depth = 0; depth < LISTING_MAX_DEPTH; depth++) {
+        char **names;
+        size_t count;
+        struct stat info;
+        enum status status = list_folder(*root, &names, &count, err);
+        char *inner = status == STATUS_OK && count == 1 ? file_join(*root, names[0]) : NULL;
+        if (inner && lstat(inner, &info) != 0)
+            status = error_set_errno(err, errno, "cannot look at %s", inner);
+        bool is_folder = inner && status == STATUS_OK && S_ISDIR(info.st_mode);
+        file_free_names(names, count);
+        if (is_folder) {
+            mem_free(*root);
+            *root = inner;
+        } else {
+            mem_free(inner);
+            return status;
+        }
+    }
+    return STATUS_OK;
 }
 
 /* --- cameras ----------------------------------------------------------------------------- */
-
-static void tell_no_cameras(const char *name, struct findings *f) {
-    struct error own;
-    error_set(&own, STATUS_INPUT, "no cameras: the bundle has no %s, nor poses of another kind", name);
-    error_hint(&own, "nerfstudio and instant-ngp write one; COLMAP, ScanNet and NICE-SLAM's Replica are read, too");
-    findings_error(f, name, &own);
-}
 
 /* The cameras of the file that was chosen, or of whatever source the bundle is; sets *match. */
 static enum status load_cameras(const struct listing *l, const char *chosen, struct source_match *match,
@@ -84,130 +86,43 @@ static enum status load_cameras(const struct listing *l, const char *chosen, str
     *t = (struct transforms){0};
     *match = sources_find(l, chosen);
     if (!match->source && chosen && listing_find(l, "", chosen)) /* of another name */
-        *match = (struct source_match){&source_nerfstudio, mem_strdup(""), mem_strdup(chosen)};
+        *match = (struct source_match){&source_nerfstudio, mem_strdup(""), mem_strdup(chosen), NULL};
     if (!match->source) {
-        tell_no_cameras(chosen ? chosen : BUNDLE_TRANSFORMS, f);
+        missing_tell_cameras(l, chosen, f);
         return STATUS_OK;
     }
     struct source_place place = {l, match->base, match->found};
-    return match->source->read(&place, t, f, err);
+    size_t problem_count = f->problem_count;
+    enum status status = match->source->read(&place, t, f, err);
+    if (status == STATUS_OK && t->named_count == 0 && f->problem_count == problem_count)
+        findings_problem(f, match->found, "holds no poses (%s): the photographs were not aligned", match->source->name);
+    if (match->other)
+        findings_warning(f,
+                         "there is more than one capture of %s: %s is taken, not %s; transforms=NAME chooses another",
+                         match->source->name, match->found, match->other);
+    return status;
 }
 
 /* --- mesh -------------------------------------------------------------------------------- */
 
-static enum status file_has_faces(const char *root, const char *name, bool *has, struct error *err) {
-    char *path = file_join(root, name);
-    enum status status = mesh_file_has_faces(path, name, has, err);
-    mem_free(path);
-    return status;
+/* Of several meshes those that fit the memory are taken. A triangle costs about so much while a room is reconstructed:
+ * Embree's tree and what it is built from 250 bytes, the mesh, its neighbours and its atlas 150. */
+#define TRIANGLE_BYTES 400
+
+static uint64_t triangle_limit(const struct bundle_limits *limits) {
+    long pages = sysconf(_SC_PHYS_PAGES), bytes = sysconf(_SC_PAGESIZE);
+    uint64_t fits = pages > 0 && bytes > 0 ? (uint64_t)pages * (uint64_t)bytes / TRIANGLE_BYTES : MESH_MAX_TRIANGLES;
+    uint64_t own = limits->triangles < MESH_MAX_TRIANGLES ? limits->triangles : MESH_MAX_TRIANGLES;
+    return fits < own ? fits : own;
 }
 
-/* Mesh files at the top level. */
-struct bundle_candidates {
-    char **name; /* [count] sorted */
-    size_t count;
-    size_t point_cloud_count;
-    const char *first, *second; /* meshes */
-    const char *unknown;        /* a mesh in a format that we do not read */
-};
-
-/* Among PLY files, or among files of the other formats. */
-static enum status find_candidates(struct bundle_candidates *c, const char *root, bool ply, struct error *err) {
-    static const char *const unknown[] = {"stl", "fbx", "off", "usd", "usdz", "dae", "3ds"};
-    for (size_t i = 0; i < c->count; i++) {
-        bool has_faces;
-        const char *extension = path_extension(c->name[i]);
-        for (size_t k = 0; k < sizeof unknown / sizeof *unknown; k++)
-            if (strcasecmp(extension, unknown[k]) == 0)
-                c->unknown = c->name[i];
-        if (!mesh_file_is_known(c->name[i]) || (strcasecmp(extension, "ply") == 0) != ply)
-            continue;
-        enum status status = file_has_faces(root, c->name[i], &has_faces, err);
-        if (status != STATUS_OK)
-            return status;
-        if (!has_faces)
-            c->point_cloud_count++;
-        else if (!c->first)
-            c->first = c->name[i];
-        else if (!c->second)
-            c->second = c->name[i];
-    }
-    return STATUS_OK;
-}
-
-/* The only PLY with faces at the top level, else the only mesh of another format. NULL with a problem when there is
- * none or more than one. */
-static enum status search_mesh(const char *root, char **found, struct findings *f, struct error *err) {
-    struct bundle_candidates c = {0};
-    struct error two;
-    enum status status = list_folder(root, &c.name, &c.count, err);
-    if (status == STATUS_OK)
-        status = find_candidates(&c, root, true, err);
-    if (status == STATUS_OK && !c.first)
-        status = find_candidates(&c, root, false, err);
-    if (status != STATUS_OK) {
-        file_free_names(c.name, c.count);
-        return status;
-    }
-    if (c.second) {
-        error_set(&two, STATUS_INPUT, "two meshes: %s and %s", c.first, c.second);
-        error_hint(&two, "leave one, or name it in transforms.json as \"mesh\"");
-        findings_error(f, c.second, &two);
-    } else if (c.first) {
-        *found = mem_strdup(c.first);
-    } else if (c.unknown) {
-        findings_problem(f, c.unknown, "no mesh: the format of %s is not read; a mesh must be " MESH_FILE_FORMATS,
-                         c.unknown);
-    } else {
-        findings_problem(f, "mesh.ply",
-                         c.point_cloud_count > 0 ? "no mesh: the PLY files at the bundle's top are point clouds"
-                                                 : "no mesh: the bundle has no " MESH_FILE_FORMATS " file at its top");
-    }
-    file_free_names(c.name, c.count);
-    return STATUS_OK;
-}
-
-/* Name of the mesh file, the caller's; NULL with a problem. */
-static enum status find_mesh(const char *root, const char *transforms_name, const struct transforms *t, char **found,
-                             struct findings *f, struct error *err) {
-    *found = NULL;
-    if (t->mesh || t->point_cloud) {
-        const char *name = t->mesh ? t->mesh : t->point_cloud;
-        bool is_there = file_is_in(root, name), is_mesh = t->mesh != NULL;
-        if (t->mesh && !is_there) {
-            findings_problem(f, transforms_name, "\"mesh\" names %s, which is not in the bundle", name);
-            return STATUS_OK;
-        }
-        enum status status = is_mesh || !is_there ? STATUS_OK : file_has_faces(root, name, &is_mesh, err);
-        if (status != STATUS_OK)
-            return status;
-        if (is_mesh) {
-            *found = mem_strdup(name);
-            return STATUS_OK;
-        }
-    }
-    return search_mesh(root, found, f, err);
-}
-
-/* The one that the reading names. */
-static enum status choose_mesh(const char *root, const char *name, char **found, struct findings *f,
-                               struct error *err) {
-    struct error own;
-    enum status status = path_clean(name, found, &own);
-    if (status == STATUS_OK && !file_is_in(root, *found)) {
-        findings_problem(f, name, "the mesh that was chosen, %s, is not in the bundle", name);
-        mem_free(*found);
-        *found = NULL;
-    }
-    return findings_settle(f, name, status, &own, err);
-}
-
-static enum status load_mesh(const char *root, const char *name, const struct reading *reading, uint64_t triangle_limit,
-                             struct scene *scene, struct findings *f, struct error *err) {
+static enum status load_mesh(const char *root, const char *name, const struct reading *reading,
+                             const struct bundle_limits *limits, struct scene *scene, struct findings *f,
+                             struct error *err) {
     struct faces_report report;
     struct error own;
     char *path = file_join(root, name);
-    size_t limit = triangle_limit < MESH_MAX_TRIANGLES ? (size_t)triangle_limit : MESH_MAX_TRIANGLES;
+    size_t limit = limits->triangles < MESH_MAX_TRIANGLES ? (size_t)limits->triangles : MESH_MAX_TRIANGLES;
     enum status status = mesh_file_read(path, name, limit, &scene->mesh, &report, &own);
     mem_free(path);
     if (status == STATUS_OK)
@@ -300,14 +215,14 @@ enum status bundle_load(const char *dir, const struct reading *given, const stru
         goto out;
     const char *name = match.found ? match.found : chosen ? chosen : BUNDLE_TRANSFORMS;
     bool has_frames = f.problem_count == 0 || t.frame_count > 0;
+    struct mesh_choice choice = {&listing, &match, &t, reading.mesh, triangle_limit(limits)};
+    if (match.source) /* else what is missing has been said */
+        status = mesh_choose(&choice, &mesh, &f, err);
+    applied_settle(&t, name, mesh, &f);
     reading_apply_frames(&reading, &t);
     scene->pose_axes = reading.axes != AXES_OF_FORMAT ? reading.axes : t.axes;
-    if (reading.mesh)
-        status = choose_mesh(root, reading.mesh, &mesh, &f, err);
-    else
-        status = find_mesh(root, name, &t, &mesh, &f, err);
     if (mesh)
-        status = load_mesh(root, mesh, &reading, limits->triangles, scene, &f, err);
+        status = load_mesh(root, mesh, &reading, limits, scene, &f, err);
     if (status == STATUS_OK && has_frames)
         status = photos_load(root, name, &t, limits->photograph_pixels, pool, scene, &f, err);
     if (status == STATUS_OK && f.problem_count > 0)

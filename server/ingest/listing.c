@@ -165,6 +165,16 @@ bool listing_has_folder(const struct listing *l, const char *base, const char *n
     return found;
 }
 
+char *listing_above(const char *base) {
+    size_t length = strlen(base);
+    if (length == 0)
+        return NULL;
+    length--; /* its slash */
+    while (length > 0 && base[length - 1] != '/')
+        length--;
+    return mem_strndup(base, length);
+}
+
 const struct listed_file *listing_match(const struct listing *l, const char *base, const char *pattern, size_t *at) {
     size_t length = strlen(base), first = lower_bound(l, base, "");
     for (*at = *at > first ? *at : first; *at < l->count && is_below(l->file[*at].path, base); (*at)++)

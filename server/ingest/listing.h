@@ -38,6 +38,8 @@ void listing_release(struct listing *l);
 const struct listed_file *listing_find(const struct listing *l, const char *base, const char *name);
 /* Whether any file lies in the folder base + name. */
 bool listing_has_folder(const struct listing *l, const char *base, const char *name);
+/* The folder that holds the folder `base`, the caller's; NULL for the root. */
+char *listing_above(const char *base);
 /* The next file below base whose path from there matches the pattern (fnmatch; "*" stands for no "/"; case is
  * ignored), from number *at on, which moves on; NULL: no more. Begin with *at = 0. */
 const struct listed_file *listing_match(const struct listing *l, const char *base, const char *pattern, size_t *at);

@@ -70,6 +70,12 @@ void mesh_file_warn(const char *name, const struct mesh *mesh, const struct face
         findings_warning(f, "%s: %zu triangles repeat an earlier one and were left out", name, check->duplicate_count);
 }
 
+enum status mesh_file_count_faces(const char *path, const char *name, uint64_t *count, struct error *err) {
+    enum status status = ply_count_faces(path, name, count, err);
+    *count = status == STATUS_INPUT ? 1 : *count;
+    return status == STATUS_INPUT ? STATUS_OK : status;
+}
+
 enum status mesh_file_has_faces(const char *path, const char *name, bool *has, struct error *err) {
     uint64_t count = 0;
     mesh_reader *read = reader_of(name);

@@ -4,6 +4,7 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 
 #include "common/error.h"
 #include "server/ingest/faces.h"
@@ -26,5 +27,8 @@ void mesh_file_warn(const char *name, const struct mesh *mesh, const struct face
 /* *has: false for a point cloud. Files that would have to be read whole to know, or are damaged, count as meshes, so
  * that reading them reports the error. Fails only on I/O errors. */
 enum status mesh_file_has_faces(const char *path, const char *name, bool *has, struct error *err);
+
+/* Faces of a PLY file; 1 where the file is damaged, so that reading it reports the error. */
+enum status mesh_file_count_faces(const char *path, const char *name, uint64_t *count, struct error *err);
 
 #endif

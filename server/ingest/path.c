@@ -80,6 +80,41 @@ enum status path_clean(const char *name, char **clean, struct error *err) {
     return STATUS_OK;
 }
 
+enum status path_clean_foreign(const char *name, char **clean, struct error *err) {
+    char *copy = mem_strdup(name), *out = mem_alloc(strlen(name) + 1);
+    size_t used = 0;
+    *clean = NULL;
+    for (char *p = copy; *p; p++)
+        if (*p == '\\')
+            *p = '/';
+    const char *part = copy;
+    if (isalpha((unsigned char)part[0]) && part[1] == ':' && part[2] == '/')
+        part += 2;
+    while (*part) {
+        size_t length = strcspn(part, "/");
+        if (length == 2 && part[0] == '.' && part[1] == '.') {
+            while (used > 0 && out[--used] != '/')
+                ;
+        } else if (length > 0 && !(length == 1 && part[0] == '.')) {
+            if (used > 0)
+                out[used++] = '/';
+            memcpy(out + used, part, length);
+            used += length;
+        }
+        part += length + (part[length] == '/');
+    }
+    out[used] = '\0';
+    enum status status = path_clean(out, clean, err);
+    if (status == STATUS_OK && (*clean)[0] == '\0') {
+        status = error_set(err, STATUS_INPUT, "\"%s\" is no name of a file", copy);
+        mem_free(*clean);
+        *clean = NULL;
+    }
+    mem_free(out);
+    mem_free(copy);
+    return status;
+}
+
 bool path_is_litter(const char *clean) {
     const char *base = path_base(clean);
     return strncmp(clean, "__MACOSX", 8) == 0 || strstr(clean, "/__MACOSX") || strncmp(base, "._", 2) == 0 ||

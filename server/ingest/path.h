@@ -14,6 +14,11 @@
  * fail utf8_is_name, and names too long or too deep. The message begins with the name, made printable. */
 enum status path_clean(const char *name, char **clean, struct error *err);
 
+/* The same for a name as a tool wrote it on another machine, which stands for a file of the bundle: backslashes are
+ * slashes; a drive, a root, "." and leading ".." are dropped, inner ".." resolved. STATUS_INPUT, with the name: nothing
+ * is left, or path_clean refuses the rest. */
+enum status path_clean_foreign(const char *name, char **clean, struct error *err);
+
 /* Whether the name is a file that operating systems leave in archives: __MACOSX, ._name, .DS_Store, Thumbs.db.
  * `clean` is from path_clean. */
 bool path_is_litter(const char *clean);

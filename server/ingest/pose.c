@@ -84,7 +84,8 @@ enum status pose_from_matrix(const double matrix[3][4], const char *what, enum p
     return STATUS_OK;
 }
 
-void pose_to_rigid(const struct exact_pose *pose, const double offset[3], struct rigid *forward, struct rigid *inverse) {
+void pose_to_rigid(const struct exact_pose *pose, const double offset[3], struct rigid *forward,
+                   struct rigid *inverse) {
     double t[3], back[3];
     for (int i = 0; i < 3; i++)
         t[i] = pose->translation[i] - offset[i];

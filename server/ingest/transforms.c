@@ -11,6 +11,9 @@
 #include "common/mem.h"
 #include "server/ingest/path.h"
 
+/* A distortion that is left out may move corners by so much: less than poses are known to. */
+#define OCTIC_MAX_PIXELS 0.25
+
 /* State of reading a file. */
 struct context {
     const cJSON *root, *frame; /* frame: NULL while the top level is read */
@@ -19,6 +22,7 @@ struct context {
     struct findings *findings;
     bool ok; /* no problem so far in this frame */
     size_t scaled_count;
+    size_t bad_count;
     const cJSON *list[3]; /* train_filenames, val_filenames, test_filenames or NULL */
     size_t unlisted_count;
 };
@@ -98,6 +102,16 @@ static char *path(struct context *c, const cJSON *object, const char *key) {
         clean = NULL;
     }
     mem_free(copy);
+    return clean;
+}
+
+/* The name of a photograph, which may be one of another machine's. */
+static char *photograph(struct context *c, const char *key) {
+    const char *value = string(c, c->frame, key);
+    char *clean = NULL;
+    struct error err;
+    if (value && path_clean_foreign(value, &clean, &err) != STATUS_OK)
+        problem(c, "%s %s", key, value[0] ? err.message : "is empty");
     return clean;
 }
 
@@ -200,10 +214,25 @@ enum status transforms_camera(const struct transforms_frame *frame, uint32_t wid
     fy = isnan(fy) ? fx : fy;
     double cx = isnan(lens->cx) ? 0.5 * width : lens->cx;
     double cy = isnan(lens->cy) ? 0.5 * height : lens->cy;
+    if (lens->is_relative) {
+        double longer = width > height ? width : height;
+        fx *= longer;
+        fy *= longer;
+        cx = 0.5 * width + lens->cx * longer;
+        cy = 0.5 * height + lens->cy * longer;
+    }
     if (!(fx > 1e-3 * width && fx < 1e4 * width && fy > 1e-3 * height && fy < 1e4 * height))
         return error_set(err, STATUS_INPUT,
                          "a focal length of %.6g x %.6g pixels cannot belong to a picture of %u x %u", fx, fy, width,
                          height);
+    double corner = 0.5 * hypot(width, height) / fx, octic_pixels = fx * fabs(lens->k8) * pow(corner, 9);
+    if (octic_pixels > OCTIC_MAX_PIXELS) {
+        error_set(err, STATUS_INPUT,
+                  "the lens has a distortion of the eighth power of the radius (%.3g), %.2g pixels at "
+                  "the corners, which is not modelled",
+                  lens->k8, octic_pixels);
+        return error_hint(err, "export photographs without distortion, or calibrate without k4");
+    }
     if (!(fabs(cx) < 10.0 * width && fabs(cy) < 10.0 * height))
         return error_set(err, STATUS_INPUT, "the principal point %.6g, %.6g lies far outside the picture of %u x %u",
                          cx, cy, width, height);
@@ -227,26 +256,34 @@ enum status transforms_camera(const struct transforms_frame *frame, uint32_t wid
 
 /* --- pose, exposure, split --------------------------------------------------------------- */
 
-static void read_pose(struct context *c, struct transforms_frame *frame) {
-    const cJSON *matrix = cJSON_GetObjectItemCaseSensitive(c->frame, "transform_matrix"), *row, *cell;
-    double m[4][4] = {{0}};
-    int rows = 0, columns = 0;
-    bool shaped = matrix != NULL;
+/* Reads 3 or 4 rows of 4 numbers; false when it is anything else. The last row is 0 0 0 1 unless it is
+ * given. */
+static bool read_matrix(const cJSON *matrix, double m[4][4]) {
+    const cJSON *row, *cell;
+    int rows = 0;
+    m[3][3] = 1.0;
     cJSON_ArrayForEach(row, matrix) {
-        columns = 0;
+        int columns = 0;
         cJSON_ArrayForEach(cell, row) {
             if (rows < 4 && columns < 4)
-                m[rows][columns] = is_plain_number(cell, &m[rows][columns]) ? m[rows][columns] : NAN;
+                m[rows][columns] = is_plain_number(cell, &m[rows][columns]) ? m[rows][columns] : (double)NAN;
             columns++;
         }
-        shaped = shaped && columns == 4;
+        if (columns != 4)
+            return false;
         rows++;
     }
-    if (!shaped || (rows != 3 && rows != 4)) {
+    return rows == 3 || rows == 4;
+}
+
+static void read_pose(struct context *c, struct transforms_frame *frame) {
+    double m[4][4] = {{0}};
+    if (!read_matrix(cJSON_GetObjectItemCaseSensitive(c->frame, "transform_matrix"), m)) {
         problem(c, "transform_matrix must be an array of 4 (or 3) rows of 4 numbers");
         return;
     }
-    if (rows == 4 && (m[3][0] != 0.0 || m[3][1] != 0.0 || m[3][2] != 0.0 || m[3][3] != 1.0)) {
+    /* but for rounding of single precision */
+    if (!(fabs(m[3][0]) + fabs(m[3][1]) + fabs(m[3][2]) + fabs(m[3][3] - 1.0) < 1e-5)) {
         problem(c, "the last row of transform_matrix must be 0 0 0 1");
         return;
     }
@@ -325,14 +362,18 @@ static bool read_frame(struct context *c, const cJSON *object, struct transforms
         problem(c, "must be an object");
         return false;
     }
-    frame->file = path(c, object, "file_path");
+    frame->file = photograph(c, "file_path");
     if (!frame->file) {
         if (c->ok)
             problem(c, "no file_path");
         return false;
     }
     snprintf(c->place, sizeof c->place, "frames[%zu] (%.200s)", frame->number, frame->file);
-    frame->mask = path(c, object, "mask_path");
+    frame->mask = photograph(c, "mask_path");
+    if (cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(object, "is_bad"))) {
+        c->bad_count++;
+        return false;
+    }
     struct lens *lens = &frame->lens;
     read_lens(c, lens);
     if (c->ok && isnan(lens->fl_x) && isnan(lens->fl_y) && isnan(lens->angle_x) && isnan(lens->angle_y))
@@ -342,6 +383,16 @@ static bool read_frame(struct context *c, const cJSON *object, struct transforms
     bool listed = read_split(c, frame);
     c->unlisted_count += !listed;
     return c->ok && listed;
+}
+
+static void read_applied(struct context *c, struct transforms *t) {
+    const cJSON *matrix = cJSON_GetObjectItemCaseSensitive(c->root, "applied_transform");
+    double m[4][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}, scale = positive(c, "applied_scale");
+    if (matrix && !cJSON_IsNull(matrix) && !read_matrix(matrix, m))
+        problem(c, "applied_transform must be an array of 3 (or 4) rows of 4 numbers");
+    memcpy(t->applied, m, sizeof t->applied);
+    t->applied_scale = isnan(scale) ? 1.0 : scale;
+    t->has_applied = cJSON_IsArray(matrix) || !isnan(scale);
 }
 
 /* Faults at the top level are reported here once, and not per frame. */
@@ -371,7 +422,36 @@ static bool read_top(struct context *c, struct transforms *t) {
     }
     read_lens(c, &scratch.lens);
     read_exposure(c, &scratch);
+    read_applied(c, t);
     return c->ok;
+}
+
+/* Adds the frames of an array; all of `test_frames` are held out. */
+static void read_frames(struct context *c, const cJSON *frames, bool is_test, struct transforms *t) {
+    const cJSON *object;
+    cJSON_ArrayForEach(object, frames) {
+        struct transforms_frame *frame = &t->frame[t->frame_count];
+        frame->number = t->named_count++;
+        if (read_frame(c, object, frame)) {
+            frame->is_test = frame->is_test || is_test;
+            t->frame_count++;
+        } else {
+            transforms_frame_release(frame);
+        }
+    }
+}
+
+static void warn(const struct context *c) {
+    if (c->scaled_count > 0)
+        findings_warning(c->findings, "%s: the rotation of %zu frames carries a scale, which was taken out", c->name,
+                         c->scaled_count);
+    if (c->bad_count > 0)
+        findings_warning(c->findings, "%s: %zu frames are marked is_bad and were left out", c->name, c->bad_count);
+    if (c->unlisted_count > 0)
+        findings_warning(c->findings,
+                         "%s: %zu frames are in none of train_filenames, val_filenames and "
+                         "test_filenames and were left out",
+                         c->name, c->unlisted_count);
 }
 
 void transforms_read(const cJSON *root, const char *name, struct transforms *t, struct findings *f) {
@@ -379,22 +459,17 @@ void transforms_read(const cJSON *root, const char *name, struct transforms *t, 
     *t = (struct transforms){.axes = AXES_OPENGL};
     if (!read_top(&c, t))
         return;
-    const cJSON *frames = cJSON_GetObjectItemCaseSensitive(root, "frames"), *object;
-    t->frame = mem_calloc((size_t)cJSON_GetArraySize(frames), sizeof *t->frame);
-    cJSON_ArrayForEach(object, frames) {
-        struct transforms_frame *frame = &t->frame[t->frame_count];
-        frame->number = t->named_count++;
-        if (read_frame(&c, object, frame))
-            t->frame_count++;
-        else
-            transforms_frame_release(frame);
+    const cJSON *frames = cJSON_GetObjectItemCaseSensitive(root, "frames");
+    const cJSON *test_frames = cJSON_GetObjectItemCaseSensitive(root, "test_frames");
+    t->frame =
+        mem_calloc((size_t)cJSON_GetArraySize(frames) + (size_t)cJSON_GetArraySize(test_frames) + 1, sizeof *t->frame);
+    read_frames(&c, frames, false, t);
+    if (cJSON_IsArray(test_frames) && cJSON_GetArraySize(test_frames) <= TRANSFORMS_MAX_FRAMES) {
+        size_t before = t->frame_count;
+        memset(c.list, 0, sizeof c.list);
+        read_frames(&c, test_frames, true, t);
+        if (t->frame_count > before)
+            findings_warning(f, "%s: the %zu frames of test_frames are held out", name, t->frame_count - before);
     }
-    if (c.scaled_count > 0)
-        findings_warning(f, "%s: the rotation of %zu frames carries a scale, which was taken out", name,
-                         c.scaled_count);
-    if (c.unlisted_count > 0)
-        findings_warning(f,
-                         "%s: %zu frames are in none of train_filenames, val_filenames and "
-                         "test_filenames and were left out",
-                         name, c.unlisted_count);
+    warn(&c);
 }

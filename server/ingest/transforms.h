@@ -3,7 +3,8 @@
  * Per frame, else at the top level: fl_x fl_y cx cy w h, camera_angle_x / _y (radians), k1 to k6, p1, p2,
  * camera_model (PINHOLE, SIMPLE_PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV, OPENCV_FISHEYE) or is_fisheye,
  * exposure, exposure_time (s), iso, f_number. Per frame: file_path, transform_matrix, mask_path, split (train, test,
- * val). At the top level: `mesh` or ply_file_path, and the lists train_filenames, val_filenames, test_filenames. val
+ * val), is_bad (left out). At the top level: test_frames, further ones that are held out; applied_transform and
+ * applied_scale. At the top level: `mesh` or ply_file_path, and the lists train_filenames, val_filenames, test_filenames. val
  * counts as test. Everything else is ignored. k4 to k6 are OpenCV's: with a pinhole lens, the denominator. */
 #ifndef UNBAKE_INGEST_TRANSFORMS_H
 #define UNBAKE_INGEST_TRANSFORMS_H
@@ -25,6 +26,8 @@ struct lens {
     /* NAN if absent. */
     double width, height, fl_x, fl_y, cx, cy, angle_x, angle_y;
     double k[6], p[2];
+    double k8;        /* OPENCV: coefficient of the eighth power of the radius, which other tools have and OpenCV not */
+    bool is_relative; /* fl_x, fl_y are shares of the picture's longer side; cx, cy, too, from the picture's centre */
 };
 
 /* Source of a frame's exposure; a bundle that mixes sources has mixed units. */
@@ -48,8 +51,11 @@ struct transforms_frame {
 
 struct transforms {
     enum matrix_axes axes; /* of the file's matrices; the frames' are with our axes already */
-    char *mesh;         /* clean path or NULL; owned */
-    char *point_cloud;  /* ply_file_path, a mesh or a point cloud, or NULL; owned */
+    char *mesh;            /* clean path or NULL; owned */
+    char *point_cloud;     /* ply_file_path, a mesh or a point cloud, or NULL; owned */
+    /* stored = applied_scale * applied (world of the capture), where the file says so: applied.h */
+    bool has_applied;
+    double applied[3][4], applied_scale;
     size_t named_count; /* frames in the file */
     size_t frame_count; /* usable frames: faulty ones are left out */
     struct transforms_frame *frame;

@@ -21,6 +21,9 @@ static struct parallel *pool;
 #define MESH                                                                                                           \
     "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"                  \
     "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+#define TURNED                                                                                                         \
+    "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"                  \
+    "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 2 1\n"
 #define OBJ "v 0 0 0\nv 1 0 0\nv 0 1 0\no a\nf 1 2 3\no b\nf 1 3 2\n"
 #define CLOUD                                                                                                          \
     "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"                  \
@@ -201,16 +204,16 @@ struct bad {
 };
 
 static const struct bad bad_bundles[] = {
-    {NULL, "transforms.json", NULL, "transforms.json", "no cameras"},
+    {NULL, "transforms.json", NULL, "a.exr", "no cameras: there are photographs and a mesh, but no poses"},
     {"{\"frames\": [}", NULL, NULL, "transforms.json", "line 1"},
     {"[]", NULL, NULL, "transforms.json", "array \"frames\""},
     {"{\"frames\": 3}", NULL, NULL, "transforms.json", "array \"frames\""},
-    {"{" LENS ",\"frames\":[]}", NULL, NULL, "transforms.json", "only 0 of its 0 frames"},
+    {"{" LENS ",\"frames\":[]}", NULL, NULL, "transforms.json", "holds no poses"},
     {"{" LENS ",\"frames\":[" FRAME("a.exr") "," FRAME("b.png") "," FRAME("x.png") "]}", NULL, NULL, "transforms.json",
      "only 2 of its 3 frames"},
     {NULL, "mesh.ply", NULL, "mesh.ply", "no mesh"},
     {NULL, "mesh.ply", CLOUD, "mesh.ply", "point clouds"},
-    {NULL, "second.ply", MESH, "second.ply", "two meshes: mesh.ply and second.ply"},
+    {NULL, "second.ply", TURNED, "second.ply", "two meshes: mesh.ply and second.ply, and neither is finer"},
     {NULL, "mesh.ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n", "mesh.ply", "line 4"},
     {NULL, "mesh.ply", "", "mesh.ply", "empty"},
     {TOP("\"mesh\":\"nowhere.ply\","), NULL, NULL, "transforms.json", "nowhere.ply"},
@@ -242,7 +245,7 @@ static const struct bad bad_bundles[] = {
     {ONE_OF_THREE("{" POSE "}"), NULL, NULL, "transforms.json", "frames[0]: no file_path"},
     {ONE_OF_THREE("7"), NULL, NULL, "transforms.json", "frames[0]: must be an object"},
     {ONE_OF_THREE("{\"file_path\":\"../../a.exr\"," POSE "}"), NULL, NULL, "transforms.json",
-     "file_path \"../../a.exr\" leads out"},
+     "frames[0] and frames[3] both name a.exr"},
     {ONE_OF_THREE("{\"file_path\":\"\"," POSE "}"), NULL, NULL, "transforms.json", "file_path is empty"},
     {ONE_OF_THREE(FRAME("./a.exr")), NULL, NULL, "transforms.json", "frames[0] and frames[3] both name a.exr"},
     {ONE_OF_THREE(FRAME("c")), NULL, NULL, "transforms.json", "frames[0] and frames[2] both name c.exr"},
@@ -318,6 +321,8 @@ static void test_formats(void) {
     put("mesh.ply", CLOUD);
     CHECK(triangles_of(&file, &err) == 1);
     put("room2.OBJ", OBJ);
+    CHECK(triangles_of(&file, &err) == 1); /* the same file twice */
+    put("room2.OBJ", "v 0 0 0\nv 1 0 0\nv 0 1 9\no a\nf 1 2 3\no b\nf 1 3 2\n");
     CHECK(triangles_of(&file, &err) == 0 && strstr(err.message, "two meshes: room.obj and room2.OBJ"));
     put("room2.OBJ", "");
     put("room.obj", "v 1 2");

@@ -215,17 +215,16 @@ static void check_folders(void) {
         enum kind kind;
         const char *name, *blamed, *part;
     } table[] = {
-        {TRANSFORMS, "transforms.json", "transforms.json", "no cameras"},
-        {TRANSFORMS, "room.gltf", "room.gltf", "is not a glTF file: it is no regular file"},
+        {TRANSFORMS, "transforms.json", "images/0.png", "no cameras"},
+        {TRANSFORMS, "room.gltf", "mesh.ply", "no mesh"},
         {TRANSFORMS, "room.bin", "room.gltf", "room.bin is not a buffer: it is no regular file"},
         {TRANSFORMS, "mask.png", "mask.png", "not a regular file"},
         {TRANSFORMS, "images/1.png", "images/1.png", "not a regular file"},
-        {COLMAP, "cameras.txt", "transforms.json", "no cameras"},
-        {COLMAP, "images.txt", "transforms.json", "no cameras"},
-        {COLMAP, "room.obj", "room.obj", "is not an OBJ file: it is no regular file"},
-        {REPLICA, "cam_params.json", "transforms.json", "no cameras"},
-        {REPLICA, "traj.txt", "transforms.json", "no cameras"},
-        {SCANNET, "intrinsic/intrinsic_color.txt", "transforms.json", "no cameras"},
+        {COLMAP, "cameras.txt", "0.png", "no cameras"},
+        {COLMAP, "images.txt", "0.png", "no cameras"},
+        {COLMAP, "room.obj", "mesh.ply", "no mesh"},
+        {REPLICA, "traj.txt", "results/frame000000.png", "no cameras"},
+        {SCANNET, "intrinsic/intrinsic_color.txt", "color/0.png", "no cameras"},
     };
     for (size_t i = 0; i < sizeof table / sizeof *table; i++) {
         put_bundle(table[i].kind);
@@ -239,7 +238,7 @@ static void check_folders(void) {
     char *poses = file_join(root, "pose");
     OK(file_remove_tree(poses, &err));
     put("pose", POSE);
-    check_blamed(SCANNET, "transforms.json", "no cameras");
+    check_blamed(SCANNET, "color/0.png", "no cameras");
     mem_free(poses);
 
     put_bundle(TRANSFORMS);

@@ -137,7 +137,7 @@ static void test_refused(void) {
         {"1 1 0 0 0 0 0 0 8 a.png\n\n", "image a.png: there is no camera 8"},
         {"1 0 0 0 0 0 0 0 7 a.png\n\n", "image a.png: the pose holds a number that is not finite"},
         {"1 1 0 0 0 inf 0 0 7 a.png\n\n", "image a.png: the pose holds a number that is not finite"},
-        {"1 1 0 0 0 0 0 0 7 ../a.png\n\n", "leads out"},
+        {"1 1 0 0 0 0 0 0 7 ..\n\n", "is no name of a file"},
     };
     struct error err;
     struct colmap_cameras *c;
@@ -219,9 +219,16 @@ static void test_folder(void) {
     CHECK(r.t.frame_count == 3);
     CHECK_STRING(r.t.frame[0].file, "a.png");
     source_rig_put(&r, "images/a.png", "");
+    source_rig_put(&r, "images/B b.PNG", "");
+    source_rig_put(&r, "images/b b.txt", "");
+    source_rig_put(&r, "images/sub/c.png", "");
+    source_rig_put(&r, "images/d.jpg", "");
     source_rig_read(&r);
     CHECK_STRING(r.problems, "[]");
-    check_frames(&r.t);
+    CHECK(r.t.frame_count == 3);
+    CHECK_STRING(r.t.frame[1].file, "images/B b.PNG");
+    CHECK_STRING(r.t.frame[2].file, "images/sub/c.png");
+    CHECK(source_rig_warned(&r, "1 photographs in images/ have no pose"));
     source_rig_stop(&r);
 }
 

@@ -23,6 +23,8 @@ static void test_replica(void) {
     CHECK(!source_rig_read(&rig));
     put("traj.txt", POSE "\n\n" LOST "\r\n" POSE);
     CHECK(!source_rig_read(&rig));
+    put("results/frame000002.jpg", "");
+    put("results/depth000000.png", "");
     put("cam_params.json",
         "{\"camera\":{\"w\":1200,\"h\":680,\"fx\":600,\"fy\":601,\"cx\":599.5,\"cy\":339.5,\"scale\":6553.5}}");
     CHECK(source_rig_read(&rig));
@@ -30,7 +32,7 @@ static void test_replica(void) {
     CHECK(t->frame_count == 2 && t->named_count == 3 && rig.findings.warning_count == 1);
     if (t->frame_count == 2) {
         CHECK_STRING(t->frame[0].file, "results/frame000000");
-        CHECK_STRING(t->frame[1].file, "results/frame000002");
+        CHECK_STRING(t->frame[1].file, "results/frame000002.jpg");
         check_pose(&t->frame[1]);
         CHECK(t->frame[1].number == 2 && t->frame[1].lens.cx == 600.0 && t->frame[1].lens.cy == 340.0);
         CHECK(t->frame[1].lens.fl_y == 601.0 && t->frame[1].lens.width == 1200.0);

@@ -1,8 +1,9 @@
 /* colmap.c -- a COLMAP reconstruction (colmap.github.io/format.html), .bin or .txt; .bin is preferred, as in COLMAP.
  *
  * Its poses are world-to-camera, with our axes. Its unit of length is arbitrary and must be that of the mesh, which
- * comes from the same reconstruction. Photographs are sorted by name; names are relative to images/ if that folder
- * exists. Counts in a file are checked against its size. */
+ * comes from the same reconstruction. Photographs are sorted by name. Of several models the one with most photographs
+ * is read. Counts in a file are checked against its size. */
+#include <stdlib.h>
 #include <string.h>
 
 #include "common/mem.h"
@@ -10,6 +11,7 @@
 #include "server/ingest/source/colmap_cursor.h"
 #include "server/ingest/source/colmap_images.h"
 #include "server/ingest/source/frame_list.h"
+#include "server/ingest/source/photo_folder.h"
 
 /* --- images --------------------------------------------------------------------------------- */
 
@@ -62,9 +64,28 @@ static enum status read_images_binary(struct colmap_cursor *r, struct images *in
     return STATUS_OK;
 }
 
-/* Two lines per image, the second of which may be empty. */
+/* Whether the present line is one of an image: nine fields, the ninth of which begins no number; the line of its points
+ * has three numbers a point. `at` stays. */
+static bool is_image_line(const struct colmap_cursor *r) {
+    struct colmap_cursor own = *r;
+    char token[COLMAP_MAX_TOKEN], *end;
+    for (int i = 0; i < 10; i++) {
+        if (!colmap_next_token(&own, token))
+            return false;
+        strtod(token, &end);
+        if (i == 9)
+            return *end != '\0';
+        if (*end != '\0')
+            return false;
+    }
+    return false;
+}
+
+/* Two lines per image, the second of which may be empty. People who write one by hand leave it out: a second line that
+ * is an image's is taken for one. */
 static enum status read_images_text(struct colmap_cursor *r, struct images *in) {
-    while (colmap_next_record(r)) {
+    bool has_line = colmap_next_record(r);
+    while (has_line) {
         double pose[7];
         uint64_t id, camera;
         enum status status = colmap_read_id(r, &id);
@@ -86,7 +107,9 @@ static enum status read_images_text(struct colmap_cursor *r, struct images *in) 
         mem_free(name);
         if (status != STATUS_OK)
             return status;
-        colmap_next_line(r);
+        has_line = colmap_next_line(r);
+        if (has_line && !is_image_line(r))
+            has_line = colmap_next_record(r);
     }
     return STATUS_OK;
 }
@@ -103,36 +126,71 @@ enum status colmap_images_parse(const void *data, size_t size, const char *name,
     return status;
 }
 
-/* --- files ---------------------------------------------------------------------------------- */
+/* --- models ----------------------------------------------------------------------------------- */
 
-static char *recognise(const struct listing *l, const char *base) {
-    static const char *const folders[] = {"", "sparse/0/", "sparse/", "colmap/sparse/0/", "dense/sparse/"};
-    static const char *const kinds[] = {"bin", "txt"};
-    for (size_t i = 0; i < sizeof folders / sizeof *folders; i++) {
-        for (size_t k = 0; k < 2; k++) {
-            char *images = mem_printf("%simages.%s", folders[i], kinds[k]);
-            char *cameras = mem_printf("%scameras.%s", folders[i], kinds[k]);
-            const struct listed_file *file = listing_find(l, base, images);
-            bool found = file && listing_find(l, base, cameras);
+/* Where models lie below a workspace: at its top, as COLMAP's commands and as scripts around them write them; a model
+ * that was undistorted last, since the one before is as good and has the photographs' own pixels. */
+static const char *const patterns[] = {"images.bin",
+                                       "images.txt",
+                                       "sparse/[0-9]*/images.bin",
+                                       "sparse/[0-9]*/images.txt",
+                                       "sparse/images.bin",
+                                       "sparse/images.txt",
+                                       "colmap/sparse/[0-9]*/images.bin",
+                                       "colmap/sparse/[0-9]*/images.txt",
+                                       "dense/[0-9]*/sparse/images.bin",
+                                       "dense/[0-9]*/sparse/images.txt",
+                                       "dense/sparse/images.bin",
+                                       "dense/sparse/images.txt"};
+
+/* The cameras file that belongs to an images file, the caller's. */
+static char *cameras_of(const char *images) {
+    return mem_printf("%.*scameras.%s", (int)(path_base(images) - images), images, path_extension(images));
+}
+
+/* The next model from (*pattern, *at) on, which move on: its images file. */
+static const struct listed_file *next_model(const struct listing *l, const char *base, size_t *pattern, size_t *at) {
+    for (; *pattern < sizeof patterns / sizeof *patterns; (*pattern)++, *at = 0) {
+        const struct listed_file *file;
+        while ((file = listing_match(l, base, patterns[*pattern], at)) != NULL) {
+            char *cameras = cameras_of(file->path);
+            bool is_model = listing_find(l, "", cameras) != NULL;
             mem_free(cameras);
-            mem_free(images);
-            if (found)
-                return mem_strdup(file->path);
+            if (is_model)
+                return file;
         }
     }
     return NULL;
 }
 
-static enum status read(const struct source_place *place, struct transforms *t, struct findings *f, struct error *err) {
-    const char *images = place->found, *base = path_base(images);
+static char *recognise(const struct listing *l, const char *base) {
+    size_t pattern = 0, at = 0;
+    const struct listed_file *file = next_model(l, base, &pattern, &at);
+    return file ? mem_strdup(file->path) : NULL;
+}
+
+/* The folder from which a model's photographs are looked for: that of dense/0 for dense/0/sparse/. */
+static char *workspace_of(const char *images, const char *base) {
+    char *folder = mem_strndup(images, (size_t)(path_base(images) - images));
+    char *dense = strstr(folder + strlen(base), "dense/"), *sparse = dense ? strstr(dense, "sparse/") : NULL;
+    if (sparse)
+        *sparse = '\0';
+    char *own = mem_strdup(sparse ? folder : base);
+    mem_free(folder);
+    return own;
+}
+
+/* Reads one model; *found_count: how many of its photographs are there. */
+static enum status read_model(const struct source_place *place, const char *images, struct transforms *t,
+                              size_t *found_count, struct findings *f, struct error *err) {
     const struct listing *l = place->listing;
     bool binary = strcmp(path_extension(images), "bin") == 0;
-    char *cameras = mem_printf("%.*scameras.%s", (int)(base - images), images, binary ? "bin" : "txt");
-    char *prefix = mem_printf("%s%s", place->base, listing_has_folder(l, place->base, "images") ? "images/" : "");
+    char *cameras = cameras_of(images), *workspace = workspace_of(images, place->base);
     struct colmap_cameras *found = NULL;
     struct mapping file;
     struct error own = {0};
     *t = (struct transforms){.axes = AXES_OPENCV_INVERSE};
+    *found_count = 0;
     enum status status = listing_open(l, cameras, "a file of cameras", &file, &own);
     if (status == STATUS_OK) {
         found = colmap_cameras_parse(file.data, file.size, cameras, binary, &own);
@@ -143,14 +201,57 @@ static enum status read(const struct source_place *place, struct transforms *t, 
     if (found) {
         status = listing_open(l, images, "a file of images", &file, &own);
         if (status == STATUS_OK)
-            status = colmap_images_parse(file.data, file.size, images, binary, found, prefix, t, f, &own);
+            status = colmap_images_parse(file.data, file.size, images, binary, found, "", t, f, &own);
         mapping_close(&file);
         result = findings_settle(f, images, status, &own, err);
+        *found_count = photo_folder_settle(l, workspace, true, t, f);
     }
     colmap_cameras_free(found);
-    mem_free(prefix);
+    mem_free(workspace);
     mem_free(cameras);
     return result;
+}
+
+/* The model of which most photographs are there: COLMAP writes one for each part that does not hang together. */
+static enum status choose_model(const struct source_place *place, char **chosen, struct findings *f,
+                                struct error *err) {
+    size_t pattern = 0, at = 0, best = 0, model_count = 0;
+    const struct listed_file *file;
+    enum status status = STATUS_OK;
+    *chosen = mem_strdup(place->found);
+    while (status == STATUS_OK && (file = next_model(place->listing, place->base, &pattern, &at)) != NULL) {
+        struct findings own = {.problems = cJSON_CreateArray()};
+        struct transforms t;
+        size_t count;
+        status = read_model(place, file->path, &t, &count, &own, err);
+        model_count++;
+        if (count > best) {
+            best = count;
+            mem_free(*chosen);
+            *chosen = mem_strdup(file->path);
+        }
+        transforms_release(&t);
+        cJSON_Delete(own.problems);
+        findings_release(&own);
+    }
+    if (model_count > 1)
+        findings_warning(f, "there are %zu models of COLMAP: %s is taken, with most photographs (%zu)", model_count,
+                         *chosen, best);
+    return status;
+}
+
+static enum status read(const struct source_place *place, struct transforms *t, struct findings *f, struct error *err) {
+    size_t pattern = 0, at = 0, count;
+    char *chosen = NULL;
+    enum status status = STATUS_OK;
+    *t = (struct transforms){.axes = AXES_OPENCV_INVERSE};
+    next_model(place->listing, place->base, &pattern, &at);
+    if (next_model(place->listing, place->base, &pattern, &at))
+        status = choose_model(place, &chosen, f, err);
+    if (status == STATUS_OK)
+        status = read_model(place, chosen ? chosen : place->found, t, &count, f, err);
+    mem_free(chosen);
+    return status;
 }
 
 const struct source source_colmap = {"COLMAP", recognise, read};

@@ -8,8 +8,6 @@
 #include "common/mem.h"
 #include "server/ingest/path.h"
 
-#define MAX_NUMBERS_BYTES ((size_t)1 << 16) /* of a small file of numbers */
-
 /* --- frames ----------------------------------------------------------------------------------- */
 
 struct frame_list frame_list_make(struct transforms *t, const char *name, enum matrix_axes axes, struct findings *f) {
@@ -41,7 +39,7 @@ enum status frame_list_add(struct frame_list *in, double m[3][4], const struct l
         in->lost_count++;
         return STATUS_OK;
     }
-    if (path_clean(file, &made.file, &own) != STATUS_OK) {
+    if (path_clean_foreign(file, &made.file, &own) != STATUS_OK) {
         findings_problem(in->findings, in->name, "%s: %s", place, own.message);
         return STATUS_OK;
     }
@@ -118,27 +116,4 @@ void pose_invert(double r[3][3], const double t[3], double m[3][4]) {
     for (int i = 0; i < 3; i++)
         centre[i] = -(r[0][i] * t[0] + r[1][i] * t[1] + r[2][i] * t[2]);
     pose_at_centre(r, centre, m);
-}
-
-/* --- numbers ---------------------------------------------------------------------------------- */
-
-bool numbers_parse(const char *text, size_t count, double *value) {
-    for (size_t i = 0; i < count; i++) {
-        char *end;
-        value[i] = strtod(text, &end);
-        if (end == text)
-            return false;
-        text = end + strspn(end, " \t\r\n,");
-    }
-    return *text == '\0';
-}
-
-enum status numbers_read(const struct listing *l, const char *path, size_t count, const char *what, double *value,
-                         struct error *err) {
-    char *text;
-    enum status status = listing_text(l, path, MAX_NUMBERS_BYTES, &text, err);
-    if (status == STATUS_OK && !numbers_parse(text, count, value))
-        status = error_set(err, STATUS_INPUT, "%s: expected the %zu numbers of %s", path, count, what);
-    mem_free(text);
-    return status;
 }

@@ -1,4 +1,4 @@
-/* frame_list.h -- what the readers of poses share: a growing list of frames, lenses, and small files of numbers. */
+/* frame_list.h -- what the readers of poses share: a growing list of frames, and how poses are turned into ours. */
 #ifndef UNBAKE_INGEST_SOURCE_FRAME_LIST_H
 #define UNBAKE_INGEST_SOURCE_FRAME_LIST_H
 
@@ -16,9 +16,9 @@ struct frame_list {
 
 /* The list for a file of camera-to-world matrices; empties *t. */
 struct frame_list frame_list_make(struct transforms *t, const char *name, enum matrix_axes axes, struct findings *f);
-/* Adds a frame with the camera-to-world matrix m[3][4] and photograph `file` (a path from the root; copied). A path that
- * path_clean refuses or a matrix that is no pose is a problem that names `place`; a lost one is
- * counted. The new frame, borrowed until the next call, or NULL. STATUS_INPUT: too many. */
+/* Adds a frame with the camera-to-world matrix m[3][4] and photograph `file`, which is copied: as the tool wrote it,
+ * cleaned by path_clean_foreign; photo_folder_settle then finds the files. A name that is none or a matrix that is no pose
+ * is a problem that names `place`; a lost pose is counted. The new frame, borrowed until the next call, or NULL. STATUS_INPUT: too many. */
 enum status frame_list_add(struct frame_list *in, double m[3][4], const struct lens *lens, const char *file,
                            const char *place, struct transforms_frame **frame, struct error *err);
 /* Warns of what was counted. */
@@ -38,12 +38,5 @@ void rotation_from_axis_angle(const double v[3], double r[3][3]);
 void pose_invert(double r[3][3], const double t[3], double m[3][4]);
 /* Camera-to-world of a rotation that turns the world into the camera, and the camera's centre. */
 void pose_at_centre(double r[3][3], const double centre[3], double m[3][4]);
-
-/* Parses exactly `count` numbers of a NUL-terminated text, apart by blanks, line breaks or commas; false when it holds
- * anything else. NaN and infinities are numbers. */
-bool numbers_parse(const char *text, size_t count, double *value);
-/* Those of a small file: STATUS_INPUT with "expected the N numbers of WHAT". */
-enum status numbers_read(const struct listing *l, const char *path, size_t count, const char *what, double *value,
-                         struct error *err);
 
 #endif

@@ -7,18 +7,32 @@
 #include "common/json.h"
 #include "common/mem.h"
 #include "server/ingest/source/frame_list.h"
+#include "server/ingest/source/photo_folder.h"
+#include "server/ingest/source/values.h"
 
 #define TRAJECTORY "traj.txt"
 #define PARAMETERS "cam_params.json"
 #define MAX_PARAMETERS_BYTES ((size_t)1 << 16)
 
-static char *recognise(const struct listing *l, const char *base) {
-    const struct listed_file *file = listing_find(l, base, TRAJECTORY);
-    return file && listing_find(l, base, PARAMETERS) ? mem_strdup(file->path) : NULL;
+/* cam_params.json beside the trajectory or, as in the archive of all rooms, in the folder above; the caller's, NULL:
+ * neither. */
+static char *find_parameters(const struct listing *l, const char *base) {
+    const struct listed_file *file = listing_find(l, base, PARAMETERS);
+    char *above = listing_above(base);
+    if (!file && above)
+        file = listing_find(l, above, PARAMETERS);
+    mem_free(above);
+    return file ? mem_strdup(file->path) : NULL;
 }
 
-static enum status parse(const char *text, const char *name, const char *base, const struct lens *lens,
-                         struct transforms *t, struct findings *f, struct error *err) {
+static char *recognise(const struct listing *l, const char *base) {
+    const struct listed_file *file = listing_find(l, base, TRAJECTORY);
+    bool has_frames = listing_has_folder(l, base, "results");
+    return file && has_frames ? mem_strdup(file->path) : NULL;
+}
+
+static enum status parse(const char *text, const char *name, const struct lens *lens, struct transforms *t,
+                         struct findings *f, struct error *err) {
     struct frame_list list = frame_list_make(t, name, AXES_OPENCV, f);
     list.may_be_lost = true;
     enum status status = STATUS_OK;
@@ -29,7 +43,7 @@ static enum status parse(const char *text, const char *name, const char *base, c
         text += length + (text[length] == '\n');
         if (own[strspn(own, " \t\r")] != '\0') {
             snprintf(place, sizeof place, "line %zu", line);
-            char *file = mem_printf("%sresults/frame%06zu", base, t->named_count);
+            char *file = mem_printf("results/frame%06zu", t->named_count);
             if (numbers_parse(own + strspn(own, " \t\r"), 16, m[0]))
                 status = frame_list_add(&list, m, lens, file, place, NULL, err);
             else
@@ -65,23 +79,41 @@ static enum status read_parameters(const struct listing *l, const char *name, st
     return status;
 }
 
+/* The data set has one lens for all of its rooms, which a room that was taken alone does not come with. */
+static const struct lens replica_lens = {.model = CAMERA_OPENCV,
+                                         .width = 1200,
+                                         .height = 680,
+                                         .fl_x = 600,
+                                         .fl_y = 600,
+                                         .cx = 599.5 + LENS_PIXEL_CENTRE,
+                                         .cy = 339.5 + LENS_PIXEL_CENTRE,
+                                         .angle_x = NAN,
+                                         .angle_y = NAN};
+
 static enum status read(const struct source_place *place, struct transforms *t, struct findings *f, struct error *err) {
-    struct lens lens;
+    struct lens lens = replica_lens;
     struct mapping file;
     struct error own;
-    char *parameters = mem_printf("%s" PARAMETERS, place->base);
+    enum status status = STATUS_OK;
+    char *parameters = find_parameters(place->listing, place->base);
     *t = (struct transforms){.axes = AXES_OPENCV};
-    enum status status = read_parameters(place->listing, parameters, &lens, &own);
+    if (parameters)
+        status = read_parameters(place->listing, parameters, &lens, &own);
+    else
+        findings_warning(f,
+                         "there is no " PARAMETERS ": the lens is taken to be that of NICE-SLAM's Replica, 1200 x 680 "
+                         "pixels with a focal length of 600");
     mem_free(parameters);
     if (status != STATUS_OK)
         return findings_settle(f, place->found, status, &own, err);
     status = listing_open(place->listing, place->found, "a list of poses", &file, &own);
     if (status == STATUS_OK) {
         char *text = mem_strndup(file.data, file.size);
-        status = parse(text, place->found, place->base, &lens, t, f, &own);
+        status = parse(text, place->found, &lens, t, f, &own);
         mem_free(text);
     }
     mapping_close(&file);
+    photo_folder_settle(place->listing, place->base, false, t, f);
     return findings_settle(f, place->found, status, &own, err);
 }
 

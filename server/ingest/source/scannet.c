@@ -9,6 +9,8 @@
 #include "common/mem.h"
 #include "server/ingest/path.h"
 #include "server/ingest/source/frame_list.h"
+#include "server/ingest/source/photo_folder.h"
+#include "server/ingest/source/values.h"
 
 #define POSES "pose"
 #define INTRINSIC "intrinsic/intrinsic_color.txt"
@@ -46,7 +48,7 @@ static enum status read_pose(const struct source_place *place, long number, cons
                              struct frame_list *list, struct error *err) {
     double m[4][4];
     struct error own;
-    char *name = mem_printf("%s/%ld.txt", place->found, number), *file = mem_printf("%scolor/%ld", place->base, number);
+    char *name = mem_printf("%s/%ld.txt", place->found, number), *file = mem_printf("color/%ld", number);
     enum status status = numbers_read(place->listing, name, 16, "a matrix", m[0], &own);
     list->name = name;
     if (status == STATUS_OK)
@@ -77,6 +79,7 @@ static enum status read(const struct source_place *place, struct transforms *t, 
         status = read_pose(place, number[i], &lens, &list, &own);
     frame_list_finish(&list);
     mem_free(number);
+    photo_folder_settle(place->listing, place->base, false, t, f);
     return findings_settle(f, place->found, status, &own, err);
 }
 

@@ -7,6 +7,7 @@
 struct source_match {
     const struct source *source; /* NULL: none */
     char *base, *found;          /* owned */
+    char *other; /* what another folder, that is not below base, has of the same source; NULL: none; owned */
 };
 
 /* Tries each folder of the bundle, the shallowest first, and there each source in the order of the table. `wanted`:

@@ -1,0 +1,173 @@
+/* metashape.c -- Agisoft Metashape's "Export Cameras", XML (Metashape manual, appendices C and D).
+ *
+ * A camera's transform is camera-to-chunk, 4 x 4, row-major, with our camera axes; the chunk's transform (or, since 2.0,
+ * the camera's component's) takes it to the coordinates in which models are exported. A chunk in geocentric coordinates
+ * has no such transform for models in a projected system, which is refused. Distortion: k1 to k4 of even powers, p1
+ * (r^2 + 2 x^2) + 2 p2 x y for x: OpenCV's with p1 and p2 exchanged; cx, cy from the picture's centre; fx = f + b1. */
+#include <math.h>
+#include <string.h>
+
+#include "common/mem.h"
+#include "server/ingest/source/frame_list.h"
+#include "server/ingest/source/photo_folder.h"
+#include "server/ingest/source/values.h"
+#include "server/ingest/source/xml.h"
+
+/* Millions of metres from the origin: the centre of the Earth, 6.4 million metres below. */
+#define GEOCENTRIC_M 5e6
+
+/* Whether the file is a document of Metashape, by its beginning: its name is the user's. */
+static bool is_document(const struct listing *l, const char *path) {
+    struct mapping file;
+    if (listing_open(l, path, "an XML file", &file, NULL) != STATUS_OK)
+        return false;
+    size_t size = file.size < 4096 ? file.size : 4096;
+    bool found = memmem(file.data, size, "<document", 9) && memmem(file.data, size, "<chunk", 6);
+    mapping_close(&file);
+    return found;
+}
+
+static char *recognise(const struct listing *l, const char *base) {
+    const struct listed_file *file;
+    for (size_t at = 0; (file = listing_match(l, base, "*.xml", &at)) != NULL;)
+        if (is_document(l, file->path))
+            return mem_strdup(file->path);
+    return NULL;
+}
+
+static double value_of(const struct xml_node *node, const char *name, double fallback) {
+    const struct xml_node *child = xml_child(node, name);
+    double value;
+    return child && numbers_parse(child->text, 1, &value) ? value : fallback;
+}
+
+/* The child of that name whose attribute `key` is `id`; NULL: none. */
+static struct xml_node *of_id(const struct xml_node *parent, const char *name, const char *key, const char *id) {
+    struct xml_node *child = xml_child(parent, name);
+    while (child) {
+        const char *own = xml_attribute(child, key);
+        if (own && id && strcmp(own, id) == 0)
+            return child;
+        child = xml_next(child, name);
+    }
+    return NULL;
+}
+
+/* STATUS_INPUT for sensors that are neither frame nor fisheye cameras. */
+static enum status read_sensor(const struct xml_node *sensor, const char *name, struct lens *lens, struct error *err) {
+    const char *type = xml_attribute(sensor, "type");
+    struct xml_node *resolution = xml_child(sensor, "resolution");
+    struct xml_node *c = of_id(sensor, "calibration", "class", "adjusted");
+    double width = NAN, height = NAN, f;
+    c = c ? c : xml_child(sensor, "calibration");
+    if (!c || !resolution || !numbers_parse(xml_attribute(resolution, "width"), 1, &width) ||
+        !numbers_parse(xml_attribute(resolution, "height"), 1, &height) || isnan(f = value_of(c, "f", NAN)))
+        return error_set(err, STATUS_INPUT, "%s: a sensor has no calibration: the photographs are not aligned", name);
+    if (type && strcmp(type, "frame") != 0 && strcmp(type, "fisheye") != 0)
+        return error_set(err, STATUS_INPUT, "%s: cameras of type %.40s are not read", name, type);
+    *lens = lens_pinhole(width, height, f + value_of(c, "b1", 0.0), f, 0.5 * width + value_of(c, "cx", 0.0),
+                         0.5 * height + value_of(c, "cy", 0.0));
+    lens->k[0] = value_of(c, "k1", 0.0);
+    lens->k[1] = value_of(c, "k2", 0.0);
+    lens->k[2] = value_of(c, "k3", 0.0);
+    lens->p[0] = value_of(c, "p2", 0.0);
+    lens->p[1] = value_of(c, "p1", 0.0);
+    if (type && strcmp(type, "fisheye") == 0) {
+        lens->model = CAMERA_OPENCV_FISHEYE;
+        lens->k[3] = value_of(c, "k4", 0.0);
+    } else if (value_of(c, "k4", 0.0) != 0.0) {
+        lens->k8 = value_of(c, "k4", 0.0);
+    }
+    return STATUS_OK;
+}
+
+/* World from chunk: scale * rotation and translation, of a <transform>; identity where it has none. */
+static enum status read_chunk(const struct xml_node *transform, const char *name, double m[3][4], struct error *err) {
+    const struct xml_node *rotation = xml_child(transform, "rotation"),
+                          *translation = xml_child(transform, "translation");
+    double r[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, t[3] = {0}, scale = value_of(transform, "scale", 1.0);
+    if ((rotation && !numbers_parse(rotation->text, 9, r)) || (translation && !numbers_parse(translation->text, 3, t)))
+        return error_set(err, STATUS_INPUT, "%s: the chunk's transform is not 9 numbers and 3", name);
+    if (hypot(hypot(t[0], t[1]), t[2]) > GEOCENTRIC_M) {
+        error_set(err, STATUS_INPUT,
+                  "%s: the chunk is georeferenced in geocentric coordinates, which no model is exported in", name);
+        return error_hint(err,
+                          "in Metashape's Reference pane choose \"Local Coordinates\", then export cameras and model");
+    }
+    for (int i = 0; i < 12; i++)
+        m[i / 4][i % 4] = i % 4 < 3 ? scale * r[3 * (i / 4) + i % 4] : t[i / 4];
+    return STATUS_OK;
+}
+
+/* The pose in the model's world: the chunk's scale goes to the position only. */
+static void place_camera(double chunk[3][4], double camera[4][4], double m[3][4]) {
+    double scale = sqrt(chunk[0][0] * chunk[0][0] + chunk[1][0] * chunk[1][0] + chunk[2][0] * chunk[2][0]);
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 4; j++) {
+            double sum = chunk[i][0] * camera[0][j] + chunk[i][1] * camera[1][j] + chunk[i][2] * camera[2][j];
+            m[i][j] = j < 3 ? sum / scale : sum + chunk[i][3];
+        }
+}
+
+static enum status read_camera(struct xml_node *chunk, struct xml_node *camera, struct frame_list *list,
+                               size_t *unposed_count, struct error *err) {
+    const char *label = xml_attribute(camera, "label"), *enabled = xml_attribute(camera, "enabled");
+    struct xml_node *transform = xml_child(camera, "transform");
+    struct xml_node *sensor = of_id(xml_child(chunk, "sensors"), "sensor", "id", xml_attribute(camera, "sensor_id"));
+    struct xml_node *component =
+        of_id(xml_child(chunk, "components"), "component", "id", xml_attribute(camera, "component_id"));
+    struct xml_node *outer = xml_child(component, "transform");
+    double own[4][4], placed[3][4], m[3][4];
+    struct lens lens;
+    if (enabled && (strcmp(enabled, "false") == 0 || strcmp(enabled, "0") == 0))
+        return STATUS_OK;
+    if (!label || !transform || !sensor) {
+        (*unposed_count)++;
+        return STATUS_OK;
+    }
+    if (!numbers_parse(transform->text, 16, own[0]))
+        return error_set(err, STATUS_INPUT, "%s: the transform of %.200s is not 16 numbers", list->name, label);
+    enum status status = read_sensor(sensor, list->name, &lens, err);
+    if (status == STATUS_OK)
+        status = read_chunk(outer ? outer : xml_child(chunk, "transform"), list->name, placed, err);
+    if (status != STATUS_OK)
+        return status;
+    place_camera(placed, own, m);
+    return frame_list_add(list, m, &lens, label, label, NULL, err);
+}
+
+/* All cameras, also those in groups. */
+static enum status read_cameras(struct xml_node *chunk, struct xml_node *parent, struct frame_list *list,
+                                size_t *unposed_count, struct error *err) {
+    enum status status = STATUS_OK;
+    for (struct xml_node *node = parent ? parent->first : NULL; node && status == STATUS_OK; node = node->next) {
+        if (strcmp(node->name, "camera") == 0)
+            status = read_camera(chunk, node, list, unposed_count, err);
+        else if (strcmp(node->name, "group") == 0)
+            status = read_cameras(chunk, node, list, unposed_count, err);
+    }
+    return status;
+}
+
+static enum status read(const struct source_place *place, struct transforms *t, struct findings *f, struct error *err) {
+    struct frame_list list = frame_list_make(t, place->found, AXES_OPENCV, f);
+    struct mapping file;
+    struct error own;
+    struct xml_node *root = NULL;
+    size_t unposed_count = 0;
+    enum status status = listing_open(place->listing, place->found, "an XML file", &file, &own);
+    if (status == STATUS_OK)
+        status = xml_parse(file.data, file.size, place->found, &root, &own);
+    mapping_close(&file);
+    struct xml_node *chunk = xml_find(root, "chunk");
+    if (status == STATUS_OK)
+        status = read_cameras(chunk, xml_child(chunk, "cameras"), &list, &unposed_count, &own);
+    xml_free(root);
+    frame_list_finish(&list);
+    if (unposed_count > 0)
+        findings_warning(f, "%s: %zu photographs have no pose and are not used", place->found, unposed_count);
+    photo_folder_settle(place->listing, place->base, false, t, f);
+    return findings_settle(f, place->found, status, &own, err);
+}
+
+const struct source source_metashape = {"Metashape", recognise, read};

@@ -1,0 +1,110 @@
+/* openmvg.c -- OpenMVG's sfm_data.json (openMVG/src/openMVG/sfm/sfm_data_io_cereal.hpp): views, intrinsics and extrinsics,
+ * each an array of {key, value}. A pose is the rotation of the world into the camera and the camera's centre, with our
+ * camera axes. Distortion is OpenCV's, with the tangential coefficients in its order: x gets t2 (r^2 + 2 x^2) + 2 t1 x y. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "common/mem.h"
+#include "server/ingest/source/frame_list.h"
+#include "server/ingest/source/photo_folder.h"
+#include "server/ingest/source/values.h"
+
+#define NONE 4294967295.0 /* OpenMVG's id of what is not there */
+
+static char *recognise(const struct listing *l, const char *base) {
+    static const char *const names[] = {"sfm_data.json", "reconstruction/sfm_data.json", "sfm_data_extrinsics.json"};
+    for (int i = 0; i < 3; i++) {
+        const struct listed_file *file = listing_find(l, base, names[i]);
+        if (file)
+            return mem_strdup(file->path);
+    }
+    return NULL;
+}
+
+/* The value of that key in an array of {key, value}; NULL: none. */
+static const cJSON *of_key(const cJSON *tree, const char *array, double key) {
+    const cJSON *item;
+    cJSON_ArrayForEach(item, cJSON_GetObjectItemCaseSensitive(tree, array)) {
+        if (json_member(item, "key") == key)
+            return cJSON_GetObjectItemCaseSensitive(item, "value");
+    }
+    return NULL;
+}
+
+static const cJSON *data_of(const cJSON *value) {
+    const cJSON *wrapper = cJSON_GetObjectItemCaseSensitive(value, "ptr_wrapper");
+    return cJSON_GetObjectItemCaseSensitive(wrapper, "data");
+}
+
+/* Reads an intrinsic; STATUS_INPUT for models that are not pinhole or fisheye. The type's name is given where a type
+ * is used first; the arrays of coefficients tell it everywhere. */
+static enum status read_lens(const cJSON *value, const char *name, struct lens *lens, struct error *err) {
+    const cJSON *data = data_of(value), *inner = cJSON_GetObjectItemCaseSensitive(data, "value0");
+    const cJSON *base = inner ? inner : data;
+    double centre[2] = {NAN, NAN}, f = json_member(base, "focal_length");
+    if (!json_numbers(cJSON_GetObjectItemCaseSensitive(base, "principal_point"), 2, centre))
+        return error_set(err, STATUS_INPUT, "%s: an intrinsic is no pinhole or fisheye camera", name);
+    *lens = lens_pinhole(json_member(base, "width"), json_member(base, "height"), f, f, centre[0], centre[1]);
+    const cJSON *fisheye = cJSON_GetObjectItemCaseSensitive(data, "fisheye");
+    double brown[5];
+    if (json_numbers(fisheye, 4, lens->k))
+        lens->model = CAMERA_OPENCV_FISHEYE;
+    json_numbers(cJSON_GetObjectItemCaseSensitive(data, "disto_k1"), 1, lens->k);
+    json_numbers(cJSON_GetObjectItemCaseSensitive(data, "disto_k3"), 3, lens->k);
+    if (json_numbers(cJSON_GetObjectItemCaseSensitive(data, "disto_t2"), 5, brown)) {
+        memcpy(lens->k, brown, 3 * sizeof *brown);
+        memcpy(lens->p, brown + 3, 2 * sizeof *brown);
+    }
+    return STATUS_OK;
+}
+
+static enum status read_view(const cJSON *tree, const cJSON *view, struct frame_list *list, size_t *unposed_count,
+                             struct error *err) {
+    const cJSON *data = data_of(cJSON_GetObjectItemCaseSensitive(view, "value"));
+    const char *root = json_text_member(tree, "root_path"), *folder = json_text_member(data, "local_path");
+    const char *file = json_text_member(data, "filename");
+    const cJSON *pose = of_key(tree, "extrinsics", json_member(data, "id_pose"));
+    const cJSON *intrinsic = of_key(tree, "intrinsics", json_member(data, "id_intrinsic"));
+    double r[9], centre[3], rotation[3][3], m[3][4];
+    struct lens lens;
+    if (!file)
+        return error_set(err, STATUS_INPUT, "%s: a view has no filename", list->name);
+    if (!pose || !intrinsic) {
+        (*unposed_count)++;
+        return STATUS_OK;
+    }
+    if (!json_numbers(cJSON_GetObjectItemCaseSensitive(pose, "rotation"), 9, r) ||
+        !json_numbers(cJSON_GetObjectItemCaseSensitive(pose, "center"), 3, centre))
+        return error_set(err, STATUS_INPUT, "%s: the pose of %s has no rotation and center", list->name, file);
+    enum status status = read_lens(intrinsic, list->name, &lens, err);
+    if (status != STATUS_OK)
+        return status;
+    memcpy(rotation, r, sizeof rotation);
+    pose_at_centre(rotation, centre, m);
+    char *full = mem_printf("%s/%s/%s", root ? root : "", folder ? folder : "", file);
+    status = frame_list_add(list, m, &lens, full, file, NULL, err);
+    mem_free(full);
+    return status;
+}
+
+static enum status read(const struct source_place *place, struct transforms *t, struct findings *f, struct error *err) {
+    struct frame_list list = frame_list_make(t, place->found, AXES_OPENCV_INVERSE, f);
+    struct error own;
+    const cJSON *view;
+    cJSON *tree;
+    size_t unposed_count = 0;
+    enum status status = json_file_read(place->listing, place->found, &tree, &own);
+    cJSON_ArrayForEach(view, cJSON_GetObjectItemCaseSensitive(tree, "views")) {
+        if (status == STATUS_OK)
+            status = read_view(tree, view, &list, &unposed_count, &own);
+    }
+    cJSON_Delete(tree);
+    frame_list_finish(&list);
+    if (unposed_count > 0)
+        findings_warning(f, "%s: %zu photographs have no pose and are not used", place->found, unposed_count);
+    photo_folder_settle(place->listing, place->base, false, t, f);
+    return findings_settle(f, place->found, status, &own, err);
+}
+
+const struct source source_openmvg = {"OpenMVG", recognise, read};

@@ -1,0 +1,239 @@
+/* realitycapture.c -- RealityCapture (RealityScan): "Internal/External camera parameters", a table of comma-separated
+ * values with the header #name,x,y,alt,heading,pitch,roll,f,px,py,k1,k2,k3,k4,t1,t2, and XMP files beside the photographs.
+ *
+ * In the table a camera with all angles 0 looks down (-z) with north (y) up; its rotation is Rz(-heading) Rx(pitch)
+ * Ry(roll) with OpenGL's camera axes. f is a focal length of 35 mm film: f / 36 of the longer side; px and py likewise.
+ * In XMP, xcr:Rotation turns the world into the camera, row-major, with our camera axes; xcr:Position is the camera's
+ * centre; xcr:PrincipalPointU and V are shares of the longer side. z is up in both. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+#include "common/mem.h"
+#include "server/ingest/path.h"
+#include "server/ingest/source/frame_list.h"
+#include "server/ingest/source/photo_folder.h"
+#include "server/ingest/source/values.h"
+#include "server/ingest/source/xml.h"
+
+#define FILM_WIDTH_MM 36.0
+#define MAX_COLUMNS 64
+#define MAX_CSV_BYTES ((size_t)64 << 20)
+#define PI 3.14159265358979323846
+
+/* Focal length and principal point (from the centre) as shares of the picture's longer side, whose size is known only
+ * when the picture is read; distortion k1 k2 k3 k4 t1 t2. */
+static struct lens make_lens(double focal, double centre_x, double centre_y, const double distortion[6]) {
+    struct lens lens = lens_pinhole(NAN, NAN, focal, focal, centre_x, centre_y);
+    lens.is_relative = true;
+    memcpy(lens.k, distortion, 3 * sizeof *distortion);
+    lens.k8 = distortion[3];
+    memcpy(lens.p, distortion + 4, 2 * sizeof *distortion);
+    return lens;
+}
+
+/* --- the table -------------------------------------------------------------------------------- */
+
+/* Whether the file is such a table, by its header. */
+static bool is_table(const struct listing *l, const char *path) {
+    struct mapping file;
+    if (listing_open(l, path, "a table", &file, NULL) != STATUS_OK)
+        return false;
+    size_t size = file.size < 1024 ? file.size : 1024;
+    bool found = memmem(file.data, size, "#name", 5) && memmem(file.data, size, "heading", 7);
+    mapping_close(&file);
+    return found;
+}
+
+static char *recognise_table(const struct listing *l, const char *base) {
+    const struct listed_file *file;
+    for (size_t at = 0; (file = listing_match(l, base, "*.csv", &at)) != NULL;)
+        if (is_table(l, file->path))
+            return mem_strdup(file->path);
+    return NULL;
+}
+
+/* Splits a line at commas, in place; a name in quotes loses them. */
+static size_t split(char *line, char *cell[MAX_COLUMNS]) {
+    size_t count = 0;
+    for (char *at = line; at && count < MAX_COLUMNS;) {
+        char *end = *at == '"' ? strchr(at + 1, '"') : NULL;
+        if (end) {
+            *end = '\0';
+            cell[count++] = at + 1;
+            at = strchr(end + 1, ',');
+            at = at ? at + 1 : NULL;
+        } else {
+            cell[count++] = strsep(&at, ",");
+        }
+    }
+    return count;
+}
+
+enum column { NAME, X, Y, ALT, HEADING, PITCH, ROLL, F, PX, PY, K1, K2, K3, K4, T1, T2, COLUMN_COUNT };
+
+struct rc_columns {
+    size_t place[COLUMN_COUNT]; /* of each column; MAX_COLUMNS: absent */
+};
+
+static enum status read_header(char *line, const char *name, struct rc_columns *table, struct error *err) {
+    static const char *const names[COLUMN_COUNT] = {"#name", "x",  "y",  "alt", "heading", "pitch", "roll", "f",
+                                                    "px",    "py", "k1", "k2",  "k3",      "k4",    "t1",   "t2"};
+    char *cell[MAX_COLUMNS];
+    size_t count = split(line, cell);
+    for (int c = 0; c < COLUMN_COUNT; c++) {
+        table->place[c] = MAX_COLUMNS;
+        for (size_t i = 0; i < count; i++)
+            if (strcasecmp(cell[i] + strspn(cell[i], " "), names[c]) == 0)
+                table->place[c] = i;
+        if (table->place[c] == MAX_COLUMNS && c <= F) {
+            error_set(err, STATUS_INPUT, "%s has no column %s", name, names[c]);
+            return error_hint(err, "export Registration as \"Internal/External camera parameters\"");
+        }
+    }
+    return STATUS_OK;
+}
+
+/* Camera-to-world of heading, pitch and roll in degrees. */
+static void rotate(const double degrees[3], double r[3][3]) {
+    double a = -degrees[0] * PI / 180.0, b = degrees[1] * PI / 180.0, c = degrees[2] * PI / 180.0;
+    double z[3][3] = {{cos(a), -sin(a), 0}, {sin(a), cos(a), 0}, {0, 0, 1}};
+    double x[3][3] = {{1, 0, 0}, {0, cos(b), -sin(b)}, {0, sin(b), cos(b)}};
+    double y[3][3] = {{cos(c), 0, sin(c)}, {0, 1, 0}, {-sin(c), 0, cos(c)}};
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            r[i][j] = 0.0;
+            for (int p = 0; p < 9; p++)
+                r[i][j] += z[i][p / 3] * x[p / 3][p % 3] * y[p % 3][j];
+        }
+}
+
+static enum status read_row(char *line, size_t number, const struct rc_columns *table, struct frame_list *list,
+                            struct error *err) {
+    char *cell[MAX_COLUMNS], place[48];
+    double v[COLUMN_COUNT] = {0.0}, r[3][3], m[3][4];
+    size_t count = split(line, cell);
+    for (int c = 0; c < COLUMN_COUNT; c++) {
+        size_t at = table->place[c];
+        bool is_given = at < count && (c == NAME || numbers_parse(cell[at], 1, &v[c]));
+        if (!is_given && (c <= F || at < count))
+            return error_set(err, STATUS_INPUT, "%s, line %zu: column %zu is no number", list->name, number, at + 1);
+    }
+    rotate(v + HEADING, r);
+    for (int i = 0; i < 12; i++)
+        m[i / 4][i % 4] = i % 4 < 3 ? r[i / 4][i % 4] : v[X + i / 4];
+    struct lens lens = make_lens(v[F] / FILM_WIDTH_MM, v[PX] / FILM_WIDTH_MM, v[PY] / FILM_WIDTH_MM, v + K1);
+    snprintf(place, sizeof place, "line %zu", number);
+    return frame_list_add(list, m, &lens, cell[table->place[NAME]], place, NULL, err);
+}
+
+static enum status read_table(const struct source_place *place, struct transforms *t, struct findings *f,
+                              struct error *err) {
+    struct frame_list list = frame_list_make(t, place->found, AXES_OPENGL, f);
+    struct rc_columns table;
+    struct error own;
+    char *text, *line;
+    enum status status = listing_text(place->listing, place->found, MAX_CSV_BYTES, &text, &own);
+    const char *at = text ? text : "";
+    for (size_t number = 1; status == STATUS_OK && (line = line_take(&at)) != NULL; number++) {
+        if (number == 1) {
+            bool has_mark = strncmp(line, "\xef\xbb\xbf", 3) == 0;
+            status = read_header(line + (has_mark ? 3 : 0), place->found, &table, &own);
+        } else if (line[strspn(line, " \t,")] != '\0') {
+            status = read_row(line, number, &table, &list, &own);
+        }
+        mem_free(line);
+    }
+    mem_free(text);
+    photo_folder_settle(place->listing, place->base, false, t, f);
+    return findings_settle(f, place->found, status, &own, err);
+}
+
+const struct source source_realitycapture = {"RealityCapture", recognise_table, read_table};
+
+/* --- XMP -------------------------------------------------------------------------------------- */
+
+static char *recognise_xmp(const struct listing *l, const char *base) {
+    static const char *const folders[] = {"", "images/", "photos/"};
+    for (int i = 0; i < 3; i++) {
+        char *pattern = mem_printf("%s*.xmp", folders[i]);
+        const struct listed_file *file = listing_first(l, base, pattern);
+        mem_free(pattern);
+        if (file)
+            return mem_strdup(file->path);
+    }
+    return NULL;
+}
+
+/* A value that is an attribute of rdf:Description or an element in it. */
+static bool take(struct xml_node *description, const char *name, size_t count, double *value) {
+    const char *attribute = xml_attribute(description, name);
+    struct xml_node *child = xml_child(description, name);
+    const char *text = attribute ? attribute : child ? child->text : NULL;
+    return text && numbers_parse(text, count, value);
+}
+
+static enum status read_description(struct xml_node *d, const char *photograph, struct frame_list *list,
+                                    size_t *unposed_count, struct error *err) {
+    double r[3][3], centre[3], focal, u = 0.0, v = 0.0, distortion[6] = {0.0}, m[3][4];
+    const char *model = xml_attribute(d, "xcr:DistortionModel");
+    if (!take(d, "xcr:Rotation", 9, r[0]) || !take(d, "xcr:Position", 3, centre) ||
+        !take(d, "xcr:FocalLength35mm", 1, &focal)) {
+        (*unposed_count)++;
+        return STATUS_OK;
+    }
+    take(d, "xcr:PrincipalPointU", 1, &u);
+    take(d, "xcr:PrincipalPointV", 1, &v);
+    take(d, "xcr:DistortionCoeficients", 6, distortion);
+    if (model && strncmp(model, "division", 8) == 0 && distortion[0] != 0.0) {
+        error_set(err, STATUS_INPUT, "%s: the distortion model \"division\" is not read", list->name);
+        return error_hint(
+            err, "set RealityCapture's distortion model to Brown3 and align again, or export undistorted images");
+    }
+    struct lens lens = make_lens(focal / FILM_WIDTH_MM, u, v, distortion);
+    pose_at_centre(r, centre, m);
+    return frame_list_add(list, m, &lens, photograph, "xcr:Rotation", NULL, err);
+}
+
+/* One file; its faults are problems. */
+static enum status read_xmp_file(const struct source_place *place, const char *path, struct frame_list *list,
+                                 size_t *unposed_count, struct error *err) {
+    struct mapping file;
+    struct error own;
+    struct xml_node *root = NULL;
+    const char *name = path_base(path);
+    char *photograph = mem_strndup(name, (size_t)(path_extension(name) - name) - 1);
+    enum status status = listing_open(place->listing, path, "an XMP file", &file, &own);
+    if (status == STATUS_OK)
+        status = xml_parse(file.data, file.size, path, &root, &own);
+    mapping_close(&file);
+    list->name = path;
+    if (status == STATUS_OK)
+        status = read_description(xml_find(root, "rdf:Description"), photograph, list, unposed_count, &own);
+    list->name = place->found;
+    xml_free(root);
+    mem_free(photograph);
+    return findings_settle(list->findings, path, status, &own, err);
+}
+
+static enum status read_xmp(const struct source_place *place, struct transforms *t, struct findings *f,
+                            struct error *err) {
+    struct frame_list list = frame_list_make(t, place->found, AXES_OPENCV_INVERSE, f);
+    struct error own;
+    const struct listed_file *file;
+    enum status status = STATUS_OK;
+    size_t unposed_count = 0;
+    char *folder = mem_strndup(place->found, (size_t)(path_base(place->found) - place->found));
+    for (size_t at = 0; status == STATUS_OK && (file = listing_match(place->listing, folder, "*.xmp", &at)) != NULL;)
+        status = read_xmp_file(place, file->path, &list, &unposed_count, &own);
+    if (unposed_count > 0)
+        findings_warning(f, "%zu files .xmp hold no pose of RealityCapture's; their photographs are not used",
+                         unposed_count);
+    photo_folder_settle(place->listing, folder, false, t, f);
+    mem_free(folder);
+    return findings_settle(f, place->found, status, &own, err);
+}
+
+const struct source source_realitycapture_xmp = {"RealityCapture XMP", recognise_xmp, read_xmp};

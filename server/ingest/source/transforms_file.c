@@ -1,0 +1,120 @@
+/* transforms_file.c -- transforms.json of nerfstudio and instant-ngp (transforms.h says what is read of it), and the same in
+ * three files, as NeRF's synthetic scenes and BlenderNeRF have it: transforms_train.json, _val.json and _test.json, the
+ * latter two held out. */
+#include "server/ingest/source/transforms_file.h"
+
+#include <string.h>
+
+#include "common/mem.h"
+#include "server/ingest/path.h"
+#include "server/ingest/source/photo_folder.h"
+
+enum status transforms_file_read(const struct source_place *place, const char *path, struct transforms *t,
+                                 struct findings *f, struct error *err) {
+    struct mapping file;
+    struct error own;
+    cJSON *tree = NULL;
+    *t = (struct transforms){.axes = AXES_OPENGL};
+    enum status status = listing_open(place->listing, path, "a list of frames", &file, &own);
+    if (status == STATUS_OK && file.size > TRANSFORMS_MAX_BYTES)
+        status = error_set(&own, STATUS_LIMIT, "%s is larger than %zu bytes", path, (size_t)TRANSFORMS_MAX_BYTES);
+    if (status == STATUS_OK)
+        status = json_parse(file.data, file.size, path, &tree, &own);
+    mapping_close(&file);
+    if (status != STATUS_OK)
+        return findings_settle(f, path, status, &own, err);
+    transforms_read(tree, path, t, f);
+    cJSON_Delete(tree);
+    return STATUS_OK;
+}
+
+void transforms_file_rebase(const char *folder, struct transforms *t) {
+    char **path[2] = {&t->mesh, &t->point_cloud};
+    for (int i = 0; i < 2; i++) {
+        char *old = *path[i];
+        *path[i] = old ? mem_printf("%s%s", folder, old) : NULL;
+        mem_free(old);
+    }
+    for (size_t i = 0; i < t->frame_count; i++) {
+        char *old = t->frame[i].mask;
+        t->frame[i].mask = old ? mem_printf("%s%s", folder, old) : NULL;
+        mem_free(old);
+    }
+}
+
+/* --- one file --------------------------------------------------------------------------------- */
+
+static char *recognise(const struct listing *l, const char *base) {
+    const struct listed_file *file = listing_find(l, base, "transforms.json");
+    return file ? mem_strdup(file->path) : NULL;
+}
+
+static enum status read(const struct source_place *place, struct transforms *t, struct findings *f, struct error *err) {
+    char *folder = mem_strndup(place->found, (size_t)(path_base(place->found) - place->found));
+    enum status status = transforms_file_read(place, place->found, t, f, err);
+    transforms_file_rebase(folder, t);
+    photo_folder_settle(place->listing, folder, false, t, f);
+    mem_free(folder);
+    return status;
+}
+
+const struct source source_nerfstudio = {"nerfstudio transforms.json", recognise, read};
+
+/* --- three files ------------------------------------------------------------------------------ */
+
+static char *recognise_split(const struct listing *l, const char *base) {
+    const struct listed_file *file = listing_find(l, base, "transforms_train.json");
+    return file ? mem_strdup(file->path) : NULL;
+}
+
+/* Moves the frames of `from` behind those of t; frees the rest. */
+static void append(struct transforms *t, struct transforms *from) {
+    t->frame = mem_realloc_array(t->frame, t->frame_count + from->frame_count + 1, sizeof *t->frame);
+    for (size_t i = 0; i < from->frame_count; i++) {
+        from->frame[i].is_test = true;
+        from->frame[i].number += t->named_count;
+        t->frame[t->frame_count + i] = from->frame[i];
+    }
+    t->frame_count += from->frame_count;
+    t->named_count += from->named_count;
+    from->frame_count = 0;
+    transforms_release(from);
+}
+
+/* Frames without a photograph: BlenderNeRF writes test views without rendering them. */
+static void drop_absent(const struct listing *l, const char *name, struct transforms *t, struct findings *f) {
+    size_t kept = 0;
+    for (size_t i = 0; i < t->frame_count; i++) {
+        if (listing_find(l, "", t->frame[i].file))
+            t->frame[kept++] = t->frame[i];
+        else
+            transforms_frame_release(&t->frame[i]);
+    }
+    if (kept < t->frame_count)
+        findings_warning(f, "%s: %zu of its %zu frames have no photograph and were left out", name,
+                         t->frame_count - kept, t->frame_count);
+    t->frame_count = kept;
+}
+
+static enum status read_split(const struct source_place *place, struct transforms *t, struct findings *f,
+                              struct error *err) {
+    static const char *const names[] = {"transforms_val.json", "transforms_test.json"};
+    enum status status = transforms_file_read(place, place->found, t, f, err);
+    transforms_file_rebase(place->base, t);
+    photo_folder_settle(place->listing, place->base, false, t, f);
+    for (int i = 0; i < 2 && status == STATUS_OK; i++) {
+        struct transforms held_out;
+        const struct listed_file *file = listing_find(place->listing, place->base, names[i]);
+        if (!file)
+            continue;
+        status = transforms_file_read(place, file->path, &held_out, f, err);
+        photo_folder_settle(place->listing, place->base, false, &held_out, f);
+        transforms_file_rebase(place->base, &held_out);
+        drop_absent(place->listing, file->path, &held_out, f);
+        append(t, &held_out);
+    }
+    return status;
+}
+
+const struct source source_nerf_synthetic = {"transforms_train.json of NeRF's synthetic scenes", recognise_split,
+                                             read_split};
