@@ -93,6 +93,8 @@ $("sign-in").addEventListener("submit", async (event) => {
 $("sign-out").addEventListener("click", async () => {
   await fetch("v1/session", { method: "DELETE" });
   jobs.clear();
+  checked = null;
+  showCheck();
   choose(null);
   start();
 });
@@ -319,16 +321,132 @@ $("submit").addEventListener("submit", async (event) => {
   $("submit-problem").textContent = "";
   try {
     const scene = await send($("archive").files[0]);
-    const settings = { quality: $("quality").value }, minutes = $("minutes").valueAsNumber;
-    if (minutes > 0) settings.time_limit_sec = 60 * minutes;
-    const job = await (await post("v1/jobs", { scene: scene.id, settings })).json();
-    jobs.set(job.id, job);
     $("archive").value = "";
-    choose(job.id);
+    watchCheck(scene);
   } catch (problem) {
     $("submit-problem").textContent = problem.message;
   }
   $("sent").hidden = true;
+  button.disabled = false;
+});
+
+// --- the check of a room --------------------------------------------------------------------
+
+const VERDICTS = {
+  yes: "Mesh and photographs fit.",
+  doubtful: "Whether mesh and photographs fit cannot be told for certain.",
+  no: "Mesh and photographs do not fit.",
+};
+const CHECK_LOOK_MS = 700;
+let checked = null; // the scene whose check is shown
+
+// Until its check has ended; one that waits for room on the server's disk says so.
+async function watchCheck(scene) {
+  checked = scene;
+  $("check-problem").textContent = "";
+  showCheck();
+  while (checked?.id === scene.id && checked.state === "checking") {
+    await new Promise((done) => setTimeout(done, CHECK_LOOK_MS));
+    const now = await get(`v1/scenes/${scene.id}`).catch(() => null); // a busy server is asked again
+    if (!now || checked?.id !== scene.id) continue;
+    checked = now;
+    showCheck();
+  }
+  updateWho();
+}
+
+function showLines(id, lines) {
+  $(id).hidden = lines.length === 0;
+  showEach($(id), [...new Set(lines)], (line) => line, () => element("li", null), (item, line) => { item.textContent = line; });
+}
+
+function describeCheck(scene, fit) {
+  if (scene.state === "checking") return scene.problems.length > 0 ? "The check waits." : "The room is being checked.";
+  if (scene.state === "rejected") return "The room cannot be used.";
+  return VERDICTS[fit?.verdict] ?? "The room can be used.";
+}
+
+function showCheck() {
+  const scene = checked;
+  $("check").hidden = scene === null;
+  if (scene === null) return;
+  const { fit, table = [], previews = [], warnings = [] } = scene.facts;
+  const isReady = scene.state === "ready";
+  $("check-name").textContent = scene.name;
+  $("check-state").textContent = describeCheck(scene, fit);
+  $("check-state").className = scene.state === "rejected" || fit?.verdict === "no" ? "bad" : "";
+  $("check-progress").hidden = scene.state !== "checking";
+  showLines("check-problems", scene.problems.map(({ file, reason, hint }) =>
+    [file ? `${file}: ${reason}` : reason, hint].filter(Boolean).join(". ")));
+  showLines("check-evidence", fit?.evidence ?? []);
+  showLines("check-warnings", warnings);
+  $("check-remedy").hidden = !fit?.remedy_text && !fit?.remedy;
+  $("remedy-text").textContent = (fit?.taken ? "Done by itself: " : "") + (fit?.remedy_text ?? JSON.stringify(fit?.remedy ?? ""));
+  $("apply-remedy").hidden = !fit?.remedy || Boolean(fit.taken);
+  $("start").hidden = !isReady;
+  $("start-button").textContent = fit?.verdict === "no" ? "Start all the same" : "Start";
+  showEach($("check-pictures"), previews, ({ name }) => name, makePreview, fillPreview);
+  $("check-facts").hidden = table.length === 0;
+  showEach($("check-table"), table, ({ label }) => label, makeFact, fillFact);
+}
+
+function makePreview() {
+  const figure = element("figure", null), link = element("a", null, { target: "_blank" });
+  link.append(element("img", null));
+  figure.append(link, element("figcaption", null));
+  return figure;
+}
+
+function fillPreview(figure, { name, caption, href }) {
+  const [link, text] = figure.children, image = link.firstChild, path = href.slice(1);
+  text.textContent = caption ?? name;
+  image.alt = caption ?? name;
+  link.href = path;
+  load(image, path);
+}
+
+function makeFact() {
+  const row = element("tr", null);
+  row.append(element("th", null, { scope: "row" }), element("td", null));
+  return row;
+}
+
+function fillFact(row, { label, value }) {
+  row.firstChild.textContent = label;
+  row.lastChild.textContent = value;
+}
+
+$("apply-remedy").addEventListener("click", async (event) => {
+  event.target.disabled = true;
+  try {
+    const reply = await ask(`v1/scenes/${checked.id}`, {
+      method: "PATCH", headers: { "Content-Type": "application/json" },
+      body: JSON.stringify({ reading: checked.facts.fit.remedy }),
+    });
+    watchCheck(await reply.json());
+  } catch (problem) {
+    $("check-problem").textContent = problem.message;
+  }
+  event.target.disabled = false;
+});
+
+$("start").addEventListener("submit", async (event) => {
+  event.preventDefault();
+  const button = event.submitter;
+  button.disabled = true;
+  $("check-problem").textContent = "";
+  try {
+    const settings = { quality: $("quality").value }, minutes = $("minutes").valueAsNumber;
+    if (minutes > 0) settings.time_limit_sec = 60 * minutes;
+    if (checked.facts.fit?.verdict === "no") settings.fit = "ignore";
+    const job = await (await post("v1/jobs", { scene: checked.id, settings })).json();
+    jobs.set(job.id, job);
+    checked = null;
+    showCheck();
+    choose(job.id);
+  } catch (problem) {
+    $("check-problem").textContent = problem.message;
+  }
   button.disabled = false;
 });
 

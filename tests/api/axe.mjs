@@ -1,10 +1,10 @@
-// axe.mjs -- what axe-core finds in the web page (signing in, the list, a job, with its files and log open) and in a
+// axe.mjs -- what axe-core finds in the web page (signing in, the list, the check of a room, a job, with its files and log open) and in a
 // report, in a light and in a dark browser: a line for each fault, and pictures of what it looked at.
 //
-// node axe.mjs NODE_MODULES CHROMIUM URL TOKEN REPORT PICTURES
+// node axe.mjs NODE_MODULES CHROMIUM URL TOKEN REPORT ROOM PICTURES: ROOM-light.tar and ROOM-dark.tar are sent
 import { createRequire } from "node:module";
 
-const [modules, chromium, url, token, report, pictures] = process.argv.slice(2);
+const [modules, chromium, url, token, report, room, pictures] = process.argv.slice(2);
 const require = createRequire(`${modules}/x.js`);
 const puppeteer = require("puppeteer-core");
 const axe = require("axe-core");
@@ -24,6 +24,49 @@ async function look(page, name) {
       console.log(`${name}: ${id}: ${help}: ${node.html.slice(0, 200)} ${node.any[0]?.message ?? ""}`);
     }
   console.log(`${name}: ${passes.length} rules hold`);
+}
+
+// A check that found what a check can find: the server's own finds little to say of a grey cube.
+const PIXEL = Buffer.from("iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg==", "base64");
+const FACTS = {
+  fit: { verdict: "no", evidence: ["93 of 100 rays hit nothing"], remedy: { exposures: "ignored" },
+    remedy_text: "the exposures are those of another capture", taken: false },
+  warnings: ["images/7.png is blurred"],
+  table: [{ label: "frames used", value: "11 of 12" }],
+  previews: [{ name: "plan.png", caption: "from above" }],
+};
+async function pretend(page) {
+  await page.setRequestInterception(true);
+  page.on("request", (request) => {
+    const [, id, name] = /\/v1\/scenes\/([0-9a-f]{64})(\/preview\/.*)?$/.exec(request.url()) ?? [];
+    const previews = FACTS.previews.map((preview) => ({ ...preview, href: `/v1/scenes/${id}/preview/${preview.name}` }));
+    if (name) request.respond({ contentType: "image/png", body: PIXEL });
+    else if (!id || request.method() !== "GET" || !page.pretends) request.continue();
+    else request.respond({ contentType: "application/json", body: JSON.stringify(
+      { id, name: "room", state: "ready", problems: [], facts: { ...FACTS, previews } }) });
+  });
+  page.pretends = true;
+}
+
+// A room is sent, and what its check found is shown before anything is started; the remedy is applied, which has it
+// checked again.
+async function checkARoom(page, scheme) {
+  await pretend(page);
+  await (await page.$("#archive")).uploadFile(`${room}-${scheme}.tar`);
+  await page.$eval("#submit button", (button) => button.click());
+  await page.waitForSelector("#check-pictures img[src]", { visible: true });
+  await page.waitForFunction(() => document.getElementById("start-button").textContent === "Start all the same");
+  await look(page, `check-${scheme}`);
+  page.pretends = false;
+  const reply = page.waitForResponse((response) => response.request().method() === "PATCH");
+  await page.$eval("#apply-remedy", (button) => button.click());
+  const patched = await (await reply).json();
+  if (patched.reading?.exposures !== "ignored") console.log(`check-${scheme}: the remedy is not applied`, ++faults);
+  await page.waitForFunction(() => document.getElementById("start-button").textContent === "Start");
+  if (scheme !== "dark") return; // once, at the end: what waits has no progress to look at
+  const jobs = await page.$$eval("#jobs tr", (rows) => rows.length);
+  await page.$eval("#start-button", (button) => button.click());
+  await page.waitForFunction((before) => document.querySelectorAll("#jobs tr").length > before, {}, jobs);
 }
 
 // What can be done with a job that runs: its button outlives the job's events.
@@ -72,6 +115,7 @@ async function lookAtAll(scheme) {
   await new Promise((done) => setTimeout(done, 500));
   await look(page, `job-${scheme}`);
   await holdAnAction(page, scheme);
+  await checkARoom(page, scheme);
   await page.setViewport({ width: 420, height: 800 });
   await look(page, `job-narrow-${scheme}`);
   await page.goto(`file://${report}`);

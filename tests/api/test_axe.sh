@@ -22,9 +22,13 @@ make_room "$work/room" 12
 run 0 submit "$work/room" --set texture_size=64 --set iterations=20 --set texels_per_iteration=64 --set report_samples=1 --watch
 run 0 submit "$work/room" --set texture_size=64 --set iterations=1000000000 --set texels_per_iteration=64 --name 'one that runs'
 run 0 get 1 report.html -q -o "$work"
+for scheme in light dark; do
+    echo "$scheme" >"$work/room/notes.txt"
+    tar -C "$work/room" -cf "$work/room-$scheme.tar" .
+done
 mkdir -p "$build/axe/pictures"
-HOME=$work timeout 180 node tests/api/axe.mjs "$modules" "$chromium" "$UNBAKE_SERVER" "$UNBAKE_TOKEN" "$work/report.html" "$build/axe/pictures" \
+HOME=$work timeout 180 node tests/api/axe.mjs "$modules" "$chromium" "$UNBAKE_SERVER" "$UNBAKE_TOKEN" "$work/report.html" "$work/room" "$build/axe/pictures" \
     >"$work/out" 2>&1 || fail "axe-core finds: $(cat "$work/out")"
-equal "$(grep -c 'rules hold' "$work/out")" 12 "pages that were looked at"
+equal "$(grep -c 'rules hold' "$work/out")" 14 "pages that were looked at"
 daemon_end TERM
 finish
