@@ -1,0 +1,176 @@
+/* spill.h: what fits the budget is in memory, else in a file without a name; contents survive being unmapped; no more than
+ * the budget stays mapped; a full disk is an error of the reservation. */
+#include "common/spill.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <signal.h>
+#include <stdbool.h>
+#include <sys/resource.h>
+#include <time.h>
+
+#include "common/file.h"
+#include "common/mem.h"
+#include "tests/check.h"
+
+#define MIB ((size_t)1 << 20)
+#define BUDGET (4 * MIB)
+#define ARRAYS 6
+#define ARRAY (4 * MIB)
+/* Pages around one that is touched are mapped with it, and the kernel counts a process's pages in batches. */
+#define SLACK (3 * MIB)
+
+static char dir[64];
+static struct error err;
+
+static struct spill *new_spill(uint64_t keep_free, uint64_t limit) {
+    return spill_new(dir, &(struct spill_limits){BUDGET, keep_free, limit});
+}
+
+/* Bytes of files that this process has mapped and touched. */
+static size_t mapped(void) {
+    unsigned long all, resident, of_files = 0;
+    FILE *file = fopen("/proc/self/statm", "re");
+    CHECK(file && fscanf(file, "%lu %lu %lu", &all, &resident, &of_files) == 3);
+    if (file)
+        fclose(file);
+    return of_files * (size_t)sysconf(_SC_PAGESIZE);
+}
+
+/* Until spill_trim looks again. */
+static void trim(struct spill *s) {
+    nanosleep(&(struct timespec){.tv_nsec = 30 * 1000 * 1000}, NULL);
+    spill_trim(s);
+}
+
+static void test_memory(void) {
+    struct spill *s = new_spill(0, 0);
+    CHECK(spill_reserve(s, "they", 2, 2 * MIB, 2 * MIB, &err) == STATUS_OK);
+    char *a = spill_take(s, MIB, 1), *b = spill_take(s, MIB / 4, 4);
+    memset(a, 1, MIB);
+    memset(b, 2, MIB);
+    CHECK(spill_file_bytes(s) == 0);
+    trim(s);
+    CHECK(a[MIB - 1] == 1 && b[0] == 2);
+    /* These no longer fit beside them. */
+    CHECK(spill_reserve(s, "they", 1, 3 * MIB, 0, &err) == STATUS_OK);
+    CHECK(spill_file_bytes(s) >= 3 * MIB);
+    char *c = spill_take(s, 3 * MIB, 1);
+    c[3 * MIB - 1] = 3;
+    spill_give(s, c);
+    CHECK_THAT(spill_file_bytes(s) < MIB, "%llu bytes are not given back", (unsigned long long)spill_file_bytes(s));
+    spill_give(s, a);
+    /* What is given back makes room. */
+    CHECK(spill_reserve(s, "they", 1, 3 * MIB, 0, &err) == STATUS_OK);
+    CHECK(spill_file_bytes(s) < MIB);
+    spill_give(s, b);
+    spill_give(s, mem_alloc(1)); /* of elsewhere */
+    spill_give(s, NULL);
+    spill_free(s);
+    spill_give(NULL, spill_take(NULL, 3, 5));
+    CHECK(spill_reserve(NULL, "they", 1, 1, 1, &err) == STATUS_OK && spill_file_bytes(NULL) == 0);
+    spill_trim(NULL);
+    spill_free(NULL);
+}
+
+/* What follows later is part of the decision. */
+static void test_later(void) {
+    struct spill *s = new_spill(0, 0);
+    CHECK(spill_reserve(s, "they", 1, MIB, BUDGET, &err) == STATUS_OK);
+    CHECK(spill_file_bytes(s) >= MIB);
+    spill_free(s);
+}
+
+static bool holds(const uint32_t *array, uint32_t of) {
+    for (size_t i = 0; i < ARRAY / 4; i++)
+        if (array[i] != (uint32_t)i * of)
+            return false;
+    return true;
+}
+
+static void test_file(void) {
+    uint32_t *array[ARRAYS];
+    struct spill *s = new_spill(0, 0);
+    CHECK(spill_reserve(s, "they", ARRAYS, ARRAYS * ARRAY, 0, &err) == STATUS_OK);
+    size_t before = mapped(), most = 0;
+    for (uint32_t k = 0; k < ARRAYS; k++) {
+        array[k] = spill_take(s, ARRAY / 4, 4);
+        for (uint32_t i = 0; i < ARRAY / 4; i++)
+            array[k][i] = i * (k + 1);
+        trim(s);
+        most = mapped() > most ? mapped() : most;
+    }
+    CHECK_THAT(most <= before + BUDGET + SLACK, "%zu KiB are mapped", (most - before) / 1024);
+    for (uint32_t round = 0; round < 2; round++) {
+        for (uint32_t k = 0; k < ARRAYS; k++) {
+            CHECK(holds(array[k], k + 1));
+            trim(s);
+            most = mapped() > most ? mapped() : most;
+        }
+    }
+    CHECK_THAT(most <= before + BUDGET + SLACK, "%zu KiB are mapped", (most - before) / 1024);
+    /* Nobody sees it, so nobody has to tidy up. */
+    DIR *folder = opendir(dir);
+    size_t names = 0;
+    while (folder && readdir(folder))
+        names++;
+    CHECK(names == 2); /* . and .. */
+    closedir(folder);
+    for (uint32_t k = 0; k < ARRAYS; k++)
+        spill_give(s, array[k]);
+    spill_free(s);
+}
+
+static void test_limits(void) {
+    struct spill *s = new_spill(0, 8 * MIB);
+    CHECK(spill_reserve(s, "they", 1, 6 * MIB, 0, &err) == STATUS_OK);
+    CHECK(spill_reserve(s, "the others", 1, 6 * MIB, 0, &err) == STATUS_NO_SPACE);
+    CHECK_THAT(strstr(err.message, "the others take 6 MiB") && *err.hint, "%s", err.message);
+    spill_free(s);
+
+    s = new_spill((uint64_t)1 << 60, 0);
+    CHECK(spill_reserve(s, "they", 1, 6 * MIB, 0, &err) == STATUS_NO_SPACE);
+    CHECK_THAT(strstr(err.message, "they do not fit the memory") && *err.hint, "%s", err.message);
+    CHECK(spill_file_bytes(s) == 0);
+    spill_free(s);
+}
+
+/* A file that may not grow stands for a disk that is full. */
+static void test_full(void) {
+    struct rlimit before, small;
+    getrlimit(RLIMIT_FSIZE, &before);
+    small = before;
+    small.rlim_cur = 16 * MIB;
+    signal(SIGXFSZ, SIG_IGN);
+    struct spill *s = new_spill(0, 0);
+    CHECK(setrlimit(RLIMIT_FSIZE, &small) == 0);
+    CHECK(spill_reserve(s, "they", 1, 64 * MIB, 0, &err) == STATUS_NO_SPACE);
+    CHECK_THAT(strstr(err.message, "they do not fit the memory, and the disk has no 64 MiB"), "%s", err.message);
+    CHECK(spill_file_bytes(s) == 0);
+    /* Less goes on. */
+    CHECK(spill_reserve(s, "they", 1, 6 * MIB, 0, &err) == STATUS_OK);
+    char *a = spill_take(s, 6 * MIB, 1);
+    memset(a, 7, 6 * MIB);
+    trim(s);
+    CHECK(a[6 * MIB - 1] == 7);
+    spill_give(s, a);
+    spill_free(s);
+    setrlimit(RLIMIT_FSIZE, &before);
+
+    s = spill_new("/nowhere/at/all", &(struct spill_limits){.memory_bytes = 1});
+    CHECK(spill_reserve(s, "they", 1, MIB, 0, &err) == STATUS_NOT_FOUND && strstr(err.message, "/nowhere"));
+    spill_free(s);
+}
+
+int main(void) {
+    snprintf(dir, sizeof dir, "%s/unbake-spill-XXXXXX", check_fast_dir());
+    if (!mkdtemp(dir))
+        return 1;
+    test_memory();
+    test_later();
+    test_file();
+    test_limits();
+    test_full();
+    CHECK(file_remove_tree(dir, &err) == STATUS_OK);
+    return check_result();
+}
