@@ -54,6 +54,8 @@ static const struct config_option table[] = {
     INT(user_max_percent, "%", 0, 100, "50",
         "The same as a share of the whole disk, as it is when the daemon starts; the smaller one counts. 0: no limit."),
     INT(worker_memory_mib, "MiB", 0, 16777216, "0", "Memory that a job may use. 0: no limit."),
+    INT(photograph_memory_mib, "MiB", 0, 16777216, "0",
+        "Memory for pixels of photographs in a job; what is more lies on the disk while it runs. 0: half of worker_memory_mib, or of what is free."),
     REAL(checkpoint_interval_sec, "s", 0.1, 86400, "60",
          "Time between a job's checkpoints; up to five times as long on a slow disk."),
     REAL(checkpoint_keep_hours, "h", 0, 100000, "168",

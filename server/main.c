@@ -122,6 +122,7 @@ static struct scheduler_config scheduler_options(const struct config *c) {
         .thread_count = (int)c->threads,
         .user_max_bytes = user_max_bytes(c),
         .worker_memory_bytes = (uint64_t)c->worker_memory_mib << 20,
+        .photograph_memory_bytes = (uint64_t)c->photograph_memory_mib << 20,
         .checkpoint_interval_sec = c->checkpoint_interval_sec,
         .stop_grace_sec = c->stop_grace_sec,
         .event_keep_sec = 3600.0 * c->event_keep_hours,

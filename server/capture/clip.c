@@ -4,7 +4,6 @@
 #include <math.h>
 
 #include "common/image.h"
-#include "common/mem.h"
 
 #define WINDOW_RADIUS 2       /* pixels to either side; by hand */
 #define WINDOW_MIN_PIXELS 9   /* pixels that must show the same surface; by hand */
@@ -78,7 +77,8 @@ void clip_mark(struct scene *scene, const struct views *views, const struct nois
             continue;
         struct clip_job job = {views, noise, photo, t};
         if (!photo->saturated)
-            photo->saturated = mem_array((size_t)photo->camera.width * photo->camera.height, sizeof *photo->saturated);
+            photo->saturated =
+                spill_take(photo->spill, (size_t)photo->camera.width * photo->camera.height, sizeof *photo->saturated);
         parallel_for(pool, photo->camera.height, mark_row, &job);
     }
 }

@@ -4,7 +4,6 @@
 #include <math.h>
 
 #include "common/image.h"
-#include "common/mem.h"
 
 #define MIN_RATIO 2.0f        /* to the brightest of the eight neighbours; by hand */
 #define NOISE_DEVIATIONS 4.0f /* standard deviations above that neighbour; by hand */
@@ -58,7 +57,8 @@ void fireflies_mark(struct scene *scene, const struct views *views, const struct
         struct photograph *photo = &scene->photograph[views->train[t]];
         struct fireflies_job job = {noise, photo, t};
         if (!photo->firefly)
-            photo->firefly = mem_array((size_t)photo->camera.width * photo->camera.height, sizeof *photo->firefly);
+            photo->firefly =
+                spill_take(photo->spill, (size_t)photo->camera.width * photo->camera.height, sizeof *photo->firefly);
         parallel_for(pool, photo->camera.height, mark_row, &job);
     }
 }

@@ -154,6 +154,7 @@ void views_update_median(struct views *v) {
             if (photograph_sample(photo, x, y, &sample))
                 value[count++] = rgb_mean(sample.radiance);
         }
+        spill_trim(v->scene->spill);
     }
     float median = quantile(value, count, 0.5);
     v->median_radiance = median > 0.0f ? median : 1.0f;
@@ -186,9 +187,9 @@ void views_init(struct views *v, const struct scene *scene, const struct segment
     }
     for (uint32_t t = 0; t < v->train_count; t++) {
         const struct camera *camera = &scene->photograph[v->train[t]].camera;
-        v->shows[t] = mem_calloc((size_t)camera->height * camera->width, 1);
-        v->edge[t] = mem_array((size_t)camera->height * camera->width, 1);
-        v->owner[t] = mem_calloc((size_t)camera->height * camera->width, 1);
+        v->shows[t] = spill_take(scene->spill, (size_t)camera->height * camera->width, 1);
+        v->edge[t] = spill_take(scene->spill, (size_t)camera->height * camera->width, 1);
+        v->owner[t] = spill_take(scene->spill, (size_t)camera->height * camera->width, 1);
         views_update_edges(v, t, pool);
     }
     views_update_median(v);
@@ -196,9 +197,9 @@ void views_init(struct views *v, const struct scene *scene, const struct segment
 
 void views_release(struct views *v) {
     for (size_t t = 0; t < v->train_count; t++) {
-        mem_free(v->shows[t]);
-        mem_free(v->edge[t]);
-        mem_free(v->owner[t]);
+        spill_give(v->scene->spill, v->shows[t]);
+        spill_give(v->scene->spill, v->edge[t]);
+        spill_give(v->scene->spill, v->owner[t]);
     }
     mem_free(v->shows);
     mem_free(v->edge);

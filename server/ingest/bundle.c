@@ -195,6 +195,18 @@ static enum status clean_choice(const char *given, char **chosen, struct error *
     return status;
 }
 
+static enum status load_photographs(const char *root, const char *name, const struct transforms *t,
+                                    const struct bundle_limits *limits, struct parallel *pool, struct scene *scene,
+                                    struct findings *f, struct error *err) {
+    const struct photos_options options = {
+        .pixel_limit = limits->photograph_pixels,
+        .decode_bytes = limits->decode_bytes,
+        .spill = limits->spill,
+        .later_bytes = limits->later_bytes,
+    };
+    return photos_load(root, name, t, &options, pool, scene, f, err);
+}
+
 enum status bundle_load(const char *dir, const struct reading *given, const struct bundle_limits *limits,
                         struct parallel *pool, struct scene *scene, cJSON *problems, struct error *err) {
     struct findings f = {.problems = problems};
@@ -224,7 +236,7 @@ enum status bundle_load(const char *dir, const struct reading *given, const stru
     if (mesh)
         status = load_mesh(root, mesh, &reading, limits, scene, &f, err);
     if (status == STATUS_OK && has_frames)
-        status = photos_load(root, name, &t, limits->photograph_pixels, pool, scene, &f, err);
+        status = load_photographs(root, name, &t, limits, pool, scene, &f, err);
     if (status == STATUS_OK && f.problem_count > 0)
         status = sum_up(&f, err);
     if (status == STATUS_OK) {

@@ -22,6 +22,10 @@ struct bundle_limits {
     double ratio;               /* unpacked / packed */
     uint64_t photograph_pixels; /* per photograph */
     uint64_t triangles;
+    /* What the photographs take; see struct photos_options. */
+    uint64_t decode_bytes;
+    struct spill *spill;
+    uint64_t later_bytes;
 };
 
 struct bundle_limits bundle_default_limits(void);

@@ -3,6 +3,7 @@
 
 #include <inttypes.h>
 #include <math.h>
+#include <pthread.h>
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,6 +16,9 @@
 #include "server/ingest/photo_fit.h"
 
 #define HALF_LARGEST 65504.0f
+/* Memory of a picture that is being decoded, bytes a pixel: 16 of four channels as float, 6 that are kept of it, and the
+ * decoder's own coefficients or planes. An estimate; it only bounds how many are decoded at the same time. */
+#define DECODE_PIXEL_BYTES 32
 
 /* Result of loading one frame; written by that frame's work item only. */
 struct outcome {
@@ -27,11 +31,22 @@ struct outcome {
     size_t not_finite_count, clamped_count; /* pixels */
 };
 
+/* Memory that decoders use at the same time. */
+struct gate {
+    pthread_mutex_t mutex;
+    pthread_cond_t freed;
+    uint64_t used, limit; /* bytes; limit 0: none */
+};
+
+#define ALL "the photographs" /* in messages */
+
 struct loading {
     const char *dir;
     const struct transforms *transforms;
     const double *offset; /* [3] of the mesh */
-    uint64_t pixel_limit;
+    const struct photos_options *options;
+    struct gate gate;
+    uint64_t pixels;               /* of all pictures together */
     char **path;                   /* [frame_count] of the picture, below dir; NULL where absent */
     struct photograph *photograph; /* [frame_count] */
     struct outcome *outcome;       /* [frame_count] */
@@ -131,7 +146,7 @@ static void mask_by_alpha(const struct image *image, struct photograph *photo) {
     int alpha = image_channel(image, "A");
     if (alpha < 0)
         return;
-    photo->mask = mem_alloc(count);
+    photo->mask = spill_take(photo->spill, count, sizeof *photo->mask);
     for (size_t i = 0; i < count; i++)
         photo->mask[i] = image->pixel[i * image->channel_count + (size_t)alpha] < 0.5f ? 0 : 255;
 }
@@ -170,7 +185,7 @@ static enum status load_mask(const struct loading *l, const char *name, int turn
     image_orient(&image, turn);
     size_t count = (size_t)image.width * image.height;
     if (!photo->mask) {
-        photo->mask = mem_alloc(count);
+        photo->mask = spill_take(photo->spill, count, sizeof *photo->mask);
         memset(photo->mask, 255, count);
     }
     for (size_t i = 0; i < count; i++)
@@ -200,6 +215,7 @@ static void set_exposure(const struct transforms_frame *frame, const struct imag
     photo->exposure = photo->exposure_known ? single : 1.0f;
 }
 
+/* Sets the camera, by the size of the picture. */
 static enum status check_size(const struct loading *l, size_t index, struct camera *camera, struct outcome *outcome) {
     const struct photo_fit *fit = &l->fit[index];
     uint64_t pixels = (uint64_t)fit->width * fit->height;
@@ -208,21 +224,43 @@ static enum status check_size(const struct loading *l, size_t index, struct came
         outcome->err = fit->err;
         return fit->status;
     }
-    if (pixels > l->pixel_limit)
+    if (pixels > l->options->pixel_limit)
         return error_set(&outcome->err, STATUS_LIMIT,
-                         "the picture has %" PRIu64 " pixels, more than the limit of %" PRIu64, pixels, l->pixel_limit);
+                         "the picture has %" PRIu64 " pixels, more than the limit of %" PRIu64, pixels,
+                         l->options->pixel_limit);
     return photo_fit_camera(fit, &l->transforms->frame[index], l->offset, camera, &outcome->err);
 }
 
-/* Takes over image->clipped and the clip value and names the colour space. */
-static void set_clip(const struct loading *l, struct image *image, const struct image_info *info,
-                     struct photograph *photo) {
+/* Takes over the clip value and names the colour space. */
+static void set_clip(const struct loading *l, const struct image_info *info, struct photograph *photo) {
     photo->is_hdr = info->encoding == IMAGE_LINEAR;
     photo->clip = photo->is_hdr ? INFINITY : info->encoding == IMAGE_CONVERTED ? info->clip : l->clip;
-    photo->clipped = image->clipped;
-    image->clipped = NULL;
     if (info->color_space[0])
         photo->color_space = mem_strdup(info->color_space);
+}
+
+/* The arrays of a decoded picture. Only now is known whether it has others than its pixels. */
+static enum status keep_pixels(const struct loading *l, const struct image *image, const struct image_info *info,
+                               bool has_mask, struct photograph *photo, struct outcome *outcome) {
+    size_t count = (size_t)image->width * image->height;
+    bool is_masked = has_mask || image_channel(image, "A") >= 0;
+    size_t others = (size_t)(image->clipped != NULL) + (size_t)is_masked;
+    enum status status =
+        spill_reserve(photo->spill, ALL, others, others * count, l->options->later_bytes * l->pixels, &outcome->err);
+    if (status != STATUS_OK)
+        return status;
+    photo->pixel = spill_take(photo->spill, count, sizeof *photo->pixel);
+    if (image->clipped) {
+        photo->clipped = spill_take(photo->spill, count, sizeof *photo->clipped);
+        memcpy(photo->clipped, image->clipped, count);
+    }
+    if (info->encoding == IMAGE_SRGB)
+        convert_srgb(l, image, photo);
+    else
+        convert_linear(image, photo, outcome);
+    if (!photo->is_hdr)
+        mask_by_alpha(image, photo);
+    return STATUS_OK;
 }
 
 static enum status load_photograph(const struct loading *l, size_t index) {
@@ -232,34 +270,25 @@ static enum status load_photograph(const struct loading *l, size_t index) {
     char *path = file_join(l->dir, l->path[index]);
     struct image image;
     struct image_info info;
-    enum status status = check_size(l, index, &photo->camera, outcome);
-    if (status == STATUS_OK) {
-        status = image_read_photograph(path, &image, &info, &outcome->err);
-        outcome->is_broken = status == STATUS_INPUT;
-    }
+    enum status status = image_read_photograph(path, &image, &info, &outcome->err);
+    outcome->is_broken = status == STATUS_INPUT;
     mem_free(path);
     if (status != STATUS_OK)
         return status;
     photo->name = mem_strdup(frame->file);
     photo->is_test = frame->is_test;
     photo->gain = rgb_gray(1.0f);
+    photo->spill = l->options->spill;
     photo_fit_apply(&l->fit[index], &info, &image);
-    set_clip(l, &image, &info, photo);
+    set_clip(l, &info, photo);
     photo_color_note(&l->color[index], frame->file, &image, &info);
     outcome->orientation = l->fit[index].turn > 1 ? 1 : info.orientation;
     set_exposure(frame, &info, photo, outcome);
     /* image_read puts R, G, B first */
-    if (image_channel(&image, "B") != 2) {
+    if (image_channel(&image, "B") != 2)
         status = error_set(&outcome->err, STATUS_INPUT, "the picture has no red, green and blue");
-    } else {
-        photo->pixel = mem_array((size_t)image.width * image.height, sizeof *photo->pixel);
-        if (info.encoding == IMAGE_SRGB)
-            convert_srgb(l, &image, photo);
-        else
-            convert_linear(&image, photo, outcome);
-        if (!photo->is_hdr)
-            mask_by_alpha(&image, photo);
-    }
+    else
+        status = keep_pixels(l, &image, &info, frame->mask, photo, outcome);
     image_release(&image);
     if (status == STATUS_OK && frame->mask) {
         status = load_mask(l, frame->mask, l->fit[index].turn, photo, outcome);
@@ -268,11 +297,55 @@ static enum status load_photograph(const struct loading *l, size_t index) {
     return status;
 }
 
+/* --- on all threads ---------------------------------------------------------------------- */
+
+/* Waits until the decoders have memory for one more, which is the first where nothing else fits. */
+static void gate_enter(struct gate *gate, uint64_t bytes) {
+    pthread_mutex_lock(&gate->mutex);
+    while (gate->limit > 0 && gate->used > 0 && gate->used + bytes > gate->limit)
+        pthread_cond_wait(&gate->freed, &gate->mutex);
+    gate->used += bytes;
+    pthread_mutex_unlock(&gate->mutex);
+}
+
+static void gate_leave(struct gate *gate, uint64_t bytes) {
+    pthread_mutex_lock(&gate->mutex);
+    gate->used -= bytes;
+    pthread_cond_broadcast(&gate->freed);
+    pthread_mutex_unlock(&gate->mutex);
+}
+
+/* Of a picture that is read; else 0. */
+static uint64_t pixels_of(const struct loading *l, size_t index) {
+    const struct camera *camera = &l->photograph[index].camera;
+    bool is_read = l->path[index] && l->outcome[index].status == STATUS_OK;
+    return is_read ? (uint64_t)camera->width * camera->height : 0;
+}
+
 static void load_body(void *user, size_t index, int thread) {
     struct loading *l = user;
     (void)thread;
-    if (l->path[index])
-        l->outcome[index].status = load_photograph(l, index);
+    uint64_t bytes = DECODE_PIXEL_BYTES * pixels_of(l, index);
+    if (bytes == 0)
+        return;
+    gate_enter(&l->gate, bytes);
+    l->outcome[index].status = load_photograph(l, index);
+    gate_leave(&l->gate, bytes);
+}
+
+/* Sets the cameras, makes room, then reads the pixels. */
+static enum status load_all(struct loading *l, struct parallel *pool, struct error *err) {
+    size_t count = l->transforms->frame_count;
+    for (size_t i = 0; i < count; i++) {
+        if (l->path[i])
+            l->outcome[i].status = check_size(l, i, &l->photograph[i].camera, &l->outcome[i]);
+        l->pixels += pixels_of(l, i);
+    }
+    enum status status = spill_reserve(l->options->spill, ALL, count, PHOTOGRAPH_PIXEL_BYTES * l->pixels,
+                                       l->options->later_bytes * l->pixels, err);
+    if (status == STATUS_OK)
+        parallel_for(pool, count, load_body, l);
+    return status;
 }
 
 /* --- all of them ------------------------------------------------------------------------- */
@@ -368,6 +441,7 @@ static void move_photographs(struct loading *l, struct scene *scene) {
         else
             photograph_release(&l->photograph[i]);
     }
+    scene->spill = l->options->spill;
     scene->photograph = l->photograph;
     scene->photograph_count = kept;
 }
@@ -383,13 +457,15 @@ static void check_count(const struct scene *scene, const char *name, size_t name
         findings_problem(f, name, "every frame is held out as test: none is left to reconstruct from");
 }
 
-enum status photos_load(const char *dir, const char *name, const struct transforms *t, uint64_t pixel_limit,
-                        struct parallel *pool, struct scene *scene, struct findings *f, struct error *err) {
+enum status photos_load(const char *dir, const char *name, const struct transforms *t,
+                        const struct photos_options *options, struct parallel *pool, struct scene *scene,
+                        struct findings *f, struct error *err) {
     struct loading l = {
         .dir = dir,
         .transforms = t,
         .offset = scene->mesh.offset,
-        .pixel_limit = pixel_limit,
+        .options = options,
+        .gate = {.limit = options->decode_bytes},
         .path = mem_calloc(t->frame_count, sizeof *l.path),
         .photograph = mem_calloc(t->frame_count, sizeof *l.photograph),
         .outcome = mem_calloc(t->frame_count, sizeof *l.outcome),
@@ -403,12 +479,17 @@ enum status photos_load(const char *dir, const char *name, const struct transfor
     l.fit = mem_calloc(t->frame_count, sizeof *l.fit);
     find_duplicates(&l, name, f);
     photo_fit_all(dir, name, l.path, t, pool, l.fit, f);
-    parallel_for(pool, t->frame_count, load_body, &l);
-    enum status status = collect(&l, name, f, err);
+    pthread_mutex_init(&l.gate.mutex, NULL);
+    pthread_cond_init(&l.gate.freed, NULL);
+    enum status status = load_all(&l, pool, err);
+    if (status == STATUS_OK)
+        status = collect(&l, name, f, err);
     move_photographs(&l, scene);
     check_count(scene, name, t->named_count, f);
     warn_about_pixels(&l, f);
     photo_color_warn(l.color, t->frame_count, f);
+    pthread_cond_destroy(&l.gate.freed);
+    pthread_mutex_destroy(&l.gate.mutex);
     for (size_t i = 0; i < t->frame_count; i++)
         mem_free(l.path[i]);
     mem_free(l.path);

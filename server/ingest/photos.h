@@ -11,16 +11,25 @@
 
 #include "common/error.h"
 #include "common/parallel.h"
+#include "common/spill.h"
 #include "server/ingest/findings.h"
 #include "server/ingest/transforms.h"
 #include "server/scene/scene.h"
 
 #define PHOTOS_MIN_COUNT 3 /* fewer views do not constrain materials and light */
 
+struct photos_options {
+    uint64_t pixel_limit;  /* of one photograph */
+    uint64_t decode_bytes; /* memory of pictures that are being decoded at the same time; 0: no limit. One is always */
+    struct spill *spill;   /* for the pixels; NULL: memory; borrowed */
+    uint64_t later_bytes;  /* that the caller will take of it for each pixel, beside what is loaded */
+};
+
 /* Loads the picture and mask of every frame from folder `dir` into scene->photograph, in the frames' order; missing
  * pictures are left out with a warning, and so are some that are broken. Faults of the files become problems in *f; other statuses than STATUS_OK are
  * failures of the machine. `name` is that of the transforms file. */
-enum status photos_load(const char *dir, const char *name, const struct transforms *t, uint64_t pixel_limit,
-                        struct parallel *pool, struct scene *scene, struct findings *f, struct error *err);
+enum status photos_load(const char *dir, const char *name, const struct transforms *t,
+                        const struct photos_options *options, struct parallel *pool, struct scene *scene,
+                        struct findings *f, struct error *err);
 
 #endif

@@ -31,14 +31,32 @@ static cJSON *new_order(const char *kind, const struct scheduler_config *config,
     json_add_string(order, "kind", kind);
     json_add_int(order, "thread_count", thread_count);
     json_add_int(order, "memory_bytes", (int64_t)config->worker_memory_bytes);
+    json_add_int(order, "photograph_memory_bytes", (int64_t)config->photograph_memory_bytes);
+    /* a quarter more than what stops jobs (disk.h): its own pixels are not to stop it */
+    json_add_int(order, "keep_free_bytes", (int64_t)(config->low_disk_bytes + config->low_disk_bytes / 4));
     json_add_bool(order, "sandbox", config->sandbox);
     return order;
 }
 
-static enum status order_job(struct attempt *a, const struct scheduler_config *config, const struct job *job,
-                             const struct scene_row *row, int thread_count, struct error *err) {
+/* What the job's owner may still take of the disk beside the job; 0: no limit. */
+static enum status disk_left(const struct scheduler_config *config, struct store *store, const struct job *job,
+                             uint64_t *bytes, struct error *err) {
+    uint64_t kept = 0;
+    *bytes = 0;
+    if (config->user_max_bytes == 0 || job->owner_id == 0)
+        return STATUS_OK;
+    enum status status = store_user_bytes(store, job->owner_id, NULL, job->id, &kept, err);
+    *bytes = kept < config->user_max_bytes ? config->user_max_bytes - kept : 1;
+    return status;
+}
+
+static enum status order_job(struct attempt *a, const struct scheduler_config *config, struct store *store,
+                             const struct job *job, const struct scene_row *row, int thread_count, struct error *err) {
     cJSON *settings;
-    enum status status = json_parse(job->settings, strlen(job->settings), "the job's settings", &settings, err);
+    uint64_t disk_bytes;
+    enum status status = disk_left(config, store, job, &disk_bytes, err);
+    if (status == STATUS_OK)
+        status = json_parse(job->settings, strlen(job->settings), "the job's settings", &settings, err);
     if (status != STATUS_OK)
         return status;
     char *out = layout_out(a->dir), *scene = layout_scene(config->data_dir, job->scene_id);
@@ -54,6 +72,8 @@ static enum status order_job(struct attempt *a, const struct scheduler_config *c
     json_add_int(order, "job_id", job->id);
     json_add_int(order, "attempt", a->number);
     json_add_number(order, "checkpoint_interval_sec", config->checkpoint_interval_sec);
+    json_add_int(order, "memory_step", job->memory_step);
+    json_add_int(order, "disk_bytes", (int64_t)disk_bytes);
     json_add(order, "settings", smaller);
     if (reduced.length > 0)
         json_add_string(order, "reduced", buf_text(&reduced));
@@ -178,7 +198,7 @@ enum status attempt_start_job(struct attempt *a, const struct scheduler_config *
     if (status == STATUS_OK)
         status = restart(a, store, &job, &why);
     if (status == STATUS_OK)
-        status = order_job(a, config, &job, &scene, thread_count, &why);
+        status = order_job(a, config, store, &job, &scene, thread_count, &why);
     if (status == STATUS_OK)
         status = supervisor_start(&a->worker, config->worker_binary, a->dir, &why);
     scene_row_release(&scene);

@@ -6,14 +6,15 @@
 #include <stdint.h>
 
 struct scheduler_config {
-    const char *data_dir;         /* borrowed; holds scenes/ID/, jobs/ID/ */
-    const char *worker_binary;    /* /proc/self/exe */
-    int max_running;              /* jobs at once */
-    int user_max_running;         /* jobs of one user at once; 0: no limit */
-    int max_checks;               /* checks of scenes at once; 0: CHECKS_AT_ONCE */
-    int thread_count;             /* shared between running jobs; 0: all processors */
-    uint64_t user_max_bytes;      /* what one user may keep; 0: no limit */
-    uint64_t worker_memory_bytes; /* 0: no limit */
+    const char *data_dir;             /* borrowed; holds scenes/ID/, jobs/ID/ */
+    const char *worker_binary;        /* /proc/self/exe */
+    int max_running;                  /* jobs at once */
+    int user_max_running;             /* jobs of one user at once; 0: no limit */
+    int max_checks;                   /* checks of scenes at once; 0: CHECKS_AT_ONCE */
+    int thread_count;                 /* shared between running jobs; 0: all processors */
+    uint64_t user_max_bytes;          /* what one user may keep; 0: no limit */
+    uint64_t worker_memory_bytes;     /* 0: no limit */
+    uint64_t photograph_memory_bytes; /* of it for pixels of photographs; 0: half of what there is */
     double checkpoint_interval_sec;
     double stop_grace_sec;      /* SIGTERM to SIGKILL */
     double checkpoint_keep_sec; /* from SIGTERM to SIGKILL */

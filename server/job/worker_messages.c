@@ -18,6 +18,7 @@
 #include "common/mem.h"
 #include "common/protocol.h"
 #include "server/data/layout.h"
+#include "server/job/measure.h"
 
 #define THINNED_SEC 1.0
 #define UNTAKEN_MAX 2000  /* files; a normal job has a few hundred */
@@ -232,6 +233,20 @@ static void note_checkpoint(const struct message_listener *l, const cJSON *line)
     cJSON_Delete(data);
 }
 
+/* What the worker takes of the disk without a name in its folder: it counts as its owner's until the attempt ends. */
+static void note_space(const struct message_listener *l, const cJSON *line) {
+    struct attempt *a = l->attempt;
+    struct error err;
+    double bytes;
+    struct disk_use use = {.job_id = a->job_id, .bytes = a->job_id ? measure_folder(a->dir) : -1};
+    if (json_number(line, "bytes", "space", -1.0, &bytes, NULL) != STATUS_OK || !(bytes >= 0.0 && bytes < 1e15) ||
+        use.bytes < 0)
+        return;
+    use.bytes += (int64_t)bytes;
+    if (store_disk_enter(l->store, &use, 1, &err) != STATUS_OK)
+        complain(a, "space", &err);
+}
+
 /* Counts iterations and rays. A loss comes with its iteration; `rays` is only counted. True when the metric is not
  * one of the job's curves. */
 static bool note_counters(const struct message_listener *l, const cJSON *line) {
@@ -294,6 +309,8 @@ static void take_line(void *user, const char *text, size_t length) {
         enter_file(l, EVENT_OUTPUT, line);
     else if (strcmp(type, "checkpoint") == 0)
         note_checkpoint(l, line);
+    else if (strcmp(type, "space") == 0)
+        note_space(l, line);
     else if (strcmp(type, "end") == 0)
         note_end(a, line);
     else if (strcmp(type, "problem") == 0 && a->problems) {

@@ -63,6 +63,9 @@ static void for_rows(struct detail *d, uint32_t train, void (*body)(void *user, 
     parallel_for(d->in.pool, photograph_of(d, train)->camera.height, body, &job);
 }
 
+/* Of the arrays with an element a pixel. */
+static struct spill *spill_of(const struct detail *d) { return d->in.views->scene->spill; }
+
 static size_t chunks_of(const struct detail *d) { return (d->in.surface.inverse->valid_count + CHUNK - 1) / CHUNK; }
 
 /* The texels in the footprint of a pixel that shows a triangle; false where too few of them are known. */
@@ -394,9 +397,9 @@ double detail_texels_per_pixel(const struct surface *s, const struct views *view
 static void make_picture(struct detail *d, uint32_t train) {
     size_t pixels = pixels_of(d, train);
     struct picture_job job = {.detail = d, .train = train, .raw = mem_array(pixels, sizeof *job.raw)};
-    d->triangle[train] = mem_array(pixels, sizeof **d->triangle);
-    d->weight[train] = mem_array(pixels, sizeof **d->weight);
-    d->residual[train] = mem_array(pixels, sizeof **d->residual);
+    d->triangle[train] = spill_take(spill_of(d), pixels, sizeof **d->triangle);
+    d->weight[train] = spill_take(spill_of(d), pixels, sizeof **d->weight);
+    d->residual[train] = spill_take(spill_of(d), pixels, sizeof **d->residual);
     parallel_for(d->in.pool, photograph_of(d, train)->camera.height, residual_row, &job);
     parallel_for(d->in.pool, photograph_of(d, train)->camera.height, filter_row, &job);
     mem_free(job.raw);
@@ -411,10 +414,13 @@ static void choose_pixels(struct detail *d) {
                 d->triangle[t][i] = NONE;
             most = d->triangle[t][i] == NONE ? most : fmaxf(most, d->weight[t][i]);
         }
+        spill_trim(spill_of(d));
     }
-    for (uint32_t t = 0; t < d->in.views->train_count; t++)
+    for (uint32_t t = 0; t < d->in.views->train_count; t++) {
         for (size_t i = 0; i < pixels_of(d, t); i++)
             d->weight[t][i] = d->triangle[t][i] == NONE ? 0.0f : d->weight[t][i] / most;
+        spill_trim(spill_of(d));
+    }
 }
 
 /* Marks the texels that may change: measured ones with enough light. */
@@ -426,6 +432,17 @@ static void mark_known(struct detail *d, size_t texels) {
             s->inverse->triangle[i] != INVERSE_UV_NONE && d->in.measured[i].weight > 0.0f && d->in.lambert[i][0] != 0;
         d->chart_of_texel[i] = known ? surface_chart(s, (uint32_t)i) : NONE;
     }
+}
+
+enum status detail_reserve(const struct views *views, struct error *err) {
+    const struct scene *scene = views->scene;
+    uint64_t pixels = 0;
+    for (uint32_t t = 0; t < views->train_count; t++) {
+        const struct camera *camera = &scene->photograph[views->train[t]].camera;
+        pixels += (uint64_t)camera->width * camera->height;
+    }
+    return spill_reserve(scene->spill, "the residuals of the photographs' pixels", 3 * views->train_count,
+                         DETAIL_PIXEL_BYTES * pixels, 0, err);
 }
 
 void detail_init(struct detail *d, const struct detail_input *input) {
@@ -449,9 +466,9 @@ void detail_init(struct detail *d, const struct detail_input *input) {
 
 void detail_release(struct detail *d) {
     for (uint32_t t = 0; t < d->in.views->train_count; t++) {
-        mem_free(d->triangle[t]);
-        mem_free(d->weight[t]);
-        mem_free(d->residual[t]);
+        spill_give(spill_of(d), d->triangle[t]);
+        spill_give(spill_of(d), d->weight[t]);
+        spill_give(spill_of(d), d->residual[t]);
     }
     mem_free(d->triangle);
     mem_free(d->weight);

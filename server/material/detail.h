@@ -33,9 +33,12 @@ struct detail_input {
     struct parallel *pool;
 };
 
+#define DETAIL_PIXEL_BYTES 14 /* of triangle, weight and residual */
+
 struct detail {
     struct detail_input in;
-    /* Of each photograph, [train_count][pixels], 14 bytes a pixel of all of them together; owned. */
+    /* Of each photograph, [train_count][pixels], DETAIL_PIXEL_BYTES a pixel of all of them together, of the scene's
+     * spill; owned. */
     uint32_t **triangle;      /* that the pixel shows; UINT32_MAX: the pixel is not used */
     float **weight;           /* inverse noise variance, up to a factor; at most 1 */
     uint16_t (**residual)[3]; /* residual of the starting texture, base colour, high-pass filtered */
@@ -52,6 +55,8 @@ struct detail {
 /* Mean number of texels that a pixel covers; up to one, nothing is blurred at the texture's resolution. */
 double detail_texels_per_pixel(const struct surface *surface, const struct views *views);
 
+/* Makes room for the arrays with an element a pixel, before detail_init. */
+enum status detail_reserve(const struct views *views, struct error *err);
 void detail_init(struct detail *d, const struct detail_input *input);
 void detail_release(struct detail *d);
 

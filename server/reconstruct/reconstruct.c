@@ -255,13 +255,28 @@ static enum status require_seen_surface(struct stage_run *run, struct error *err
     return seen_share_require(&share, settings_is(run->r->settings, "fit", "ignore"), err);
 }
 
+/* Room for what is found of each pixel of the photographs that are used. */
+static enum status reserve_pixels(const struct reconstruction *r, struct error *err) {
+    size_t count = 0;
+    uint64_t pixels = 0;
+    for (size_t i = 0; i < r->scene->photograph_count; i++) {
+        const struct photograph *photo = &r->scene->photograph[i];
+        count += !photo->is_test;
+        pixels += photo->is_test ? 0 : (uint64_t)photo->camera.width * photo->camera.height;
+    }
+    return spill_reserve(r->scene->spill, "the classes of the photographs' pixels", PHOTOGRAPH_LATER_BYTES * count,
+                         PHOTOGRAPH_LATER_BYTES * pixels, 0, err);
+}
+
 static enum status prepare(struct stage_run *run, struct error *err) {
     struct reconstruction *r = run->r;
     const struct mesh *mesh = &r->scene->mesh;
     if (settings_is(r->settings, "segmentation", "given") && !mesh->object_id)
         return error_set(err, STATUS_INPUT, "segmentation=given, but the mesh has no object_id per face");
     hold_out(r);
-    enum status status = orient_mesh(r->scene, r->pool, &run->flipped, err);
+    enum status status = reserve_pixels(r, err);
+    if (status == STATUS_OK)
+        status = orient_mesh(r->scene, r->pool, &run->flipped, err);
     if (status != STATUS_OK)
         return status;
     denoise_mesh(run);
@@ -388,11 +403,7 @@ enum status reconstruct_run(struct scene *scene, const struct settings *settings
 }
 
 void reconstruct_release(struct reconstruction *r) {
-    for (size_t i = 0; i < r->held_out_count; i++) {
-        image_release(&r->held_out[i].photograph);
-        image_release(&r->held_out[i].render);
-    }
-    mem_free(r->held_out);
+    report_release_held_out(r);
     mem_free(r->radiance_preview);
     mem_free(r->is_emitter);
     mem_free(r->evidence);

@@ -112,6 +112,15 @@ static void photograph_noise(const struct reconstruction *r, const struct photog
     }
 }
 
+/* Moves the pixels of a picture to where those of photographs are. */
+static void move_pixels(struct image *image, struct spill *spill) {
+    size_t count = (size_t)image->width * image->height;
+    float *moved = spill_take(spill, count, 3 * sizeof *moved);
+    memcpy(moved, image->pixel, count * 3 * sizeof *moved);
+    mem_free(image->pixel);
+    image->pixel = moved;
+}
+
 static void render_view(struct reconstruction *r, struct photograph *photo, struct held_out *view, uint32_t samples,
                         double median) {
     const struct settings *set = r->settings;
@@ -137,6 +146,22 @@ static void render_view(struct reconstruction *r, struct photograph *photo, stru
     view->ssim = metrics_ssim(&view->photograph, &view->render, exposure);
     image_release(&noise);
     image_release(&error);
+    move_pixels(&view->photograph, r->scene->spill);
+    move_pixels(&view->render, r->scene->spill);
+}
+
+void report_release_held_out(struct reconstruction *r) {
+    for (size_t i = 0; i < r->held_out_count; i++) {
+        struct image *both[] = {&r->held_out[i].photograph, &r->held_out[i].render};
+        for (size_t k = 0; k < 2; k++) {
+            spill_give(r->scene->spill, both[k]->pixel);
+            both[k]->pixel = NULL;
+            image_release(both[k]);
+        }
+    }
+    mem_free(r->held_out);
+    r->held_out = NULL;
+    r->held_out_count = 0;
 }
 
 /* Mean over the views that have a value; a view without valid pixels has none. */
@@ -164,6 +189,10 @@ enum status report_held_out(struct reconstruction *r, const struct views *views,
     for (size_t i = 0; i < scene->photograph_count; i++)
         pixels_left += scene->photograph[i].is_test ? pixels_of(&scene->photograph[i]) : 0.0;
     struct metric_mean msre = {0}, render_noise = {0}, photograph_noise = {0}, psnr = {0}, ssim = {0};
+    enum status status = spill_reserve(scene->spill, "the held-out photographs and their renders", 2 * total,
+                                       2 * 3 * sizeof(float) * (uint64_t)pixels_left, 0, err);
+    if (status != STATUS_OK)
+        return status;
     r->held_out = mem_calloc(total + 1, sizeof *r->held_out);
     for (size_t i = 0; i < scene->photograph_count; i++) {
         if (!scene->photograph[i].is_test)

@@ -11,6 +11,9 @@
 enum status report_held_out(struct reconstruction *r, const struct views *views, const struct reconstruct_hooks *hooks,
                             struct error *err);
 
+/* Releases r->held_out, which is empty then. */
+void report_release_held_out(struct reconstruction *r);
+
 /* Adds "emitters" to r->report: the segments that emit or nearly do, with their evidence. */
 void report_emitters(struct reconstruction *r);
 

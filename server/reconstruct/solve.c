@@ -158,10 +158,12 @@ static enum status divide_all(struct solve *s, int pass, struct error *err) {
 static enum status find_detail(struct solve *s, struct error *err) {
     const struct reconstruction *r = s->r;
     size_t texels = (size_t)r->atlas.width * r->atlas.height;
-    uint16_t(*lambert)[3] = mem_calloc_large(texels, sizeof *lambert);
     int steps = (int)settings_number(r->settings, "detail_steps");
-    enum status status = STATUS_OK;
     struct detail detail;
+    enum status status = detail_reserve(s->views, err);
+    if (status != STATUS_OK)
+        return status;
+    uint16_t(*lambert)[3] = mem_calloc_large(texels, sizeof *lambert);
     divide_lambert_all(&s->divide, lambert);
     detail_init(&detail, &(struct detail_input){.surface = reconstruction_surface(r),
                                                 .views = s->views,

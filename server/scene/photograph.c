@@ -10,12 +10,12 @@
 
 void photograph_release(struct photograph *photo) {
     mem_free(photo->name);
-    mem_free(photo->pixel);
-    mem_free(photo->saturated);
-    mem_free(photo->clipped);
+    spill_give(photo->spill, photo->pixel);
+    spill_give(photo->spill, photo->saturated);
+    spill_give(photo->spill, photo->clipped);
     mem_free(photo->color_space);
-    mem_free(photo->firefly);
-    mem_free(photo->mask);
+    spill_give(photo->spill, photo->firefly);
+    spill_give(photo->spill, photo->mask);
     *photo = (struct photograph){0};
 }
 

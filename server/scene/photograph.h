@@ -14,11 +14,18 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "common/spill.h"
 #include "common/vec.h"
 #include "server/scene/camera.h"
 
+/* Bytes a pixel that a photograph takes when it is loaded, and that the reconstruction adds for each one that it uses:
+ * saturated, firefly, and three of capture/views.h. */
+#define PHOTOGRAPH_PIXEL_BYTES 6
+#define PHOTOGRAPH_LATER_BYTES 5
+
 struct photograph {
-    char *name; /* as in transforms.json; owned */
+    struct spill *spill; /* of which the arrays of pixels are; NULL: memory; borrowed */
+    char *name;          /* as in transforms.json; owned */
     struct camera camera;
     bool is_test; /* held out: never used to reconstruct */
     bool is_hdr;

@@ -16,6 +16,7 @@ struct scene {
     char *source;       /* kind of capture: "COLMAP"; NULL in scenes that were not read from a bundle; owned */
     size_t named_count; /* frames that its files name, of which the photographs are those that can be used */
     enum matrix_axes pose_axes; /* what the matrices of the cameras' file were taken for */
+    struct spill *spill; /* for arrays with an element for each pixel of all photographs; NULL: memory; borrowed */
     size_t warning_count;
     char **warning; /* [warning_count] sentences for the user; owned */
 };

@@ -12,6 +12,7 @@
 #include "server/data/layout.h"
 #include "server/check/check_pictures.h"
 #include "server/ingest/facts.h"
+#include "server/worker/pixel_memory.h"
 #include "server/worker/tasks.h"
 
 static enum status flush(const char *dir, struct error *err) {
@@ -59,6 +60,9 @@ enum status task_check(const struct order *order, struct progress *progress, str
     struct bundle_limits limits = bundle_default_limits();
     char *archive = layout_archive(order->dir), *files = layout_files(order->dir);
     struct parallel *pool = parallel_new(order->thread_count);
+    struct spill *spill = pixel_memory_new(order, pool);
+    limits.spill = spill;
+    limits.decode_bytes = spill_memory_bytes(spill) / 2;
     cJSON *problems = cJSON_CreateArray();
     struct scene_check room;
     struct reading reading;
@@ -80,6 +84,7 @@ enum status task_check(const struct order *order, struct progress *progress, str
     reading_release(&reading);
     cJSON_Delete(problems);
     parallel_free(pool);
+    spill_free(spill);
     mem_free(files);
     mem_free(archive);
     return status;

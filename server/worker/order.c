@@ -20,6 +20,27 @@ static enum status read_whole(const struct order *o, const char *key, double fal
     return status;
 }
 
+static enum status read_memory(struct order *o, struct error *err) {
+    double memory_bytes, photograph_memory_bytes, step, keep_free_bytes, disk_bytes;
+    enum status status = read_whole(o, "memory_bytes", 0.0, 0x1p53, &memory_bytes, err);
+    if (status == STATUS_OK)
+        status = read_whole(o, "photograph_memory_bytes", 0.0, 0x1p53, &photograph_memory_bytes, err);
+    if (status == STATUS_OK)
+        status = read_whole(o, "memory_step", 0.0, INT_MAX, &step, err);
+    if (status == STATUS_OK)
+        status = read_whole(o, "keep_free_bytes", 0.0, 0x1p53, &keep_free_bytes, err);
+    if (status == STATUS_OK)
+        status = read_whole(o, "disk_bytes", 0.0, 0x1p53, &disk_bytes, err);
+    if (status != STATUS_OK)
+        return status;
+    o->memory_bytes = (uint64_t)memory_bytes;
+    o->photograph_memory_bytes = (uint64_t)photograph_memory_bytes;
+    o->memory_step = (int)step;
+    o->keep_free_bytes = (uint64_t)keep_free_bytes;
+    o->disk_bytes = (uint64_t)disk_bytes;
+    return STATUS_OK;
+}
+
 static enum status read_reconstruct(struct order *o, struct error *err) {
     double job_id, attempt;
     enum status status = json_string(o->json, "scene", WHAT, "", &o->scene, err);
@@ -56,7 +77,7 @@ static enum status read_deliver(struct order *o, struct error *err) {
 
 enum status order_read(struct order *o, const char *dir, struct error *err) {
     *o = (struct order){.dir = dir};
-    double thread_count, memory_bytes;
+    double thread_count;
     char *path = layout_order(dir);
     enum status status = json_read(path, (size_t)1 << 20, &o->json, err);
     mem_free(path);
@@ -67,13 +88,12 @@ enum status order_read(struct order *o, const char *dir, struct error *err) {
     if (status == STATUS_OK)
         status = read_whole(o, "thread_count", 1.0, INT_MAX, &thread_count, err);
     if (status == STATUS_OK)
-        status = read_whole(o, "memory_bytes", 0.0, 0x1p53, &memory_bytes, err);
+        status = read_memory(o, err);
     if (status == STATUS_OK)
         status = json_bool(o->json, "sandbox", WHAT, true, &o->sandbox, err);
     if (status == STATUS_OK) {
         o->reading = cJSON_GetObjectItemCaseSensitive(o->json, "reading");
         o->thread_count = (int)thread_count;
-        o->memory_bytes = (uint64_t)memory_bytes;
     }
     if (status == STATUS_OK && strcmp(o->kind, "reconstruct") == 0)
         status = read_reconstruct(o, err);

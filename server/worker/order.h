@@ -2,8 +2,10 @@
  *
  *   {"kind":"reconstruct","scene":"DATA/scenes/ID/files","scene_id":"…","reading":{…},"settings":{…},
  *    "name":"my room","job_id":17,"attempt":2,"thread_count":4,"memory_bytes":0,"sandbox":true,
- *    "checkpoint_interval_sec":60}
- *   {"kind":"check","scene_id":"…","reading":{…},"thread_count":4,"memory_bytes":0,"sandbox":true}
+ *    "checkpoint_interval_sec":60,"photograph_memory_bytes":0,"memory_step":0,"keep_free_bytes":671088640,
+ *    "disk_bytes":0}
+ *   {"kind":"check","scene_id":"…","reading":{…},"thread_count":4,"memory_bytes":0,"photograph_memory_bytes":0,
+ *    "keep_free_bytes":671088640,"sandbox":true}
  *   {"kind":"deliver","url":"https://…","secret":"…","body":"…","message_id":"msg_7",
  *    "allow_private":false,"sandbox":true}
  *
@@ -22,7 +24,11 @@ struct order {
     const char *dir;
     const char *kind, *scene_id;
     int thread_count;
-    uint64_t memory_bytes; /* 0: no limit */
+    uint64_t memory_bytes;            /* 0: no limit */
+    uint64_t photograph_memory_bytes; /* of it for pixels of photographs; 0: pixel_memory.h says */
+    int memory_step;                  /* how often it has run out of memory */
+    uint64_t keep_free_bytes;         /* space of the disk that pixels leave free */
+    uint64_t disk_bytes;              /* that pixels may take of the disk; 0: what is free */
     bool sandbox;
     const cJSON *reading; /* how to read the scene (common/reading.h); NULL: as its files say */
     /* kind "reconstruct" */

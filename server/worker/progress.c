@@ -106,6 +106,12 @@ void progress_checkpoint(struct progress *p, long iteration, uint64_t bytes, dou
     send_line(p, object);
 }
 
+void progress_space(struct progress *p, uint64_t bytes) {
+    cJSON *object = line("space");
+    json_add_int(object, "bytes", (int64_t)bytes);
+    send_line(p, object);
+}
+
 void progress_problem(struct progress *p, const char *file, const char *reason, const char *hint) {
     cJSON *object = line("problem");
     char *name = cut(file, 1000);

@@ -7,6 +7,7 @@
  *   {"type":"output","name":"base_color.exr","bytes":123,"sha256":"…","content_type":"image/x-exr"}
  *   {"type":"log","level":"info","message":"…"}
  *   {"type":"checkpoint","iteration":120,"bytes":…,"seconds":…}
+ *   {"type":"space","bytes":…}   what it takes of the disk besides the files in its folder
  *   {"type":"problem","file":"images/003.png","reason":"…","hint":"…"}   (scene checks)
  *   {"type":"scene","facts":{"triangle_count":…,"frame_count":…,…}}  (scene checks, last)
  *   {"type":"end","status":"ok|input|no-space|…","message":"…","hint":"…"}
@@ -45,6 +46,7 @@ void progress_file(struct progress *p, const char *type, const char *name, uint6
                    const char *content_type);
 void progress_log(struct progress *p, const char *level, const char *message);
 void progress_checkpoint(struct progress *p, long iteration, uint64_t bytes, double seconds);
+void progress_space(struct progress *p, uint64_t bytes);
 /* hint may be NULL. */
 void progress_problem(struct progress *p, const char *file, const char *reason, const char *hint);
 void progress_scene(struct progress *p, cJSON *facts); /* takes facts */

@@ -32,6 +32,7 @@
 #include "server/reconstruct/reconstruct.h"
 #include "server/scene/select.h"
 #include "server/worker/checkpoint.h"
+#include "server/worker/pixel_memory.h"
 #include "server/worker/read_back.h"
 #include "server/worker/results.h"
 #include "server/worker/tasks.h"
@@ -49,6 +50,8 @@ struct worker_run {
     const struct order *order;
     struct progress *progress;
     struct checkpoint *checkpoint;
+    struct spill *spill; /* of the photographs' pixels */
+    uint64_t told_bytes; /* what they take of the disk, as was told last */
     char *out_dir;
     bool stop;
     bool preview_asked;      /* by SIGUSR1 */
@@ -121,8 +124,17 @@ static void tell_held_metrics(struct worker_run *run) {
     }
 }
 
+/* What pixels take of the disk, when that has changed. */
+static void tell_space(struct worker_run *run) {
+    uint64_t bytes = spill_file_bytes(run->spill);
+    if (bytes != run->told_bytes)
+        progress_space(run->progress, bytes);
+    run->told_bytes = bytes;
+}
+
 static void tell_stage(void *user, const char *stage) {
     struct worker_run *run = user;
+    tell_space(run);
     tell_held_metrics(run);
     progress_stage(run->progress, stage);
     run->next_progress = 0.0; /* send the new stage's remaining time at once */
@@ -134,6 +146,7 @@ static void tell_progress(void *user, const char *stage, double done, double tot
     if (now < run->next_progress && done < total)
         return;
     run->next_progress = now + PROGRESS_INTERVAL_SEC;
+    tell_space(run);
     progress_step(run->progress, stage, done, total, eta_sec);
 }
 
@@ -296,9 +309,24 @@ static enum status select_parts(struct worker_run *run, const struct settings *s
     return STATUS_OK;
 }
 
+static void tell_pixels(const struct worker_run *run, const struct scene *scene) {
+    uint64_t bytes = spill_file_bytes(run->spill);
+    if (bytes == 0)
+        return;
+    char *text =
+        mem_printf("photographs: the pixels of all %zu do not fit the %.0f MiB that they may have of the memory "
+                   "(photograph_memory_mib): they are read from the disk",
+                   scene->photograph_count, (double)spill_memory_bytes(run->spill) / 1048576.0);
+    progress_log(run->progress, "info", text);
+    mem_free(text);
+}
+
 static enum status load_scene(struct worker_run *run, const struct settings *settings, struct parallel *pool,
                               struct scene *scene, struct error *err) {
     struct bundle_limits limits = bundle_default_limits();
+    limits.spill = run->spill;
+    limits.decode_bytes = spill_memory_bytes(run->spill) / 2;
+    limits.later_bytes = PHOTOGRAPH_LATER_BYTES;
     struct reading reading;
     const char *transforms = settings_text(settings, "transforms");
     enum status status = reading_parse(run->order->reading, &reading, err);
@@ -371,6 +399,7 @@ static enum status reconstruct(struct worker_run *run, const struct settings *se
     enum status status = load_scene(run, settings, pool, &scene, err);
     if (status != STATUS_OK)
         return status;
+    tell_pixels(run, &scene);
     double now = clock_sec();
     run->next_checkpoint = now + run->order->checkpoint_interval_sec;
     run->next_preview = now; /* an early preview shows that something happens */
@@ -406,10 +435,12 @@ enum status task_reconstruct(const struct order *order, struct progress *progres
     if (status == STATUS_OK) {
         run.preview_interval_sec = settings_number(&settings, "preview_interval_sec");
         pool = parallel_new(order->thread_count);
+        run.spill = pixel_memory_new(order, pool);
         working_time_init(&run.worked, parallel_thread_count(pool));
         status = reconstruct(&run, &settings, pool, err);
     }
     parallel_free(pool);
+    spill_free(run.spill);
     checkpoint_close(run.checkpoint);
     settings_release(&settings);
     mem_free(run.out_dir);

@@ -1,6 +1,7 @@
 /* reconstruct_room ROOM OUT [name=value ...] -- one reconstruction without the daemon, for
  * benches and experiments: reads the unpacked bundle ROOM, writes the outputs to OUT, prints the
- * curve and the figures. No checkpoints. */
+ * curve and the figures. No checkpoints. Where the environment has ROOM_PIXEL_MIB, pixels of photographs
+ * beyond so many MiB lie in a file in OUT. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,6 +11,7 @@
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
+#include "common/spill.h"
 #include "server/ingest/bundle.h"
 #include "server/worker/results.h"
 #include "server/worker/working_time.h"
@@ -91,6 +93,16 @@ static enum status write_outputs(const char *dir, const struct reconstruction *r
     return status;
 }
 
+static void trim_pixels(void *user) { spill_trim(user); }
+
+/* NULL: all in memory. */
+static struct spill *new_spill(const char *out, struct error *err) {
+    const char *mib = getenv("ROOM_PIXEL_MIB");
+    if (!mib || file_make_dirs(out, err) != STATUS_OK)
+        return NULL;
+    return spill_new(out, &(struct spill_limits){.memory_bytes = (uint64_t)(atof(mib) * 1048576.0)});
+}
+
 static enum status run(int argc, char **argv, struct error *err) {
     struct room_clock clock = {.last = clock_sec()};
     double begin = clock.last;
@@ -122,6 +134,10 @@ static enum status run(int argc, char **argv, struct error *err) {
     struct scene scene = {0};
     struct reconstruction r = {0};
     struct bundle_limits limits = bundle_default_limits();
+    limits.spill = new_spill(argv[2], err);
+    limits.decode_bytes = limits.spill ? spill_memory_bytes(limits.spill) / 2 : 0;
+    limits.later_bytes = PHOTOGRAPH_LATER_BYTES;
+    parallel_set_between(pool, trim_pixels, limits.spill);
     struct reading reading = reading_default();
     reading.transforms = mem_strdup(settings_text(&settings, "transforms"));
     if (status == STATUS_OK)
@@ -139,9 +155,12 @@ static enum status run(int argc, char **argv, struct error *err) {
         printf("%s\npeak memory %.0f MiB, total %.1f s\n", text, (double)usage.ru_maxrss / 1024.0, clock_sec() - begin);
         mem_free(text);
     }
+    if (limits.spill)
+        printf("pixels in a file: %.0f MiB\n", (double)spill_file_bytes(limits.spill) / 1048576.0);
     reconstruct_release(&r);
     scene_release(&scene);
     parallel_free(pool);
+    spill_free(limits.spill);
     cJSON_Delete(object);
     settings_release(&settings);
     return status;

@@ -49,7 +49,8 @@ static void check_json(const cJSON *value) {
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
-    static const struct bundle_limits limits = {100, 1 << 20, 100.0, 1 << 20, 1000};
+    static const struct bundle_limits limits = {
+        .file_count = 100, .total_bytes = 1 << 20, .ratio = 100.0, .photograph_pixels = 1 << 20, .triangles = 1000};
     struct scene scene;
     struct error err = {.message = ""};
     if (!pool)

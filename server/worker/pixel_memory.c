@@ -1,0 +1,40 @@
+/* pixel_memory.c -- see pixel_memory.h. */
+#include "server/worker/pixel_memory.h"
+
+#include "common/machine.h"
+
+/* With less, even one photograph is read from the disk again and again; by hand. */
+#define LEAST_BYTES ((uint64_t)64 << 20)
+/* Where the system does not tell what it has. */
+#define UNKNOWN_BYTES ((uint64_t)2 << 30)
+#define STEPS_MAX 16
+
+uint64_t pixel_memory_bytes(const struct order *order) {
+    uint64_t bytes = order->photograph_memory_bytes;
+    if (bytes == 0) {
+        uint64_t available = machine_memory_available("");
+        if (available == 0)
+            available = UNKNOWN_BYTES;
+        if (order->memory_bytes > 0 && order->memory_bytes < available)
+            available = order->memory_bytes;
+        bytes = available / 2;
+    }
+    bytes >>= order->memory_step < STEPS_MAX ? order->memory_step : STEPS_MAX;
+    return bytes > LEAST_BYTES || order->photograph_memory_bytes > 0 ? bytes : LEAST_BYTES;
+}
+
+static void trim(void *user) {
+    struct spill *spill = user;
+    spill_trim(spill);
+}
+
+struct spill *pixel_memory_new(const struct order *order, struct parallel *pool) {
+    const struct spill_limits limits = {
+        .memory_bytes = pixel_memory_bytes(order),
+        .keep_free_bytes = order->keep_free_bytes,
+        .file_bytes = order->disk_bytes,
+    };
+    struct spill *spill = spill_new(order->dir, &limits);
+    parallel_set_between(pool, trim, spill);
+    return spill;
+}
