@@ -193,13 +193,16 @@ static void add_parts(struct glb *g) {
     cJSON *materials = cJSON_AddArrayToObject(g->root, "materials");
     for (size_t i = 0; i < g->parts->count; i++) {
         uint32_t s = g->parts->part[i].segment;
-        char name[32];
-        snprintf(name, sizeof name, "segment %u", s);
+        char number[32];
+        const char *own = segments_name(g->in->segments, g->in->mesh, s), *name = own ? own : number;
+        snprintf(number, sizeof number, "segment %u", s);
         add_mesh(g, append(meshes), i, name);
         add_material(g, append(materials), s, name);
         cJSON *node = add_node(g, name);
         json_add_int(node, "mesh", (int64_t)i);
-        json_add_int(add_object(node, "extras"), "object_id", g->in->segments->id[s]);
+        cJSON *extras = add_object(node, "extras");
+        json_add_int(extras, "segment", s);
+        json_add_int(extras, "object_id", g->in->segments->id[s]);
     }
 }
 

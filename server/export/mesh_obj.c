@@ -35,7 +35,9 @@ enum status mesh_obj_write(const char *path, const struct export_input *input, c
                     (double)mesh->normal[v].y, (double)mesh->normal[v].z);
     for (size_t p = 0; p < parts->count; p++) {
         const struct part *part = &parts->part[p];
-        sink_printf(&out, "o segment_%u\nusemtl segment_%u\n", part->segment, part->segment);
+        char label[PARTS_LABEL_BYTES];
+        parts_label(input->segments, mesh, part->segment, label);
+        sink_printf(&out, "o %s\nusemtl %s\n", label, label);
         for (size_t i = part->first_triangle; i < part->first_triangle + part->triangle_count; i++) {
             uint32_t t = parts->order[i];
             sink_printf(&out, "f");
@@ -59,10 +61,12 @@ enum status mesh_mtl_write(const char *path, const struct export_input *input, c
         uint32_t s = parts->part[p].segment;
         double specular = (double)m->specular[s], roughness = (double)m->roughness[s];
         double smooth = 1.0 - roughness;
+        char label[PARTS_LABEL_BYTES];
+        parts_label(input->segments, input->mesh, s, label);
         sink_printf(&out,
-                    "newmtl segment_%u\nKd 1 1 1\nmap_Kd %s\nKs " SINK_FLOAT " " SINK_FLOAT " " SINK_FLOAT
+                    "newmtl %s\nKd 1 1 1\nmap_Kd %s\nKs " SINK_FLOAT " " SINK_FLOAT " " SINK_FLOAT
                     "\nNi 1.5\nNs " SINK_FLOAT "\nPr " SINK_FLOAT "\n",
-                    s, base_color, specular, specular, specular, MAX_NS * smooth * smooth, roughness);
+                    label, base_color, specular, specular, specular, MAX_NS * smooth * smooth, roughness);
         bool varies = scales && scales[s] > 0.0f;
         rgb e = varies ? rgb_gray(scales[s]) : m->emission[s];
         if (rgb_max(e) > 0.0f)

@@ -1,6 +1,7 @@
 /* mesh_obj.h -- the mesh as Wavefront OBJ (scene.obj) with its materials (scene.mtl).
  *
- * One object and one material of the same name, "segment_N" as in the report, per segment. Vertices and normals are
+ * One object and one material of the same name, "segment_N" as in the report and the input's
+ * name for it (parts_label), per segment. Vertices and normals are
  * those of the mesh, so connectivity is preserved; texture coordinates have their origin at the lower left. Metres,
  * in the room's axes.
  *

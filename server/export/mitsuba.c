@@ -63,8 +63,10 @@ static void put_emitter(struct sink *out, rgb radiance, bool varies) {
 static void put_shape(struct sink *out, const struct export_input *in, const char *shapes, size_t number,
                       uint32_t segment, bool varies) {
     const struct materials *m = in->materials;
+    char label[PARTS_LABEL_BYTES];
+    parts_label(in->segments, in->mesh, segment, label);
     sink_printf(out,
-                "  <shape type=\"serialized\" id=\"segment_%u\">\n"
+                "  <shape type=\"serialized\" id=\"%s\">\n"
                 "    <string name=\"filename\" value=\"%s\"/>\n"
                 "    <integer name=\"shape_index\" value=\"%zu\"/>\n"
                 "    <boolean name=\"face_normals\" value=\"%s\"/>\n"
@@ -73,7 +75,7 @@ static void put_shape(struct sink *out, const struct export_input *in, const cha
                 "      <float name=\"roughness\" value=\"" SINK_FLOAT "\"/>\n"
                 "      <float name=\"specular\" value=\"" SINK_FLOAT "\"/>\n"
                 "    </bsdf></bsdf>\n",
-                segment, shapes, number, in->mesh->normal ? "false" : "true", (double)m->roughness[segment],
+                label, shapes, number, in->mesh->normal ? "false" : "true", (double)m->roughness[segment],
                 (double)m->specular[segment]);
     if (rgb_max(m->emission[segment]) > 0.0f)
         put_emitter(out, m->emission[segment], varies);
@@ -181,8 +183,8 @@ static void pack_vec3(struct packer *p, vec3 v) {
 static void pack_part(struct packer *p, const struct export_input *in, const struct parts *parts,
                       const struct part *part) {
     const struct seams *seams = &parts->seams;
-    char name[32];
-    snprintf(name, sizeof name, "segment_%u", part->segment);
+    char name[PARTS_LABEL_BYTES];
+    parts_label(in->segments, in->mesh, part->segment, name);
     pack_u32(p, (in->mesh->normal ? HAS_NORMALS : 0) | HAS_TEXCOORDS | SINGLE_PRECISION);
     pack(p, name, strlen(name) + 1);
     pack_u64(p, part->vertex_count);

@@ -373,6 +373,9 @@ static cJSON *describe_segments(const struct export_input *in) {
         cJSON *entry = cJSON_CreateObject();
         json_add_int(entry, "segment", (int64_t)s); /* the same number as in scene.ply */
         json_add_int(entry, "id", in->segments->id[s]);
+        const char *name = segments_name(in->segments, in->mesh, s);
+        if (name)
+            json_add_string(entry, "name", name);
         json_add_int(entry, "triangles", (int64_t)triangles[s]);
         json_add_int(entry, "texels", (int64_t)texels[s]);
         json_add_number(entry, "area_m2", area[s]);

@@ -1,6 +1,9 @@
 /* parts.c -- see parts.h. */
 #include "server/export/parts.h"
 
+#include <stdbool.h>
+#include <stdio.h>
+
 #include "common/mem.h"
 #include "common/rng.h"
 
@@ -105,4 +108,19 @@ void parts_release(struct parts *p) {
     mem_free(p->order);
     mem_free(p->part);
     *p = (struct parts){0};
+}
+
+void parts_label(const struct segments *segments, const struct mesh *mesh, uint32_t segment,
+                 char label[PARTS_LABEL_BYTES]) {
+    const char *name = segments_name(segments, mesh, segment);
+    int length = snprintf(label, PARTS_LABEL_BYTES, "segment_%u%s", segment, name ? "_" : "");
+    for (; name && *name && length + 1 < PARTS_LABEL_BYTES; name++) {
+        bool is_plain = (*name >= 'a' && *name <= 'z') || (*name >= 'A' && *name <= 'Z') ||
+                        (*name >= '0' && *name <= '9') || *name == '-';
+        if (is_plain || label[length - 1] != '_') /* other characters in a row are one _ */
+            label[length++] = is_plain ? *name : '_';
+    }
+    while (label[length - 1] == '_')
+        length--;
+    label[length] = '\0';
 }

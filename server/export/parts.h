@@ -44,6 +44,13 @@ enum status parts_make(struct parts *parts, const struct mesh *mesh, const struc
                        const struct atlas *atlas, struct error *err);
 void parts_release(struct parts *parts);
 
+#define PARTS_LABEL_BYTES 96
+
+/* A name for files that take few characters: "segment_3", or "segment_3_wall_paint" where the input calls it
+ * "wall/paint". Unique, of letters, digits, - and _. */
+void parts_label(const struct segments *segments, const struct mesh *mesh, uint32_t segment,
+                 char label[PARTS_LABEL_BYTES]);
+
 /* Position, normal (the mesh must have normals) and texture coordinates (0 to 1 from the top left corner) of a
  * vertex. */
 static inline vec3 seams_position(const struct seams *s, const struct mesh *mesh, size_t vertex) {

@@ -264,6 +264,11 @@ static void put_segment(struct buf *out, const cJSON *segment) {
     static const char *const plain[] = {"area_m2", "texels", "roughness", "specular"};
     buf_puts(out, "<tr><td>");
     html_value(out, cJSON_GetObjectItemCaseSensitive(segment, "id"));
+    const cJSON *name = cJSON_GetObjectItemCaseSensitive(segment, "name");
+    if (name) {
+        buf_puts(out, " ");
+        html_value(out, name);
+    }
     buf_puts(out, "</td>");
     for (size_t i = 0; i < sizeof plain / sizeof *plain; i++) {
         buf_puts(out, "<td class=n>");

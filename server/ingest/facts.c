@@ -14,6 +14,18 @@ static cJSON *vec3_facts(vec3 v) {
     return array;
 }
 
+#define MAX_NAMES 200 /* of objects, in the facts; report.json has all */
+
+/* What the input calls its objects, by object_id; only where it has names. */
+static void add_names(cJSON *facts, const struct mesh *mesh) {
+    if (mesh->name_count == 0)
+        return;
+    cJSON *names = cJSON_AddArrayToObject(facts, "object_names");
+    for (size_t i = 0; i < mesh->name_count && i < MAX_NAMES; i++)
+        cJSON_AddItemToArray(names, json_new_string(mesh->name[i]));
+    json_add_int(facts, "object_count", (int64_t)mesh->name_count);
+}
+
 static void add_mesh_facts(cJSON *facts, const struct scene *scene) {
     const struct mesh *mesh = &scene->mesh;
     vec3 lower, upper;
@@ -23,6 +35,7 @@ static void add_mesh_facts(cJSON *facts, const struct scene *scene) {
     json_add_int(facts, "face_count", (int64_t)mesh->face_count);
     json_add_bool(facts, "has_normals", mesh->normal != NULL);
     json_add_bool(facts, "has_object_id", mesh->object_id != NULL);
+    add_names(facts, mesh);
     json_add_int(facts, "degenerate_count", (int64_t)scene->mesh_report.degenerate_count);
     json_add_int(facts, "duplicate_count", (int64_t)scene->mesh_report.duplicate_count);
     json_add_number(facts, "area_m2", mesh_area(mesh));

@@ -72,3 +72,5 @@ uint32_t intern_number(struct intern *in, const void *bytes, size_t length) {
     append(in, bytes, length, hash);
     return (uint32_t)in->count - 1;
 }
+
+const char *intern_text(const struct intern *in, size_t number) { return in->bytes + in->entry[number].offset; }

@@ -19,5 +19,7 @@ void intern_init(struct intern *in);
 void intern_release(struct intern *in);
 /* Number of the string, which is copied when it is new. */
 uint32_t intern_number(struct intern *in, const void *bytes, size_t length);
+/* The bytes of a string, borrowed until the next call of intern_number. */
+const char *intern_text(const struct intern *in, size_t number);
 
 #endif

@@ -8,6 +8,7 @@
 #include "common/mem.h"
 #include "server/ingest/intern.h"
 #include "server/ingest/mapping.h"
+#include "server/ingest/obj_objects.h"
 #include "server/ingest/positions.h"
 
 #define MAX_TOKEN 64 /* characters of a number or of a corner of a face */
@@ -16,10 +17,8 @@
 /* Below this size there are fewer points than NONE, since each takes a line of 8 bytes, "v 0 0 0". */
 #define MAX_BYTES ((size_t)8 * (NONE - 1))
 
-enum label { LABEL_OBJECT, LABEL_GROUP, LABEL_MATERIAL, LABEL_COUNT };
-
 struct obj_reader {
-    const char *name;
+    const char *name, *folder; /* folder: of other files, or NULL */
     const uint8_t *data;
     size_t size, at, line_end; /* `at` is within the line */
     size_t line, next_line;    /* numbers, from 1; a continued line counts as several */
@@ -31,10 +30,7 @@ struct obj_reader {
     struct intern pairs; /* position and normal of each vertex of the mesh */
     uint32_t (*pair)[2]; /* [pairs.count]; owned */
     size_t pair_capacity;
-    struct intern labels, objects;
-    uint32_t label[LABEL_COUNT]; /* current labels */
-    uint32_t object;             /* number of their combination, once a face has used it: */
-    bool object_known;
+    struct obj_objects objects;
     struct error *err;
 };
 
@@ -107,21 +103,27 @@ static enum status read_vec3(struct obj_reader *r, struct positions *points) {
 
 /* --- labels --------------------------------------------------------------------------------- */
 
-static void read_label(struct obj_reader *r, enum label kind) {
+/* The rest of the line, without blanks around it. */
+static const uint8_t *rest_of_line(const struct obj_reader *r, size_t *length) {
     size_t from = r->at, to = r->line_end;
     while (from < to && is_blank(r->data[from]))
         from++;
     while (to > from && is_blank(r->data[to - 1]))
         to--;
-    r->label[kind] = intern_number(&r->labels, r->data + from, to - from);
-    r->object_known = false;
+    *length = to - from;
+    return r->data + from;
 }
 
-static uint32_t object_of_face(struct obj_reader *r) {
-    if (!r->object_known)
-        r->object = intern_number(&r->objects, r->label, sizeof r->label);
-    r->object_known = true;
-    return r->object;
+static void read_label(struct obj_reader *r, enum obj_label kind) {
+    size_t length;
+    const uint8_t *name = rest_of_line(r, &length);
+    obj_objects_set(&r->objects, kind, name, length);
+}
+
+static void read_library(struct obj_reader *r) {
+    size_t length;
+    const uint8_t *name = rest_of_line(r, &length);
+    obj_objects_set_library(&r->objects, name, length);
 }
 
 /* --- faces ---------------------------------------------------------------------------------- */
@@ -193,7 +195,7 @@ static enum status read_face(struct obj_reader *r) {
         f->corner[f->corner_count] = vertex_of(r, pair);
         memcpy(f->position[f->corner_count++], r->position.at[pair[0]], sizeof *f->position);
     }
-    return faces_add(f, object_of_face(r), r->err);
+    return faces_add(f, obj_objects_current(&r->objects), r->err);
 }
 
 static void read_comment(struct obj_reader *r) {
@@ -218,11 +220,13 @@ static enum status read_line(struct obj_reader *r) {
     if (strcmp(word, "#") == 0)
         read_comment(r);
     else if (strcmp(word, "o") == 0)
-        read_label(r, LABEL_OBJECT);
+        read_label(r, OBJ_OBJECT);
     else if (strcmp(word, "g") == 0)
-        read_label(r, LABEL_GROUP);
+        read_label(r, OBJ_GROUP);
     else if (strcmp(word, "usemtl") == 0)
-        read_label(r, LABEL_MATERIAL);
+        read_label(r, OBJ_MATERIAL);
+    else if (strcmp(word, "mtllib") == 0)
+        read_library(r);
     return STATUS_OK;
 }
 
@@ -246,10 +250,7 @@ static void finish(struct obj_reader *r, struct mesh *mesh) {
         mesh->normal[v] = vec3_make((float)n[0], (float)n[1], (float)n[2]);
     }
     positions_settle(&vertices, mesh);
-    if (r->objects.count < 2) {
-        mem_free(mesh->object_id);
-        mesh->object_id = NULL;
-    }
+    obj_objects_settle(&r->objects, r->folder, mesh, &r->faces->report);
 }
 
 static enum status check_whole(const struct obj_reader *r) {
@@ -261,19 +262,16 @@ static enum status check_whole(const struct obj_reader *r) {
     return error_hint(r->err, "a mesh of triangles or polygons is needed, not a point cloud or curves");
 }
 
-enum status obj_parse(const void *data, size_t size, const char *name, size_t triangle_limit, struct mesh *mesh,
-                      struct faces_report *report, struct error *err) {
+enum status obj_parse(const void *data, size_t size, const char *name, const char *folder, size_t triangle_limit,
+                      struct mesh *mesh, struct faces_report *report, struct error *err) {
     *mesh = (struct mesh){0};
     if (size > MAX_BYTES)
         return error_set(err, STATUS_LIMIT, "%s is larger than %zu bytes", name, MAX_BYTES);
     struct obj_reader *r = mem_calloc(1, sizeof *r);
-    *r = (struct obj_reader){.name = name, .data = data, .size = size, .next_line = 1, .err = err};
+    *r = (struct obj_reader){.name = name, .folder = folder, .data = data, .size = size, .next_line = 1, .err = err};
     r->faces = faces_new(mesh, name, triangle_limit, true);
     intern_init(&r->pairs);
-    intern_init(&r->labels);
-    intern_init(&r->objects);
-    for (int i = 0; i < LABEL_COUNT; i++)
-        r->label[i] = intern_number(&r->labels, "", 0);
+    obj_objects_init(&r->objects);
     begin_text(r);
     enum status status = STATUS_OK;
     while (status == STATUS_OK && next_line(r))
@@ -286,8 +284,7 @@ enum status obj_parse(const void *data, size_t size, const char *name, size_t tr
         mesh_release(mesh);
     if (report)
         *report = r->faces->report;
-    intern_release(&r->objects);
-    intern_release(&r->labels);
+    obj_objects_release(&r->objects);
     intern_release(&r->pairs);
     mem_free(r->pair);
     positions_release(&r->position);
@@ -300,10 +297,13 @@ enum status obj_parse(const void *data, size_t size, const char *name, size_t tr
 enum status obj_read(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
                      struct faces_report *report, struct error *err) {
     struct mapping file;
+    const char *slash = strrchr(path, '/');
+    char *folder = slash ? mem_strndup(path, (size_t)(slash - path)) : mem_strdup(".");
     *mesh = (struct mesh){0};
     enum status status = mapping_open(&file, path, name, "an OBJ file", err);
     if (status == STATUS_OK)
-        status = obj_parse(file.data, file.size, name, triangle_limit, mesh, report, err);
+        status = obj_parse(file.data, file.size, name, folder, triangle_limit, mesh, report, err);
     mapping_close(&file);
+    mem_free(folder);
     return status;
 }

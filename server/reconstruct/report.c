@@ -242,6 +242,9 @@ void report_emitters(struct reconstruction *r) {
         cJSON *entry = cJSON_CreateObject();
         json_add_int(entry, "segment", (int64_t)s);
         json_add_int(entry, "object_id", r->segments.id[s]);
+        const char *name = segments_name(&r->segments, &r->scene->mesh, s);
+        if (name)
+            json_add_string(entry, "name", name);
         json_add_bool(entry, "is_emitter", r->is_emitter[s]);
         json_add_bool(entry, "hidden", evidence->is_hidden);
         json_add_number(entry, "share_beyond_reflection", (double)evidence->emitted_share);

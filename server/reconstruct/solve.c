@@ -398,6 +398,9 @@ static cJSON *segment_list(const struct reconstruction *r) {
     for (size_t i = 0; i < r->segments.count; i++) {
         cJSON *entry = cJSON_CreateObject();
         json_add_int(entry, "object_id", r->segments.id[i]);
+        const char *name = segments_name(&r->segments, &r->scene->mesh, i);
+        if (name)
+            json_add_string(entry, "name", name);
         json_add_number(entry, "roughness", (double)r->materials.roughness[i]);
         json_add_number(entry, "specular", (double)r->materials.specular[i]);
         cJSON_AddItemToArray(list, entry);

@@ -16,6 +16,9 @@ void mesh_release(struct mesh *mesh) {
     mem_free(mesh->index);
     mem_free(mesh->face);
     mem_free(mesh->object_id);
+    for (size_t i = 0; i < mesh->name_count; i++)
+        mem_free(mesh->name[i]);
+    mem_free(mesh->name);
     *mesh = (struct mesh){0};
 }
 
@@ -23,6 +26,11 @@ vec3 mesh_cross(const struct mesh *mesh, size_t triangle) {
     const uint32_t *v = mesh->index[triangle];
     vec3 a = mesh->position[v[0]];
     return vec3_cross(vec3_sub(mesh->position[v[1]], a), vec3_sub(mesh->position[v[2]], a));
+}
+
+const char *mesh_object_name(const struct mesh *mesh, int64_t object_id) {
+    bool has_name = object_id >= 0 && (uint64_t)object_id < mesh->name_count && mesh->name[object_id][0] != '\0';
+    return has_name ? mesh->name[object_id] : NULL;
 }
 
 double mesh_area(const struct mesh *mesh) {

@@ -20,8 +20,10 @@ struct mesh {
     uint32_t *face;       /* [triangle_count] face of the input that the triangle was cut from,
                               * ascending; owned */
     int64_t *object_id;   /* [triangle_count] the input's object_id, or NULL; owned */
-    size_t face_count;    /* faces of the input, the dropped ones included */
-    double offset[3]; /* metres, whole; a position plus this is where the input has it. 0 unless the input lies so far
+    size_t name_count;
+    char **name;       /* [name_count] of the object with that object_id in the input; none: NULL; owned */
+    size_t face_count; /* faces of the input, the dropped ones included */
+    double offset[3];  /* metres, whole; a position plus this is where the input has it. 0 unless the input lies so far
                        * from its origin that single precision would blur it (server/ingest/positions.h) */
 };
 
@@ -53,6 +55,8 @@ static inline vec3 mesh_point(const struct mesh *mesh, size_t triangle, float b1
     p = vec3_mad(p, b1, mesh->position[v[1]]);
     return vec3_mad(p, b2, mesh->position[v[2]]);
 }
+/* Name of the object, borrowed; NULL when the input has none for it. */
+const char *mesh_object_name(const struct mesh *mesh, int64_t object_id);
 double mesh_area(const struct mesh *mesh);                           /* total, m^2 */
 void mesh_bounds(const struct mesh *mesh, vec3 *lower, vec3 *upper); /* of the triangles */
 

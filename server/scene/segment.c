@@ -40,6 +40,7 @@ static int ascending(const void *left, const void *right) {
 
 void segments_from_object_id(struct segments *s, const struct mesh *mesh) {
     size_t n = mesh->triangle_count;
+    s->is_given = true;
     s->id = mem_array(n, sizeof *s->id);
     s->of_triangle = mem_array(n, sizeof *s->of_triangle);
     memcpy(s->id, mesh->object_id, n * sizeof *s->id);
@@ -212,6 +213,7 @@ static void number_regions(struct segments *s, struct regions *r, size_t triangl
     uint32_t *number = mem_array(triangle_count, sizeof *number);
     for (size_t t = 0; t < triangle_count; t++)
         number[t] = NONE;
+    s->is_given = false;
     s->count = 0;
     s->of_triangle = mem_array(triangle_count, sizeof *s->of_triangle);
     for (uint32_t t = 0; t < triangle_count; t++) {
@@ -260,6 +262,10 @@ void segments_automatic(struct segments *s, const struct mesh *mesh) {
     mem_free(r.inside);
     mem_free(link);
     adjacency_release(&adjacency);
+}
+
+const char *segments_name(const struct segments *s, const struct mesh *mesh, size_t segment) {
+    return s->is_given ? mesh_object_name(mesh, s->id[segment]) : NULL;
 }
 
 void segments_release(struct segments *s) {

@@ -5,6 +5,7 @@
 #ifndef UNBAKE_SCENE_SEGMENT_H
 #define UNBAKE_SCENE_SEGMENT_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -13,6 +14,7 @@
 struct segments {
     size_t count;
     uint32_t *of_triangle; /* [triangle_count], in [0, count); owned */
+    bool is_given;         /* by the input: `id` is its object_id */
     int64_t *id;           /* [count] the input's object_id, or the segment's own number; of a part that was split
                             * off: that of the whole; owned */
 };
@@ -20,6 +22,8 @@ struct segments {
 void segments_from_object_id(struct segments *s, const struct mesh *mesh); /* needs object_id */
 /* Deterministic; a few seconds for millions of triangles. */
 void segments_automatic(struct segments *s, const struct mesh *mesh);
+/* What the input calls the object that the segment is or is part of; borrowed from the mesh; NULL: nothing. */
+const char *segments_name(const struct segments *s, const struct mesh *mesh, size_t segment);
 void segments_release(struct segments *s);
 
 #endif

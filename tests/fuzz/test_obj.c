@@ -6,7 +6,7 @@
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     struct mesh mesh;
     struct error err = {.message = ""};
-    enum status status = obj_parse(data, size, "case", 100000, &mesh, NULL, &err);
+    enum status status = obj_parse(data, size, "case", NULL, 100000, &mesh, NULL, &err);
     MUST(status != STATUS_OK || mesh.triangle_count > 0);
     for (size_t i = 0; status == STATUS_OK && i < mesh.triangle_count; i++)
         MUST(!mesh.object_id || (mesh.object_id[i] >= 0 && mesh.object_id[i] <= (int64_t)mesh.face_count));

@@ -322,6 +322,50 @@ static void test_far(const char *dir, struct export_input *in, struct mesh *room
     memset(room->offset, 0, sizeof room->offset);
 }
 
+/* Names of the input go into every file, with the segment's number. */
+static void test_named(const char *dir, struct export_input *in, struct mesh *room, const struct parts *parts) {
+    static const struct {
+        const char *file, *text;
+    } table[] = {
+        {"scene.obj", "\no segment_0_wall_north-side_1\nusemtl segment_0_wall_north-side_1\n"},
+        {"scene.obj", "\no segment_1\n"},
+        {"scene.mtl", "newmtl segment_0_wall_north-side_1\n"},
+        {"scene.xml", "<shape type=\"serialized\" id=\"segment_0_wall_north-side_1\">"},
+        {"scene.glb", "\"name\":\"wall/north-side 1\""},
+        {"scene.glb", "\"name\":\"segment 1\""},
+        {"scene.glb", "\"extras\":{\"segment\":0,\"object_id\":0}"},
+    };
+    char *name[] = {"wall/north-side 1", "", "\xe5\xa2\x99"};
+    struct segments named = *in->segments, *before = (struct segments *)in->segments;
+    char label[PARTS_LABEL_BYTES];
+    room->name = name;
+    room->name_count = 3;
+    struct segments automatic = named;
+    automatic.is_given = false;
+    named.is_given = true;
+    in->segments = &named;
+    CHECK(named.id[0] == 0 && named.id[1] == 1);
+    parts_label(&named, room, 2, label);
+    CHECK_STRING(label, "segment_2");
+    CHECK(segments_name(&named, room, 1) == NULL && segments_name(&automatic, room, 0) == NULL);
+    for (size_t i = 0; i < sizeof table / sizeof *table; i++) {
+        struct error err = {.message = ""};
+        struct buf file;
+        char *path = file_join(dir, table[i].file);
+        for (size_t f = 0; f < FORMATS_COUNT; f++)
+            CHECK(strcmp(formats[f].name, table[i].file) != 0 || formats[f].write(dir, in, parts, &err) == STATUS_OK);
+        buf_init(&file, 1 << 26);
+        CHECK(file_read(path, &file, &err) == STATUS_OK);
+        CHECK_THAT(memmem(file.data, file.length, table[i].text, strlen(table[i].text)), "%s: %s", table[i].file,
+                   table[i].text);
+        buf_release(&file);
+        mem_free(path);
+    }
+    in->segments = before;
+    room->name = NULL;
+    room->name_count = 0;
+}
+
 static void test_same_bytes(const char *dir, const struct export_input *in, const struct parts *parts) {
     struct error err;
     struct buf once, twice;
@@ -492,6 +536,7 @@ int main(void) {
     test_round(dir, "scene.glb", &in, &parts);
     test_far(dir, &in, &room.mesh, &parts);
     in.up = (vec3){0.0f, 1.0f, 0.0f};
+    test_named(dir, &in, &room.mesh, &parts);
     test_same_bytes(dir, &in, &parts);
     test_picture(dir, &room, &in, &parts);
     test_failures(dir, &in, &parts);

@@ -7,7 +7,7 @@
 #define SQUARE "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 
 static enum status parse(const char *text, struct mesh *mesh, struct faces_report *report, struct error *err) {
-    return obj_parse(text, strlen(text), "room.obj", 1000, mesh, report, err);
+    return obj_parse(text, strlen(text), "room.obj", NULL, 1000, mesh, report, err);
 }
 
 /* Comments, colours behind positions, indices from both ends, continued lines, all kinds of ends. */
@@ -125,9 +125,9 @@ static void test_limits(void) {
     struct mesh mesh;
     struct error err;
     static const char binary[] = SQUARE "f 1 2 3\n\0";
-    CHECK(obj_parse(binary, sizeof binary, "room.obj", 9, &mesh, NULL, &err) == STATUS_INPUT);
+    CHECK(obj_parse(binary, sizeof binary, "room.obj", NULL, 9, &mesh, NULL, &err) == STATUS_INPUT);
     CHECK(strstr(err.message, "not text"));
-    CHECK(obj_parse(SQUARE "f 1 2 3 4\n", sizeof SQUARE + 9, "room.obj", 1, &mesh, NULL, &err) == STATUS_LIMIT);
+    CHECK(obj_parse(SQUARE "f 1 2 3 4\n", sizeof SQUARE + 9, "room.obj", NULL, 1, &mesh, NULL, &err) == STATUS_LIMIT);
     CHECK(obj_read("/nowhere/room.obj", "room.obj", 9, &mesh, NULL, &err) == STATUS_NOT_FOUND);
     CHECK(obj_read("/dev/null", "room.obj", 9, &mesh, NULL, &err) == STATUS_INPUT);
 }
