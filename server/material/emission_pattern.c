@@ -38,10 +38,11 @@ struct emitter {
 };
 
 struct finder {
-    struct reconstruction *r;
-    const struct views *views;
-    struct texels_by_segment texels; /* owned, as all below */
-    struct emitter *emitter;         /* [emitter_count] */
+    struct emission_pattern_input in;
+    struct materials *materials;       /* borrowed, both */
+    struct emitter_evidence *evidence; /* [segment_count] */
+    struct texels_by_segment texels;   /* owned, as all below */
+    struct emitter *emitter;           /* [emitter_count] */
     size_t emitter_count;
     struct measured *measured; /* [height][width] observed radiance, times the emitter's scale */
     struct color_prior *prior; /* [chart_count] where has_emitter */
@@ -55,7 +56,7 @@ struct finder {
  * outweigh dark ones, whose relative noise is larger, wherever neighbours are averaged. */
 static float weight_of(const struct emitter *e, const struct view *view, float mixing) {
     const struct finder *f = e->finder;
-    return view->weight * noise_weight(&f->r->noise, f->views, view, f->r->evidence[e->segment].observed, mixing);
+    return view->weight * noise_weight(f->in.noise, f->in.views, view, f->evidence[e->segment].observed, mixing);
 }
 
 static struct robust_sample observation_of(const struct emitter *e, const struct view *view, float mixing, rgb observed,
@@ -63,7 +64,7 @@ static struct robust_sample observation_of(const struct emitter *e, const struct
     const struct finder *f = e->finder;
     rgb value = rgb_scale(observed, e->scale);
     float times_typical = rgb_mean(value);
-    rgb noise = rgb_scale(noise_deviation(&f->r->noise, f->views, view, fused), e->scale);
+    rgb noise = rgb_scale(noise_deviation(f->in.noise, f->in.views, view, fused), e->scale);
     return (struct robust_sample){.value = value,
                                   .gray = logf(fmaxf(rgb_mean(value), 0.0f) + LOG_FLOOR),
                                   .deviation = rgb_mean(noise) / (e->scale * rgb_mean(fused) + LOG_FLOOR),
@@ -78,29 +79,29 @@ static struct robust_sample observation_of(const struct emitter *e, const struct
  * is used where there is no other observation, and only if it exceeds the segment's radiance; else the texel may be as
  * bright as the rest of the segment. */
 static void observe_all(const struct emitter *e, uint32_t texel, struct measured_observations *observations) {
-    const struct reconstruction *r = e->finder->r;
-    const struct views *views = e->finder->views;
-    rgb fused = fused_radiance(&r->fused, texel);
+    const struct surface *s = &e->finder->in.surface;
+    const struct views *views = e->finder->in.views;
+    rgb fused = fused_radiance(e->finder->in.fused, texel);
     struct robust_sample bound = {.weight = 0.0f};
     struct surface_point at;
     struct best best;
     struct best_item item[MEASURED_OBSERVATIONS];
     observations->count = 0;
-    if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at))
+    if (!surface_at_texel(s->mesh, s->atlas, s->inverse, texel, &at))
         return;
     best_init(&best, item, MEASURED_OBSERVATIONS);
     for (uint32_t t = 0; t < views->train_count; t++) {
-        const struct photograph *photo = &r->scene->photograph[views->train[t]];
+        const struct photograph *photo = &views->scene->photograph[views->train[t]];
         struct view view;
-        struct photograph_sample s;
+        struct photograph_sample sample;
         if (!views_faces(views, t, at.position, at.normal, &view) || !best_takes(&best, weight_of(e, &view, 0.0f), t) ||
             views_edge(views, &view, at.triangle) >= VIEWS_EDGE - 1 ||
-            !views_unoccluded(views, t, at.position, at.normal) || !photograph_sample(photo, view.x, view.y, &s))
+            !views_unoccluded(views, t, at.position, at.normal) || !photograph_sample(photo, view.x, view.y, &sample))
             continue;
-        float mixing = views_mixing(views, &view, at.triangle, s.radiance);
-        bool saturated = photograph_sample_saturates(&s);
-        bool sharp = !saturated && photograph_sample_cubic(photo, view.x, view.y, &s.radiance);
-        struct robust_sample observation = observation_of(e, &view, mixing, s.radiance, sharp, fused);
+        float mixing = views_mixing(views, &view, at.triangle, sample.radiance);
+        bool saturated = photograph_sample_saturates(&sample);
+        bool sharp = !saturated && photograph_sample_cubic(photo, view.x, view.y, &sample.radiance);
+        struct robust_sample observation = observation_of(e, &view, mixing, sample.radiance, sharp, fused);
         size_t slot = saturated ? BEST_NONE : best_put(&best, observation.weight, t);
         if (slot != BEST_NONE)
             observations->observation[slot] = observation;
@@ -116,7 +117,7 @@ static void measure_texel(const struct emitter *e, uint32_t texel) {
     struct measured_observations observations;
     observe_all(e, texel, &observations);
     /* Of a screen whose picture changed, keep the majority: the rest is another picture, not noise. */
-    if (observations.count > 0 && e->finder->r->evidence[e->segment].changing_share > 0.0f)
+    if (observations.count > 0 && e->finder->evidence[e->segment].changing_share > 0.0f)
         observations.count = robust_keep(observations.observation, observations.count, MAX_SCREEN_DEVIATION);
     if (observations.count > 0)
         e->finder->measured[texel] = measured_mean(&observations, OUTLIER_SCALE, rgb_gray(0.0f));
@@ -180,7 +181,7 @@ static void mark_charts(struct emitter *e) {
     e->is_measured = known.weight >= MIN_MEASURED * (double)e->count;
     struct color_prior prior = {moments_mean(&known), (float)moments_variance(&known)};
     for (size_t i = 0; i < e->count && e->is_measured; i++) {
-        uint32_t chart = f->r->atlas.chart_of_triangle[f->r->inverse.triangle[e->texel[i]]];
+        uint32_t chart = surface_chart(&f->in.surface, e->texel[i]);
         f->has_emitter[chart] = true;
         f->prior[chart] = prior;
     }
@@ -189,12 +190,12 @@ static void mark_charts(struct emitter *e) {
 /* --- patterns -------------------------------------------------------------------------------------- */
 
 /* Surface area under a texel, m^2. */
-static double texel_area(const struct reconstruction *r, uint32_t texel) {
-    uint32_t triangle = r->inverse.triangle[texel];
-    const vec2 *c = r->atlas.corner[triangle];
+static double texel_area(const struct surface *s, uint32_t texel) {
+    uint32_t triangle = s->inverse->triangle[texel];
+    const vec2 *c = s->atlas->corner[triangle];
     double charted = fabs((double)(c[1].x - c[0].x) * (double)(c[2].y - c[0].y) -
                           (double)(c[1].y - c[0].y) * (double)(c[2].x - c[0].x));
-    return charted > 0.0 ? (double)vec3_length(mesh_cross(&r->scene->mesh, triangle)) / charted : 0.0;
+    return charted > 0.0 ? (double)vec3_length(mesh_cross(s->mesh, triangle)) / charted : 0.0;
 }
 
 static rgb denoised_at(const struct finder *f, uint32_t texel) {
@@ -205,10 +206,10 @@ static rgb denoised_at(const struct finder *f, uint32_t texel) {
 /* Sets an emitter's pattern, if its contrast is high enough. */
 static void set_pattern(const struct emitter *e) {
     const struct finder *f = e->finder;
-    struct materials *m = &f->r->materials;
+    struct materials *m = f->materials;
     struct moments moments = {.weight = 0.0};
     for (size_t i = 0; i < e->count; i++)
-        moments_add(&moments, texel_area(f->r, e->texel[i]), denoised_at(f, e->texel[i]));
+        moments_add(&moments, texel_area(&f->in.surface, e->texel[i]), denoised_at(f, e->texel[i]));
     rgb mean = moments_mean(&moments);
     if (!(sqrt(moments_variance(&moments)) > MIN_CONTRAST * sqrt((double)rgb_dot(mean, mean))))
         return;
@@ -216,21 +217,23 @@ static void set_pattern(const struct emitter *e) {
         materials_start_emission_pattern(m);
     for (size_t i = 0; i < e->count; i++)
         materials_set_emission_pattern(m, e->texel[i], denoised_at(f, e->texel[i]), mean);
-    evidence_set_radiance(&f->r->evidence[e->segment], rgb_scale(mean, 1.0f / e->scale));
+    evidence_set_radiance(&f->evidence[e->segment], rgb_scale(mean, 1.0f / e->scale));
 }
 
 /* --- the whole ------------------------------------------------------------------------------------- */
 
 /* Lists the emitters that may have a pattern. */
-static void finder_init(struct finder *f, struct reconstruction *r, const struct views *views) {
-    size_t texels = (size_t)r->atlas.width * r->atlas.height;
-    *f = (struct finder){.r = r, .views = views};
-    by_segment_sort(&f->texels, &r->segments, &r->inverse);
-    f->emitter = mem_array(r->segments.count, sizeof *f->emitter);
-    for (size_t s = 0; s < r->segments.count; s++) {
-        const struct emitter_evidence *e = &r->evidence[s];
+static void finder_init(struct finder *f, const struct emission_pattern_input *in, struct materials *materials,
+                        struct emitter_evidence *evidence) {
+    const struct atlas *atlas = in->surface.atlas;
+    size_t texels = (size_t)atlas->width * atlas->height, segments = in->surface.segments->count;
+    *f = (struct finder){.in = *in, .materials = materials, .evidence = evidence};
+    by_segment_sort(&f->texels, in->surface.segments, in->surface.inverse);
+    f->emitter = mem_array(segments, sizeof *f->emitter);
+    for (size_t s = 0; s < segments; s++) {
+        const struct emitter_evidence *e = &evidence[s];
         size_t first = f->texels.first[s], count = f->texels.first[s + 1] - first;
-        if (r->is_emitter[s] && !e->is_hidden && !e->is_unbounded && count >= MIN_TEXELS &&
+        if (in->is_emitter[s] && !e->is_hidden && !e->is_unbounded && count >= MIN_TEXELS &&
             rgb_mean(e->observed) > 0.0f)
             f->emitter[f->emitter_count++] = (struct emitter){.finder = f,
                                                               .segment = s,
@@ -240,9 +243,9 @@ static void finder_init(struct finder *f, struct reconstruction *r, const struct
     }
     /* Only few charts are written; untouched pages take no memory. */
     f->measured = mem_calloc(texels, sizeof *f->measured);
-    f->denoised = (struct texture){r->atlas.width, r->atlas.height, mem_calloc(texels, sizeof *f->denoised.texel)};
-    f->prior = mem_calloc(r->atlas.chart_count, sizeof *f->prior);
-    f->has_emitter = mem_calloc(r->atlas.chart_count, sizeof *f->has_emitter);
+    f->denoised = (struct texture){atlas->width, atlas->height, mem_calloc(texels, sizeof *f->denoised.texel)};
+    f->prior = mem_calloc(atlas->chart_count, sizeof *f->prior);
+    f->has_emitter = mem_calloc(atlas->chart_count, sizeof *f->has_emitter);
 }
 
 static void finder_release(struct finder *f) {
@@ -254,18 +257,20 @@ static void finder_release(struct finder *f) {
     by_segment_release(&f->texels);
 }
 
-void emission_pattern_find(struct reconstruction *r, const struct views *views) {
+void emission_pattern_find(const struct emission_pattern_input *in, struct materials *materials,
+                           struct emitter_evidence *evidence) {
+    const struct surface *surface = &in->surface;
     struct finder f;
-    materials_drop_emission_pattern(&r->materials);
-    finder_init(&f, r, views);
+    materials_drop_emission_pattern(materials);
+    finder_init(&f, in, materials, evidence);
     for (size_t i = 0; i < f.emitter_count; i++) {
         struct emitter *e = &f.emitter[i];
-        parallel_for(r->pool, (e->count + CHUNK - 1) / CHUNK, measure_chunk, e);
+        parallel_for(in->pool, (e->count + CHUNK - 1) / CHUNK, measure_chunk, e);
         fit_range(e);
         mark_charts(e);
     }
-    denoise(&r->atlas, &r->inverse, r->scene->mesh.triangle_count, f.measured, f.prior, f.has_emitter, &f.denoised,
-            r->pool);
+    denoise(surface->atlas, surface->inverse, surface->mesh->triangle_count, f.measured, f.prior, f.has_emitter,
+            &f.denoised, in->pool);
     for (size_t i = 0; i < f.emitter_count; i++) {
         if (f.emitter[i].is_measured)
             set_pattern(&f.emitter[i]);
@@ -305,30 +310,31 @@ static void subtract_reflected(struct materials *m, uint32_t texel, rgb observed
     materials_set_emission_pattern(m, texel, rgb_sub(all, rgb_sub(observed, own)), own);
 }
 
-void emission_pattern_separate(struct reconstruction *r, struct emitter_fit *own) {
-    struct materials *m = &r->materials;
+void emission_pattern_separate(const struct emission_pattern_input *in, struct materials *materials,
+                               const struct emitter_evidence *evidence, struct emitter_fit *own) {
     struct texels_by_segment texels;
-    by_segment_sort(&texels, &r->segments, &r->inverse);
-    for (size_t s = 0; s < r->segments.count; s++) {
-        const struct emitter_evidence *e = &r->evidence[s];
+    by_segment_sort(&texels, in->surface.segments, in->surface.inverse);
+    for (size_t s = 0; s < in->surface.segments->count; s++) {
+        const struct emitter_evidence *e = &evidence[s];
         const uint32_t *texel = texels.texel + texels.first[s];
         size_t count = texels.first[s + 1] - texels.first[s];
         own[s] = (struct emitter_fit){{0.0f, 0.0f, 0.0f}, NEUTRAL_BASE_COLOR};
-        if (!r->is_emitter[s])
+        if (!in->is_emitter[s])
             continue;
-        float darkest = max_segment_base_color(m, e, texel, count);
+        float darkest = max_segment_base_color(materials, e, texel, count);
         own[s].base_color = fminf(NEUTRAL_BASE_COLOR, darkest);
         rgb observed = rgb_mad(e->radiance, e->is_hidden ? 0.0f : -own[s].base_color, e->lambert);
         own[s].radiance = rgb_make(fmaxf(observed.r, 0.0f), fmaxf(observed.g, 0.0f), fmaxf(observed.b, 0.0f));
         for (size_t i = 0; i < count && darkest < INFINITY; i++)
-            subtract_reflected(m, texel[i], e->radiance, own[s].radiance);
+            subtract_reflected(materials, texel[i], e->radiance, own[s].radiance);
     }
     by_segment_release(&texels);
 }
 
-void emission_pattern_restore(struct reconstruction *r, const struct views *views) {
-    struct emitter_fit *own = mem_array(r->segments.count, sizeof *own);
-    emission_pattern_find(r, views);
-    emission_pattern_separate(r, own);
+void emission_pattern_restore(const struct emission_pattern_input *in, struct materials *materials,
+                              struct emitter_evidence *evidence) {
+    struct emitter_fit *own = mem_array(in->surface.segments->count, sizeof *own);
+    emission_pattern_find(in, materials, evidence);
+    emission_pattern_separate(in, materials, evidence, own);
     mem_free(own);
 }

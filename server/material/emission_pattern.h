@@ -7,13 +7,34 @@
 #ifndef UNBAKE_MATERIAL_EMISSION_PATTERN_H
 #define UNBAKE_MATERIAL_EMISSION_PATTERN_H
 
+#include "common/parallel.h"
+#include "server/capture/fuse.h"
+#include "server/capture/noise.h"
 #include "server/capture/views.h"
-#include "server/state/reconstruction.h"
+#include "server/scene/materials.h"
+#include "server/scene/surface.h"
+#include "server/state/evidence.h"
 
-/* Finds the patterns of all emitters (is_emitter) in their outgoing radiance, emitted and reflected; where there is
- * one, sets evidence.radiance to the mean over the surface. Depends only on photographs, emitters and evidence.observed, not
- * on the number of threads. */
-void emission_pattern_find(struct reconstruction *r, const struct views *views);
+/* What the search reads. Borrowed. */
+struct emission_pattern_input {
+    struct surface surface;
+    const struct views *views;
+    const struct noise *noise; /* of the photographs */
+    const struct fused *fused;
+    const bool *is_emitter; /* [segment_count] */
+    struct parallel *pool;
+};
+static inline struct emission_pattern_input emission_pattern_input(const struct reconstruction *r,
+                                                                   const struct views *views) {
+    return (struct emission_pattern_input){
+        reconstruction_surface(r), views, &r->noise, &r->fused, r->is_emitter, r->pool};
+}
+
+/* Finds the patterns of all emitters in their outgoing radiance, emitted and reflected: writes the emission patterns of
+ * *materials and, where there is one, sets evidence[segment_count].radiance to the mean over the surface. Depends only on
+ * photographs, emitters and evidence.observed, not on the number of threads. */
+void emission_pattern_find(const struct emission_pattern_input *in, struct materials *materials,
+                           struct emitter_evidence *evidence);
 
 /* Emitted radiance, mean over the surface, and base colour (all channels). */
 struct emitter_fit {
@@ -24,9 +45,11 @@ struct emitter_fit {
 /* Subtracts reflected light (base colour times evidence.lambert) from the patterns just found, and fills
  * own[segment_count], {0, NEUTRAL_BASE_COLOR} where nothing emits. Base colour of an emitter is neutral, or less where
  * the darkest part of its pattern shows less; a hidden emitter reflects nothing. */
-void emission_pattern_separate(struct reconstruction *r, struct emitter_fit *own);
+void emission_pattern_separate(const struct emission_pattern_input *in, struct materials *materials,
+                               const struct emitter_evidence *evidence, struct emitter_fit *own);
 
 /* Recomputes the patterns from stored emitters and evidence: checkpoints do not contain them. */
-void emission_pattern_restore(struct reconstruction *r, const struct views *views);
+void emission_pattern_restore(const struct emission_pattern_input *in, struct materials *materials,
+                              struct emitter_evidence *evidence);
 
 #endif

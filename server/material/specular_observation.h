@@ -13,8 +13,9 @@
 #include "server/capture/views.h"
 #include "server/gather/highlight.h"
 #include "server/gather/probes.h"
+#include "server/gather/sun.h"
 #include "server/scene/by_segment.h"
-#include "server/state/reconstruction.h"
+#include "server/scene/surface.h"
 
 #define SPECULAR_VIEWS 10        /* observations of a point, at most; bounds time and memory */
 #define SPECULAR_MAX_POINTS 1024 /* points of a segment, at most; bounds memory: 9 MB a thread */

@@ -346,6 +346,12 @@ static enum status solve(struct stage_run *run, struct error *err) {
 
 static enum status optimise(struct stage_run *run, struct error *err) { return optimiser_run(run->optimiser, err); }
 
+/* Checkpoints do not contain emission patterns. */
+static void restore_patterns(struct stage_run *run) {
+    const struct emission_pattern_input input = emission_pattern_input(run->r, &run->views);
+    emission_pattern_restore(&input, &run->r->materials, run->r->evidence);
+}
+
 /* The stages that checkpoints cover; those that are done are skipped. */
 static enum status run_resumable(struct stage_run *run, struct error *err) {
     bool found = false, solves = settings_is(run->r->settings, "method", "solve");
@@ -359,7 +365,7 @@ static enum status run_resumable(struct stage_run *run, struct error *err) {
     if (was_solved && rgb_mean(run->r->sky_factor) != 1.0f) /* checkpoints hold this factor instead of the map */
         lamps_brighten_sky(run->r, run->r->sky_factor);
     if (was_solved)
-        emission_pattern_restore(run->r, &run->views);
+        restore_patterns(run);
     if (run->r->sun.is_there) {
         sun_report(run->r);
         sun_draw(&run->r->sun, &run->r->environment);

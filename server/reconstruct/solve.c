@@ -190,7 +190,8 @@ static void find_patterns(struct solve *s) {
     if (memcmp(s->pattern_emitters, r->is_emitter, r->segments.count * sizeof *s->pattern_emitters) == 0)
         return;
     memcpy(s->pattern_emitters, r->is_emitter, r->segments.count * sizeof *s->pattern_emitters);
-    emission_pattern_find(r, s->views);
+    const struct emission_pattern_input input = emission_pattern_input(r, s->views);
+    emission_pattern_find(&input, &r->materials, r->evidence);
 }
 
 /* Makes lights of the emitters by their outgoing radiance, emitted and reflected. */
@@ -277,7 +278,8 @@ static void set_emission(struct solve *s) {
     struct reconstruction *r = s->r;
     struct emitter_fit *emitter = mem_array(r->segments.count, sizeof *emitter);
     find_patterns(s);
-    emission_pattern_separate(r, emitter);
+    const struct emission_pattern_input input = emission_pattern_input(r, s->views);
+    emission_pattern_separate(&input, &r->materials, r->evidence, emitter);
     for (size_t i = 0; i < r->segments.count; i++)
         r->materials.emission[i] = emitter[i].radiance;
     for (size_t i = 0; i < r->inverse.valid_count; i++) {

@@ -14,28 +14,28 @@
 #define DECISION_ITERATION UINT64_C(0x7fff0000)
 
 struct decision_job {
-    struct reconstruction *r;
-    struct texels_by_segment texels;
-    struct observation_batch *batch; /* [threads] */
+    const struct emitter_decision_input *in;
+    const struct materials *materials;
     struct emitter_evidence *evidence;
+    struct texels_by_segment texels;
 };
 
 /* Sums reflected radiance and base colour over observations of a segment: their ratio is the radiance that a surface of
  * base colour 1 would reflect. */
 static void gather_light(void *user, size_t segment, int thread) {
     struct decision_job *job = user;
-    struct reconstruction *r = job->r;
-    struct observation_batch *b = &job->batch[thread];
+    const struct materials *m = job->materials;
+    struct observation_batch *b = &job->in->batch[thread];
     size_t count = by_segment_count(&job->texels, segment);
     size_t wanted = count < EMITTER_DECISION_TEXELS ? count : EMITTER_DECISION_TEXELS;
     observation_batch_clear(b);
     for (size_t i = 0; i < wanted; i++)
         observation_add(b, by_segment_spaced(&job->texels, segment, i, wanted), DECISION_ITERATION);
     observation_trace(b);
-    const rgb *own = &r->materials.emission[segment];
+    const rgb *own = &m->emission[segment];
     double reflected[3] = {0}, base[3] = {0};
     for (size_t k = 0; k < b->observation_count; k++) {
-        const float *texel = r->materials.base_color.texel[b->observation[k].texel];
+        const float *texel = m->base_color.texel[b->observation[k].texel];
         if (texel[0] + texel[1] + texel[2] < 3.0f * DARKEST_BASE_COLOR)
             continue;
         for (int s = 0; s < b->samples; s++) {
@@ -55,18 +55,18 @@ static void gather_light(void *user, size_t segment, int thread) {
     evidence_set_lambert(e, lambert);
 }
 
-void emitter_decision_make(struct reconstruction *r, struct observation_batch *batch,
-                           struct emitter_evidence *evidence) {
-    struct decision_job job = {.r = r, .batch = batch, .evidence = evidence};
-    by_segment_sort(&job.texels, &r->segments, &r->inverse);
-    parallel_for(r->pool, r->segments.count, gather_light, &job);
+void emitter_decision_make(const struct emitter_decision_input *in, struct emitter_evidence *evidence, bool *is_emitter,
+                           struct materials *materials) {
+    struct decision_job job = {.in = in, .materials = materials, .evidence = evidence};
+    size_t segments = in->surface.segments->count;
+    by_segment_sort(&job.texels, in->surface.segments, in->surface.inverse);
+    parallel_for(in->pool, segments, gather_light, &job);
     by_segment_release(&job.texels);
-    for (size_t s = 0; s < r->segments.count; s++) {
+    for (size_t s = 0; s < segments; s++) {
         struct emitter_evidence *e = &evidence[s];
-        r->is_emitter[s] =
-            settings_emitter(r->settings, (uint32_t)s, e->is_hidden || e->emitted_share >= EMITTER_SHARE);
+        is_emitter[s] = settings_emitter(in->settings, (uint32_t)s, e->is_hidden || e->emitted_share >= EMITTER_SHARE);
         rgb own = rgb_sub(e->radiance, rgb_scale(e->lambert, NEUTRAL_BASE_COLOR));
-        r->materials.emission[s] =
-            r->is_emitter[s] ? rgb_make(fmaxf(own.r, 0.0f), fmaxf(own.g, 0.0f), fmaxf(own.b, 0.0f)) : rgb_gray(0.0f);
+        materials->emission[s] =
+            is_emitter[s] ? rgb_make(fmaxf(own.r, 0.0f), fmaxf(own.g, 0.0f), fmaxf(own.b, 0.0f)) : rgb_gray(0.0f);
     }
 }

@@ -49,9 +49,9 @@ static struct params_rates rates_at(const struct listing1 *l, double fraction) {
     };
 }
 
-static void start_base_color(struct reconstruction *r) {
-    for (size_t i = 0; i < r->inverse.valid_count; i++) {
-        float *value = r->materials.base_color.texel[r->inverse.valid[i]];
+static void start_base_color(const struct inverse_uv *inverse, struct texture *base_color) {
+    for (size_t i = 0; i < inverse->valid_count; i++) {
+        float *value = base_color->texel[inverse->valid[i]];
         value[0] = value[1] = value[2] = NEUTRAL_BASE_COLOR;
     }
 }
@@ -62,7 +62,7 @@ static float neutral_share(rgb observed, float median) {
 }
 
 static void start_neutral(struct reconstruction *r, const struct views *views) {
-    start_base_color(r);
+    start_base_color(&r->inverse, &r->materials.base_color);
     emitters_observe(r, views, r->evidence);
     for (size_t s = 0; s < r->segments.count; s++) {
         rgb observed = r->evidence[s].radiance;
@@ -79,10 +79,12 @@ static void fix_emitters(struct listing1 *l) {
 static void decide_emitters(struct listing1 *l) {
     struct reconstruction *r = l->o->r;
     if (!l->any_emits)
-        emitter_decision_make(r, l->o->pass.batch, r->evidence);
+        emitter_decision_make(
+            &(struct emitter_decision_input){reconstruction_surface(r), r->settings, l->o->pass.batch, r->pool},
+            r->evidence, r->is_emitter, &r->materials);
     /* Emission by the segment's median may have exceeded the radiance of its dark parts, which base colour then
      * compensated: start it anew. */
-    start_base_color(r);
+    start_base_color(&r->inverse, &r->materials.base_color);
     params_refine(&l->params, l->progress.level);
     fix_emitters(l);
     for (size_t s = 0; s < r->segments.count; s++)

@@ -177,7 +177,8 @@ static void test_restored(struct reconstruction *r, const struct scene *scene) {
     memcpy(before, r->materials.emission_pattern, bytes);
     r->pool = parallel_new(2);
     views_init(&views, scene, &r->segments, r->world.accel, r->pool);
-    emission_pattern_restore(r, &views);
+    const struct emission_pattern_input input = emission_pattern_input(r, &views);
+    emission_pattern_restore(&input, &r->materials, r->evidence);
     CHECK(r->materials.emission_pattern && memcmp(before, r->materials.emission_pattern, bytes) == 0);
     views_release(&views);
     parallel_free(r->pool);

@@ -109,7 +109,8 @@ static void test_emission_pattern(uint32_t count) {
     rig.r.is_emitter[0] = true;
     rig.r.evidence[0] =
         (struct emitter_evidence){.radiance = {0.5f, 0.5f, 0.5f}, .observed = {0.5f, 0.5f, 0.5f}, .is_seen = true};
-    emission_pattern_find(&rig.r, &rig.views);
+    const struct emission_pattern_input input = emission_pattern_input(&rig.r, &rig.views);
+    emission_pattern_find(&input, &rig.r.materials, rig.r.evidence);
     CHECK(rig.r.materials.emission_pattern != NULL);
     if (rig.r.materials.emission_pattern) {
         float left = image_float_from_half(rig.r.materials.emission_pattern[PLANE_MIDDLE - 2][0]);
