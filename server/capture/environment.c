@@ -15,17 +15,20 @@
 #include "server/scene/latlong.h"
 
 /* A point so far away that every camera of a room sees it in the same direction, in metres. */
-#define FAR_M 1e6f /* metres: distance of a point that every camera of a room sees in the same direction */
+/* Metres: distance of a point that every camera of a room sees in the same direction; +25 %: no change. */
+#define FAR_M 1e6f
 /* Places over a cell, along each side, at most. */
-#define MAX_GRID 4 /* sample points along each side of a pixel of the map, at most; by hand */
+/* Sample points along each side of a pixel of the map, at most; by hand; +25 %: no change. */
+#define MAX_GRID 4
 /* Weight of a look-up within a pixel of the opening's rim, where slightly wrong poses mix light and frame. By hand. */
-#define RIM_WEIGHT 0.1f
-#define DEVIATIONS_PER_MAD 1.4826f /* standard deviations of normal values in their median absolute deviation */
+#define RIM_WEIGHT 0.1f /* +25 %: no change */
+/* Standard deviations of normal values in their median absolute deviation; +25 %: no change. */
+#define DEVIATIONS_PER_MAD 1.4826f
 /* Outliers: standard deviations from the median. By hand. */
-#define OUTLIER_DEVIATIONS 3.0f
+#define OUTLIER_DEVIATIONS 3.0f /* +25 %: no change */
 /* Least standard deviation, as a share of the median: when two photographs agree by chance, a third is no outlier. By
  * hand. */
-#define MIN_DEVIATION 0.05f
+#define MIN_DEVIATION 0.05f /* +25 %: no change */
 
 /* A photograph with open pixels. */
 struct window {

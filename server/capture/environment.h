@@ -20,8 +20,8 @@
 #include "server/capture/views.h"
 
 /* Bounds of the map's width, pixels; by hand. */
-#define ENVIRONMENT_MIN_WIDTH 64
-#define ENVIRONMENT_MAX_WIDTH 2048
+#define ENVIRONMENT_MIN_WIDTH 64   /* +25 %: no change */
+#define ENVIRONMENT_MAX_WIDTH 2048 /* +25 %: no change */
 
 struct environment {
     struct image map;        /* R G B radiance; height = width / 2; no pixels when nothing was seen; owned */

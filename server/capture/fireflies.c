@@ -5,8 +5,9 @@
 
 #include "common/image.h"
 
-#define MIN_RATIO 2.0f        /* to the brightest of the eight neighbours; by hand */
-#define NOISE_DEVIATIONS 4.0f /* standard deviations above that neighbour; by hand */
+/* To the brightest of the eight neighbours; by hand; +25 %: -0.01 dB, roughness +0.88, specular +0.71. */
+#define MIN_RATIO 2.0f
+#define NOISE_DEVIATIONS 4.0f /* standard deviations above that neighbour; by hand; +25 %: 0 dB */
 
 struct fireflies_job {
     const struct noise *noise;

@@ -7,9 +7,9 @@
 
 /* Samples less sharp than this share of the sharpest are left out of the halves, unless nothing else is there: their
  * lost texture would count as noise. By hand. */
-#define SHARPNESS_SHARE 0.3f
+#define SHARPNESS_SHARE 0.3f /* +25 %: -0.05 dB */
 /* Splits are tried until the lighter half has this share of the weight; by hand. */
-#define BALANCED_SHARE 0.25f
+#define BALANCED_SHARE 0.25f /* +25 %: +0.01 dB */
 
 /* A weighted mean and its expected variance. */
 struct half_mean {

@@ -12,7 +12,7 @@
 #include "server/capture/robust.h"
 
 /* Half of a photograph, 0 or 1, in one of HALVES_SPLITS pseudo-random splits. */
-#define HALVES_SPLITS 32
+#define HALVES_SPLITS 32 /* +25 %: +0.01 dB */
 int halves_of(uint32_t source, int split);
 
 /* Draws the error of the weighted mean of the samples. False, with *draw unchanged, where there is only one source or

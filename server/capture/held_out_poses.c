@@ -6,8 +6,10 @@
 #include "common/mem.h"
 #include "common/quantile.h"
 
-#define DEVIATIONS_PER_MAD 1.5 /* standard deviations of normal residuals in their median absolute deviation, about */
-#define OCCLUSION_MARGIN 0.01f /* an occluder is nearer than the point by this share of its distance; by hand */
+/* Standard deviations of normal residuals in their median absolute deviation, about; +25 %: no change. */
+#define DEVIATIONS_PER_MAD 1.5
+/* An occluder is nearer than the point by this share of its distance; by hand; +25 %: no change. */
+#define OCCLUSION_MARGIN 0.01f
 
 /* A held-out photograph. */
 struct held_out_photograph {

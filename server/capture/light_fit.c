@@ -20,18 +20,19 @@
 /* Standard deviations, in logarithms: of an observation of a flat, frontal surface; added at grazing angles (times 1 /
  * cosine - 1); of the priors on unknown exposures, drift of given ones, white balance and vignette coefficients. By
  * hand. */
-#define OBSERVATION_SIGMA 0.02
-#define GRAZING_SIGMA 0.03
-#define UNKNOWN_EXPOSURE_SIGMA 3.0
-#define DRIFT_SIGMA 0.2
-#define COLOR_SIGMA 0.2
-#define VIGNETTE_SIGMA 0.5
+#define OBSERVATION_SIGMA 0.02     /* +25 %: no change */
+#define GRAZING_SIGMA 0.03         /* +25 %: no change */
+#define UNKNOWN_EXPOSURE_SIGMA 3.0 /* +25 %: no change */
+#define DRIFT_SIGMA 0.2            /* +25 %: no change */
+#define COLOR_SIGMA 0.2            /* +25 %: no change */
+#define VIGNETTE_SIGMA 0.5         /* +25 %: no change */
 
-#define ROUNDS 12               /* of reweighting; by hand */
-#define CONVEX_ROUNDS 4         /* the first of them, with convex weights; by hand */
-#define DEVIATIONS_PER_MAD 1.48 /* standard deviations of normal residuals in their median absolute deviation */
-#define CG_STEPS 60             /* of conjugate gradients a round, at most */
-#define CG_TOLERANCE 1e-7       /* of the residual's norm, over that of the right-hand side */
+#define ROUNDS 12       /* of reweighting; by hand; +25 %: no change */
+#define CONVEX_ROUNDS 4 /* the first of them, with convex weights; by hand; +25 %: no change */
+/* Standard deviations of normal residuals in their median absolute deviation; +25 %: no change. */
+#define DEVIATIONS_PER_MAD 1.48
+#define CG_STEPS 60       /* of conjugate gradients a round, at most; +25 %: no change */
+#define CG_TOLERANCE 1e-7 /* of the residual's norm, over that of the right-hand side; +25 %: no change */
 
 void light_fit_init(struct light_fit *f, const struct views *views, const struct overlaps *o) {
     size_t observations = o->start[o->point_count];

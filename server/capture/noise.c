@@ -8,24 +8,27 @@
 #include "common/quantile.h"
 #include "common/rng.h"
 
-#define MIN_EXPONENT (-24)          /* first octave: from 2^-24, the smallest half */
-#define SAMPLES 8192                /* differences kept for each octave; by hand */
-#define MIN_SAMPLES 512             /* an octave with fewer takes the share of the one below; by hand */
-#define QUANTILE 0.25               /* of the differences: below the median, which texture raises; by hand */
-#define QUANTILE_DEVIATIONS 0.3186f /* that quantile of |x| for standard normal x */
+#define MIN_EXPONENT (-24) /* first octave: from 2^-24, the smallest half */
+#define SAMPLES 8192       /* differences kept for each octave; by hand; +25 %: 0 dB */
+/* An octave with fewer takes the share of the one below; by hand; +25 %: no change. */
+#define MIN_SAMPLES 512
+/* Of the differences: below the median, which texture raises; by hand; +25 %: +0.05 dB. */
+#define QUANTILE 0.25
+#define QUANTILE_DEVIATIONS 0.3186f /* that quantile of |x| for standard normal x; +25 %: -0.06 dB */
 /* Var(b - (a + c) / 2) over that of one pixel. */
-#define DIFFERENCE_VARIANCE 1.5f
-#define MAX_SHARE 1.0f /* noise as large as the value: nothing is known */
+#define DIFFERENCE_VARIANCE 1.5f /* +25 %: -0.01 dB */
+#define MAX_SHARE 1.0f           /* noise as large as the value: nothing is known; +25 %: 0 dB */
 /* Above this share of MAX_SHARE, values are lost in noise; by hand. */
-#define LOST_SHARE 0.97f
+#define LOST_SHARE 0.97f /* +25 %: no change */
 /* Normal noise of deviation 1 clipped at 0 has a mean .4 too bright where the true value is 0, and .08 where it is 1.
  * With clipped values read as minus this, the error is .1 at most in both directions. */
-#define BLACK_DEVIATIONS 0.6f
-#define MIN_SHARE 0.01f /* floor of the relative deviation: errors of poses and colours; by hand */
+#define BLACK_DEVIATIONS 0.6f /* +25 %: no change */
+/* Floor of the relative deviation: errors of poses and colours; by hand; +25 %: no change. */
+#define MIN_SHARE 0.01f
 /* Blocks: least number of differences, and bounds of the factor; by hand. */
-#define MIN_DIFFERENCES 64
-#define MEDIAN_DEVIATIONS 0.6745f /* median of |x| for standard normal x */
-#define SCALE_MIN 0.5f
+#define MIN_DIFFERENCES 64        /* +25 %: 0 dB */
+#define MEDIAN_DEVIATIONS 0.6745f /* median of |x| for standard normal x; +25 %: +0.04 dB */
+#define SCALE_MIN 0.5f            /* +25 %: +0.05 dB */
 #define SCALE_MAX 4.0f
 
 /* Differences of one octave: an even sample of those offered (reservoir sampling, Vitter 1985). */

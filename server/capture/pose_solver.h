@@ -22,18 +22,18 @@
 #include "server/capture/tracks.h"
 #include "server/capture/validation.h"
 
-#define POSE_UNKNOWNS 6
+#define POSE_UNKNOWNS 6     /* of a pose: rotation and translation */
 #define POSE_CELL_COLUMNS 8 /* of the grid of offsets; by hand */
-#define POSE_CELL_ROWS 6
+#define POSE_CELL_ROWS 6    /* as coarse as 8 columns in a picture of 4 : 3 */
 #define POSE_CELLS (POSE_CELL_COLUMNS * POSE_CELL_ROWS)
-#define POSE_OBSERVATIONS_MAX (TRACK_OTHERS + 1)
-#define POSE_HELD_OUT_EVERY 3    /* one track in three is held out; by hand */
-#define POSE_MIN_OBSERVATIONS 60 /* finite ones, for a photograph to be moved: ten an unknown */
-#define POSE_ROUNDS 12           /* Gauss-Newton steps at each level; by hand */
-#define POSE_STEP_PX 1.5         /* pixels of a level: largest step; by hand */
-#define POSE_MIN_SHIFT_PX 0.15   /* pixels, rms: smaller corrections are not applied; by hand */
-#define POSE_DAMPING 0.01        /* share of the diagonal that is added to it (Levenberg-Marquardt); by hand */
-#define POSE_MIN_SCALE 0.01      /* of log residuals: bounds weights where photographs agree perfectly; by hand */
+#define POSE_OBSERVATIONS_MAX (TRACK_OTHERS + 1) /* of a track, with its own photograph */
+#define POSE_HELD_OUT_EVERY 3                    /* one track in three is held out; by hand */
+#define POSE_MIN_OBSERVATIONS 60                 /* finite ones, for a photograph to be moved: ten an unknown */
+#define POSE_ROUNDS 12                           /* Gauss-Newton steps at each level; by hand */
+#define POSE_STEP_PX 1.5                         /* pixels of a level: largest step; by hand */
+#define POSE_MIN_SHIFT_PX 0.15                   /* pixels, rms: smaller corrections are not applied; by hand */
+#define POSE_DAMPING 0.01   /* share of the diagonal that is added to it (Levenberg-Marquardt); by hand */
+#define POSE_MIN_SCALE 0.01 /* of log residuals: bounds weights where photographs agree perfectly; by hand */
 
 struct pose { /* camera_from_world */
     double r[3][3], t[3];

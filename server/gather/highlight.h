@@ -10,6 +10,7 @@
 
 #include "server/gather/incident.h"
 
+/* Levels evaluated at once, at most; every highlight costs time and memory for all. By hand. */
 #define HIGHLIGHT_ROUGHNESSES 12
 #define HIGHLIGHT_SPECULARS 5
 

@@ -10,12 +10,14 @@
 #include "common/mem.h"
 #include "server/material/wiener.h"
 
-#define TILE 512 /* texels a side; does not change results */
-#define FINE_LEVELS 5
-#define FINE_WINDOW 80   /* largest radius of the window over which power is averaged, texels */
-#define GRID 8           /* texels between samples of the coarse scales: a quarter of the finest one's step */
-#define COARSE_WINDOW 24 /* the same radius on the coarse scales, samples of the grid */
-#define COARSE_STEP ((1 << FINE_LEVELS) / GRID)
+#define TILE 512      /* texels a side; does not change results */
+#define FINE_LEVELS 5 /* scales of 1 to 16 texels, filtered by tiles; the rest on the grid; to 6: 0 dB */
+/* Largest radius of the window over which power is averaged, texels; +25 %: no change. */
+#define FINE_WINDOW 80
+/* Texels between samples of the coarse scales: a quarter of the finest one's step; +25 %: 0 dB. */
+#define GRID 8
+#define COARSE_WINDOW 24 /* the same radius on the coarse scales, samples of the grid; +25 %: no change */
+#define COARSE_STEP ((1 << FINE_LEVELS) / GRID) /* samples: step of the first coarse level */
 
 struct box {
     long x0, y0, x1, y1; /* [x0, x1) x [y0, y1), texels of the atlas */

@@ -11,20 +11,20 @@
 
 #include "common/parallel.h"
 
-#define PREPARE_SEC 3.0
+#define PREPARE_SEC 3.0          /* of any room */
 #define PREPARE_PIXEL_SEC 4.5e-6 /* a pixel of photographs */
 #define PREPARE_TEXEL_SEC 1.6e-6 /* a texel of the square, mapped or not */
-#define FUSE_SEC 2.0
-#define FUSE_TEXEL_SEC 9.0e-6 /* a mapped texel, as all below */
-#define GATHER_SEC 0.45e-6    /* a direction */
-#define FIT_SPECULAR_SEC 13.0 /* a specular fit */
-#define FIT_TEXEL_SEC 3.5e-6
-#define MEASURE_SEC 16.0e-6
-#define DETAIL_SEC 0.9e-6      /* a step */
-#define REFINE_PATH_SEC 1.7e-6 /* a path of refine; listing1 walks it backwards as well: */
-#define LISTING1_FACTOR 1.5
-#define REPORT_SEC 1.2e-6 /* a path of a held-out re-render */
-#define EXPORT_TEXEL_SEC 3.0e-6
+#define FUSE_SEC 2.0             /* likewise */
+#define FUSE_TEXEL_SEC 9.0e-6    /* a mapped texel, as all below */
+#define GATHER_SEC 0.45e-6       /* a direction */
+#define FIT_SPECULAR_SEC 13.0    /* a specular fit */
+#define FIT_TEXEL_SEC 3.5e-6     /* a texel, for the fits of lamps and emitters */
+#define MEASURE_SEC 16.0e-6      /* a texel measured */
+#define DETAIL_SEC 0.9e-6        /* a step */
+#define REFINE_PATH_SEC 1.7e-6   /* a path of refine */
+#define LISTING1_FACTOR 1.5      /* on that, of listing1, which walks paths backwards as well */
+#define REPORT_SEC 1.2e-6        /* a path of a held-out re-render */
+#define EXPORT_TEXEL_SEC 3.0e-6  /* a texel of the square */
 /* Usual part of the square that charts cover, and probes per block of mapped texels. */
 #define USUAL_COVER 0.75
 #define USUAL_PROBES 1.3
