@@ -137,11 +137,13 @@ static enum status read_table(const struct source_place *place, struct transform
     char *text, *line;
     enum status status = listing_text(place->listing, place->found, MAX_CSV_BYTES, &text, &own);
     const char *at = text ? text : "";
+    bool has_header = false; /* "#cameras N" may come before it */
     for (size_t number = 1; status == STATUS_OK && (line = line_take(&at)) != NULL; number++) {
-        if (number == 1) {
-            bool has_mark = strncmp(line, "\xef\xbb\xbf", 3) == 0;
-            status = read_header(line + (has_mark ? 3 : 0), place->found, &table, &own);
-        } else if (line[strspn(line, " \t,")] != '\0') {
+        char *header = has_header ? NULL : strstr(line, "#name");
+        if (header) {
+            status = read_header(header, place->found, &table, &own);
+            has_header = true;
+        } else if (has_header && line[strspn(line, " \t,")] != '\0') {
             status = read_row(line, number, &table, &list, &own);
         }
         mem_free(line);
