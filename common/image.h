@@ -118,6 +118,9 @@ enum status image_read_memory(const char *name, const void *data, size_t size, s
 enum status image_probe(const char *path, struct image *image, struct image_info *info, struct error *err);
 enum status image_probe_photograph(const char *path, struct image *image, struct image_info *info, struct error *err);
 
+/* Whether cameras give their raw files, many of which are TIFF, such a name. image_read refuses them. */
+bool image_is_raw_name(const char *name);
+
 /* Version of libheif; and which decoder it was installed without, as a sentence, or NULL (its decoders are packages of
  * their own since Debian 13). */
 const char *image_heif_version(void);

@@ -4,6 +4,8 @@
 #include <string.h>
 #include <strings.h>
 
+#include "common/image.h"
+
 static const struct {
     size_t offset;
     const char *magic;

@@ -11,8 +11,6 @@
 /* Sets *err and returns true when the file's first `length` bytes are of such a kind; `name` is for the message. */
 bool image_is_foreign(const char *name, const char *start, size_t length, struct error *err);
 
-/* Whether cameras give their raw files, which have a TIFF's first bytes, such a name. */
-bool image_is_raw_name(const char *name);
 /* STATUS_INPUT: camera raw is to be developed. */
 enum status image_refuse_raw(const char *name, struct error *err);
 

@@ -249,8 +249,8 @@ static void check_folders(void) {
     CHECK(bundle_load(root, &reading, &limits, pool, &scene, NULL, &err) == STATUS_INPUT);
     CHECK_STRING(err.message, "\"./\" is no name of a file");
     put("transforms.json",
-        "{\"fl_x\":3,\"frames\":[{\"file_path\":\"images/0\"," MATRIX ",\"mask_path\":\"room.bin/mask.png\"}]}");
-    check_blamed(TRANSFORMS, "room.bin/mask.png", "the mask is not in the bundle");
+        "{\"fl_x\":3,\"frames\":[{\"file_path\":\"images/0\"," MATRIX ",\"mask_path\":\"room.bin/other.png\"}]}");
+    check_blamed(TRANSFORMS, "room.bin/other.png", "the mask is not in the bundle");
     put("room.gltf", "{\"asset\":{\"version\":\"2.0\"},\"buffers\":[{\"uri\":\"mask.png/room.bin\"}]}");
     check_blamed(TRANSFORMS, "room.gltf", "names the buffer mask.png/room.bin, which is not in the bundle");
 }

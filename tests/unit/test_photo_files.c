@@ -1,5 +1,5 @@
 /* test_photo_files.c -- photographs as people have them: formats, sizes and orientations other than those stated, broken
- * files among good ones. A bundle of three pictures made here, and those of the shared captures. */
+ * files among good ones, names of other machines. Bundles made here; test_captures.c has the shared ones. */
 #include <sys/stat.h>
 
 #include "common/file.h"
@@ -176,45 +176,62 @@ static void data_window(void) {
     CHECK_THAT(strstr(told, "data window"), "%s", told);
 }
 
-/* --- the shared captures ---------------------------------------------------------------------- */
+/* --- names ------------------------------------------------------------------------------------ */
 
-static void captures(void) {
-    static const struct {
-        const char *name;
-        bool is_ready;
-        const char *part; /* of what is told; NULL: nothing is */
-    } cases[] = {
-        {"ph_heic", true, NULL},
-        {"ph_heic_named_jpg", true, NULL},
-        {"ph_jpeg_cmyk", true, "it is CMYK"},
-        {"ph_tiff8", true, NULL},
-        {"ph_tiff16", true, "16 bits without a colour profile"},
-        {"ph_webp", true, NULL},
-        {"ph_dng", false, "16-bit linear"},
-        {"png16_linear_gama", true, NULL},
-        {"exr_blender_multilayer", true, NULL},
-        {"exr_lower", true, NULL},
-        {"icc_p3", true, NULL},
-        {"exif_orient_swapped", true, "EXIF orientation"},
-        {"one_corrupt", true, "was left out"},
-        {"ns_downscaled", true, "multiplied by 0.5"},
-        {"ns_downscaled_nowh", true, "no w and h"},
-        {"cm_downscaled", true, "multiplied by 0.5"},
-        {"ns_swapped_wh", false, "w and h are exchanged"},
-        {"ns_string_wh", true, NULL},
-    };
-    if (access(check_data("captures"), R_OK) != 0) {
-        printf("no captures: %s\n", check_data("captures"));
-        return;
-    }
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        char path[256];
-        snprintf(path, sizeof path, "captures/%s", cases[i].name);
-        bool is_ready = load(check_data(path));
-        bool is_told = cases[i].part ? strstr(told, cases[i].part) != NULL : told[0] == '\0';
-        CHECK_THAT(is_ready == cases[i].is_ready && is_told, "%s: %s: %s", cases[i].name, is_ready ? "ready" : "refused",
-                   told);
-    }
+static void put_frames(const char *one, const char *two, const char *three, const char *mask) {
+    char *text = mem_printf("{\"w\":24,\"h\":16,\"fl_x\":20,\"frames\":[{\"file_path\":\"%s\",%s%s%s" POSE "},"
+                            "{\"file_path\":\"%s\"," POSE "},{\"file_path\":\"%s\"," POSE "}]}",
+                            one, mask ? "\"mask_path\":\"" : "", mask ? mask : "", mask ? "\"," : "", two, three);
+    put("transforms.json", text, strlen(text));
+    mem_free(text);
+}
+
+static void make_folder(const char *name) {
+    char *path = file_join(work, name);
+    CHECK(mkdir(path, 0700) == 0);
+    mem_free(path);
+}
+
+static void check_names(const char *one, const char *two, const char *three) {
+    const char *const wanted[3] = {one, two, three};
+    CHECK_THAT(scene.photograph_count == 3, "%zu: %s", scene.photograph_count, told);
+    for (size_t i = 0; i < 3 && scene.photograph_count == 3; i++)
+        CHECK_THAT(strcmp(scene.photograph[i].name, wanted[i]) == 0, "%s, not %s", scene.photograph[i].name, wanted[i]);
+}
+
+static void names(void) {
+    struct image black;
+    CHECK(file_remove_tree(work, NULL) == STATUS_OK && mkdir(work, 0700) == 0);
+    put("mesh.ply", MESH, strlen(MESH));
+    make_folder("images");
+    make_folder("masks");
+    put_copy("images/a.jpg", PLAIN, SIZE_MAX);
+    put_copy("images/b.JPG", PLAIN, SIZE_MAX);
+    put_copy("images/c.jpeg", PLAIN, SIZE_MAX);
+    put("images/c.dng", "II*", 4); /* beside the picture, as cameras write them */
+    image_init_rgb(&black, 24, 16);
+    char *mask = file_join(work, "masks/a.png");
+    CHECK(image_write_png(mask, &black, 1, NULL) == STATUS_OK);
+    image_release(&black);
+    put_frames("images/A.JPG", "images/b.jpg", "images/c.png", NULL);
+    CHECK_THAT(load(work), "%s", told);
+    check_names("images/a.jpg", "images/b.JPG", "images/c.jpeg");
+    put_frames("C:\\\\scan\\\\images\\\\a.jpg", "C:\\\\scan\\\\images\\\\b.jpg", "C:\\\\scan\\\\images\\\\c.jpg",
+               "C:\\\\scan\\\\masks\\\\A.PNG");
+    CHECK_THAT(load(work), "%s", told);
+    check_names("images/a.jpg", "images/b.JPG", "images/c.jpeg");
+    CHECK(scene.photograph[0].mask && scene.photograph[0].mask[0] == 0 && !scene.photograph[1].mask);
+    put_frames("../in/images/a.jpg", "../in/images/b.jpg", "../in/images/c.jpeg", "masks/a.png");
+    CHECK_THAT(load(work) && scene.photograph[0].mask, "%s", told);
+    /* a mask that is missing is no photograph of its name */
+    CHECK(unlink(mask) == 0);
+    put_frames("images/a.jpg", "images/b.JPG", "images/c.jpeg", "masks/a.jpg");
+    CHECK_THAT(!load(work) && strstr(told, "the mask is not in the bundle"), "%s", told);
+    /* two files that a name may mean */
+    put_copy("images/c.tif", PLAIN, SIZE_MAX);
+    put_frames("images/a.jpg", "images/b.JPG", "images/c.png", NULL);
+    CHECK_THAT(!load(work) && strstr(told, "images/c.jpeg or images/c.tif"), "%s", told);
+    mem_free(mask);
 }
 
 int main(void) {
@@ -228,7 +245,7 @@ int main(void) {
     scaled();
     broken();
     data_window();
-    captures();
+    names();
     scene_release(&scene);
     file_remove_tree(work, NULL);
     parallel_free(pool);

@@ -35,11 +35,6 @@ void transforms_file_rebase(const char *folder, struct transforms *t) {
         *path[i] = old ? mem_printf("%s%s", folder, old) : NULL;
         mem_free(old);
     }
-    for (size_t i = 0; i < t->frame_count; i++) {
-        char *old = t->frame[i].mask;
-        t->frame[i].mask = old ? mem_printf("%s%s", folder, old) : NULL;
-        mem_free(old);
-    }
 }
 
 /* --- one file --------------------------------------------------------------------------------- */
@@ -54,6 +49,7 @@ static enum status read(const struct source_place *place, struct transforms *t, 
     enum status status = transforms_file_read(place, place->found, t, f, err);
     transforms_file_rebase(folder, t);
     photo_folder_settle(place->listing, folder, false, t, f);
+    photo_folder_settle_masks(place->listing, folder, t, f);
     mem_free(folder);
     return status;
 }
@@ -102,6 +98,7 @@ static enum status read_split(const struct source_place *place, struct transform
     enum status status = transforms_file_read(place, place->found, t, f, err);
     transforms_file_rebase(place->base, t);
     photo_folder_settle(place->listing, place->base, false, t, f);
+    photo_folder_settle_masks(place->listing, place->base, t, f);
     for (int i = 0; i < 2 && status == STATUS_OK; i++) {
         struct transforms held_out;
         const struct listed_file *file = listing_find(place->listing, place->base, names[i]);
@@ -109,6 +106,7 @@ static enum status read_split(const struct source_place *place, struct transform
             continue;
         status = transforms_file_read(place, file->path, &held_out, f, err);
         photo_folder_settle(place->listing, place->base, false, &held_out, f);
+        photo_folder_settle_masks(place->listing, place->base, &held_out, f);
         transforms_file_rebase(place->base, &held_out);
         drop_absent(place->listing, file->path, &held_out, f);
         append(t, &held_out);
