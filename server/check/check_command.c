@@ -11,6 +11,7 @@
 #include "common/settings.h"
 #include "server/check/check_pictures.h"
 #include "server/ingest/facts.h"
+#include "server/ingest/pixels.h"
 
 const struct flag check_flags[] = {
     {"--scene-set", "KEY=VALUE",
@@ -92,10 +93,12 @@ static enum status find_facts(const struct arguments *a, const struct scene_chec
 static enum status check(const struct arguments *a, const struct reading *reading, const cJSON *settings,
                          struct parallel *pool, bool *fits, struct error *err) {
     struct bundle_limits limits = bundle_default_limits();
+    struct spill *pixels = pixels_new_temporary(pool);
     struct scene_check room;
     cJSON *problems = cJSON_CreateArray(), *facts = NULL;
     bool as_json = arguments_have(a, "--json");
     (void)settings;
+    pixels_use(pixels, &limits);
     enum status status = scene_check(&room, a->words[0], reading, &limits, pool, problems, err);
     *fits = status == STATUS_OK && room.fit.verdict != FIT_NO;
     if (status == STATUS_OK) {
@@ -113,6 +116,7 @@ static enum status check(const struct arguments *a, const struct reading *readin
     cJSON_Delete(facts);
     cJSON_Delete(problems);
     scene_check_release(&room);
+    pixels_free(pixels, pool);
     return status;
 }
 

@@ -13,6 +13,7 @@
 #include "server/evaluate/recovered.h"
 #include "server/evaluate/seen.h"
 #include "server/ingest/bundle.h"
+#include "server/ingest/pixels.h"
 #include "server/reconstruct/metrics.h"
 #include "server/render/film.h"
 #include "server/scene/scene.h"
@@ -25,6 +26,7 @@ struct evaluator {
     const struct evaluate_settings *settings;
     struct parallel *pool;
     const char *room;
+    struct spill *pixels;
     struct scene scene;
     struct recovered recovered;
     bool *emits; /* [triangle_count] by the truth */
@@ -298,6 +300,7 @@ static enum status score_views(struct evaluator *e, struct evaluation *v, struct
 
 static enum status load_room(struct evaluator *e, struct error *err) {
     struct bundle_limits limits = bundle_default_limits();
+    pixels_use(e->pixels, &limits);
     cJSON *problems = cJSON_CreateArray();
     enum status status = bundle_load(e->room, NULL, &limits, e->pool, &e->scene, problems, err);
     cJSON_Delete(problems);
@@ -313,9 +316,10 @@ enum status evaluate_outputs(const char *room, const char *outputs, const struct
     struct evaluator e = {.settings = settings, .pool = pool, .room = room};
     memset(v, 0, sizeof *v);
     size_t turned;
+    e.pixels = pixels_new_temporary(pool);
     enum status status = load_room(&e, err);
     if (status != STATUS_OK)
-        return status;
+        goto out;
     status = orient_mesh(&e.scene, pool, &turned, err); /* turn the mesh as the outputs are: emitters emit from the
                                                          * front */
     if (status != STATUS_OK)
@@ -335,6 +339,7 @@ enum status evaluate_outputs(const char *room, const char *outputs, const struct
 out:
     mem_free(e.emits);
     scene_release(&e.scene);
+    pixels_free(e.pixels, pool);
     return status;
 }
 

@@ -12,6 +12,7 @@
 #include "server/data/layout.h"
 #include "server/check/check_pictures.h"
 #include "server/ingest/facts.h"
+#include "server/ingest/pixels.h"
 #include "server/worker/pixel_memory.h"
 #include "server/worker/tasks.h"
 
@@ -61,8 +62,7 @@ enum status task_check(const struct order *order, struct progress *progress, str
     char *archive = layout_archive(order->dir), *files = layout_files(order->dir);
     struct parallel *pool = parallel_new(order->thread_count);
     struct spill *spill = pixel_memory_new(order, pool);
-    limits.spill = spill;
-    limits.decode_bytes = spill_memory_bytes(spill) / 2;
+    pixels_use(spill, &limits);
     cJSON *problems = cJSON_CreateArray();
     struct scene_check room;
     struct reading reading;
@@ -83,8 +83,8 @@ enum status task_check(const struct order *order, struct progress *progress, str
     }
     reading_release(&reading);
     cJSON_Delete(problems);
+    pixels_free(spill, pool);
     parallel_free(pool);
-    spill_free(spill);
     mem_free(files);
     mem_free(archive);
     return status;

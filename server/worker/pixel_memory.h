@@ -12,7 +12,7 @@
  * for each time that the job has run out of memory. */
 uint64_t pixel_memory_bytes(const struct order *order);
 
-/* Memory and a file in the order's folder, which the pool keeps within the budget; the caller's (spill_free). */
+/* Memory and a file in the order's folder, which the pool keeps within the budget; the caller's (pixels_free). */
 struct spill *pixel_memory_new(const struct order *order, struct parallel *pool);
 
 #endif

@@ -28,6 +28,7 @@
 #include "server/export/outputs.h"
 #include "server/ingest/bundle.h"
 #include "server/ingest/photo_color.h"
+#include "server/ingest/pixels.h"
 #include "server/ingest/photos.h"
 #include "server/reconstruct/reconstruct.h"
 #include "server/scene/select.h"
@@ -324,8 +325,7 @@ static void tell_pixels(const struct worker_run *run, const struct scene *scene)
 static enum status load_scene(struct worker_run *run, const struct settings *settings, struct parallel *pool,
                               struct scene *scene, struct error *err) {
     struct bundle_limits limits = bundle_default_limits();
-    limits.spill = run->spill;
-    limits.decode_bytes = spill_memory_bytes(run->spill) / 2;
+    pixels_use(run->spill, &limits);
     limits.later_bytes = PHOTOGRAPH_LATER_BYTES;
     struct reading reading;
     const char *transforms = settings_text(settings, "transforms");
@@ -439,8 +439,8 @@ enum status task_reconstruct(const struct order *order, struct progress *progres
         working_time_init(&run.worked, parallel_thread_count(pool));
         status = reconstruct(&run, &settings, pool, err);
     }
+    pixels_free(run.spill, pool);
     parallel_free(pool);
-    spill_free(run.spill);
     checkpoint_close(run.checkpoint);
     settings_release(&settings);
     mem_free(run.out_dir);

@@ -11,8 +11,8 @@
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
-#include "common/spill.h"
 #include "server/ingest/bundle.h"
+#include "server/ingest/pixels.h"
 #include "server/worker/results.h"
 #include "server/worker/working_time.h"
 
@@ -93,14 +93,12 @@ static enum status write_outputs(const char *dir, const struct reconstruction *r
     return status;
 }
 
-static void trim_pixels(void *user) { spill_trim(user); }
-
 /* NULL: all in memory. */
-static struct spill *new_spill(const char *out, struct error *err) {
+static struct spill *new_spill(const char *out, struct parallel *pool, struct error *err) {
     const char *mib = getenv("ROOM_PIXEL_MIB");
     if (!mib || file_make_dirs(out, err) != STATUS_OK)
         return NULL;
-    return spill_new(out, &(struct spill_limits){.memory_bytes = (uint64_t)(atof(mib) * 1048576.0)});
+    return pixels_new(out, &(struct spill_limits){.memory_bytes = (uint64_t)(atof(mib) * 1048576.0)}, pool);
 }
 
 static enum status run(int argc, char **argv, struct error *err) {
@@ -134,10 +132,10 @@ static enum status run(int argc, char **argv, struct error *err) {
     struct scene scene = {0};
     struct reconstruction r = {0};
     struct bundle_limits limits = bundle_default_limits();
-    limits.spill = new_spill(argv[2], err);
-    limits.decode_bytes = limits.spill ? spill_memory_bytes(limits.spill) / 2 : 0;
+    struct spill *spill = new_spill(argv[2], pool, err);
+    if (spill)
+        pixels_use(spill, &limits);
     limits.later_bytes = PHOTOGRAPH_LATER_BYTES;
-    parallel_set_between(pool, trim_pixels, limits.spill);
     struct reading reading = reading_default();
     reading.transforms = mem_strdup(settings_text(&settings, "transforms"));
     if (status == STATUS_OK)
@@ -155,12 +153,12 @@ static enum status run(int argc, char **argv, struct error *err) {
         printf("%s\npeak memory %.0f MiB, total %.1f s\n", text, (double)usage.ru_maxrss / 1024.0, clock_sec() - begin);
         mem_free(text);
     }
-    if (limits.spill)
-        printf("pixels in a file: %.0f MiB\n", (double)spill_file_bytes(limits.spill) / 1048576.0);
+    if (spill)
+        printf("pixels in a file: %.0f MiB\n", (double)spill_file_bytes(spill) / 1048576.0);
     reconstruct_release(&r);
     scene_release(&scene);
+    pixels_free(spill, pool);
     parallel_free(pool);
-    spill_free(limits.spill);
     cJSON_Delete(object);
     settings_release(&settings);
     return status;
