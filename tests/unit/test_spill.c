@@ -7,6 +7,7 @@
 #include <signal.h>
 #include <stdbool.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <time.h>
 
 #include "common/file.h"
@@ -73,12 +74,32 @@ static void test_memory(void) {
     spill_free(NULL);
 }
 
+/* Space of the disk that open files without a name in `dir` have. */
+static uint64_t allocated(void) {
+    uint64_t bytes = 0;
+    DIR *folder = opendir("/proc/self/fd");
+    const struct dirent *entry;
+    while (folder && (entry = readdir(folder)) != NULL) {
+        char link[300], target[512];
+        struct stat info;
+        snprintf(link, sizeof link, "/proc/self/fd/%s", entry->d_name);
+        ssize_t length = readlink(link, target, sizeof target - 1);
+        target[length > 0 ? length : 0] = '\0';
+        if (strncmp(target, dir, strlen(dir)) == 0 && stat(link, &info) == 0)
+            bytes += (uint64_t)info.st_blocks * 512;
+    }
+    closedir(folder);
+    return bytes;
+}
+
 /* What follows later is part of the decision. */
 static void test_later(void) {
     struct spill *s = new_spill(0, 0);
     CHECK(spill_reserve(s, "they", 1, MIB, BUDGET, &err) == STATUS_OK);
     CHECK(spill_file_bytes(s) >= MIB);
+    CHECK_THAT(allocated() >= MIB, "what is reserved is not allocated: a full disk is a signal at a later store");
     spill_free(s);
+    CHECK(allocated() == 0);
 }
 
 static bool holds(const uint32_t *array, uint32_t of) {
