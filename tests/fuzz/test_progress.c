@@ -153,7 +153,8 @@ void fuzz_seeds(struct seeds *s) {
                   "{\"type\":\"metric\",\"series\":\"loss\",\"step\":120,\"value\":0.0123}\n"
                   "{\"type\":\"metric\",\"series\":\"loss\",\"step\":140,\"value\":0.0113}\n"
                   "{\"type\":\"metric\",\"series\":\"rays\",\"step\":120,\"value\":1e9}\n"
-                  "{\"type\":\"checkpoint\",\"iteration\":120,\"bytes\":1e6,\"seconds\":0.5}\n");
+                  "{\"type\":\"checkpoint\",\"iteration\":120,\"bytes\":1e6,\"seconds\":0.5}\n"
+                  "{\"type\":\"space\",\"bytes\":1e9}\n");
     seeds_text(
         s, "3{\"type\":\"output\",\"name\":\"a.exr\",\"bytes\":10,\"sha256\":\"" SCENE "\","
            "\"content_type\":\"image/x-exr\"}\n{\"type\":\"preview\",\"name\":\"../a\",\"bytes\":10,\"sha256\":\"\"}\n"

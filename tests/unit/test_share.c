@@ -1,6 +1,6 @@
 /* test_share.c -- what a user is held to have taken of the disk: folders of scenes and jobs as they are, whatever of them
  * an archive or a list of outputs tells; the limit of it where a scene is checked and a job begins; the figure after the
- * daemon was killed. As worker stands in this program itself: `test_share worker DIR`. */
+ * daemon was killed, and what a job takes beside its folder. As worker stands in this program itself: `test_share worker DIR`. */
 #include "server/job/attempt.h"
 
 #include "server/job/worker_messages.h"
@@ -11,6 +11,7 @@
 #include "tests/unit/fault_rig.h"
 
 #define KIB 1024
+#define NAMELESS (3 * 1024 * KIB) /* bytes that a job takes of the disk in no file of its folder */
 #define SCENE_B "bbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbb"
 #define SCENE_C "cccccccccccccccccccccccccccccccccccccccccccccccccccccccccccccccc"
 #define ALICE 7
@@ -48,6 +49,7 @@ static int worker(const char *folder) {
         write_file(files, "mesh.ply", 256);
         progress_scene(&p, cJSON_CreateObject());
     } else {
+        progress_space(&p, NAMELESS);
         write_file(folder, "checkpoint.db", 128);
         write_file(folder, "out/a.exr", 64);
         progress_file(&p, "output", "a.exr", 64 * KIB, SCENE_A, "image/x-exr");
@@ -223,6 +225,31 @@ static void test_running(void) {
     OK(store_job_delete(store, id, &err));
 }
 
+/* What a job says that it takes beside its folder counts until it ends, and it is told how much that may be. */
+static void test_nameless(void) {
+    int64_t before = kept_by(ALICE), id = job_of(ALICE), most = 0;
+    const struct scheduler_config with = limited((uint64_t)before + 5000 * KIB);
+    struct attempt a = {0};
+    double left = 0.0;
+    char *folder = job_dir(id), *path = file_join(folder, "job.json");
+    cJSON *order = NULL;
+    OK(attempt_start_job(&a, &with, store, &figures, id, 1, &err));
+    OK(json_read(path, 1 << 20, &order, &err));
+    OK(json_number(order, "disk_bytes", "job.json", 0.0, &left, &err));
+    CHECK_NEAR(left, 5000 * KIB, 0.5);
+    for (; a.phase == ATTEMPT_ALIVE; usleep(1000)) {
+        worker_messages_read(&a, store, &figures);
+        most = kept_by(ALICE) > most ? kept_by(ALICE) : most;
+    }
+    CHECK_THAT(most >= before + NAMELESS, "%lld bytes beside", (long long)(most - before));
+    OK(outcome_settle(&a, store, NULL, &figures, &err));
+    CHECK(disk_of(id) == size_of(folder) && disk_of(id) < NAMELESS);
+    OK(store_job_delete(store, id, &err));
+    cJSON_Delete(order);
+    mem_free(path);
+    mem_free(folder);
+}
+
 /* A job of somebody who keeps too much waits for him; one that has begun does not wait for itself. */
 static void test_full(void) {
     struct job job;
@@ -312,6 +339,7 @@ int main(int argc, char **argv) {
     test_large_scene();
     test_job();
     test_running();
+    test_nameless();
     test_full();
     test_killed();
     test_many();
