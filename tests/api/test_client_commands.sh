@@ -238,9 +238,9 @@ bad=$("$build/unbake" scenes -q | head -n 1)
 run 0 scenes show "$bad" --json
 so '.state == "rejected" and (.problems | length) > 0'
 make_room "$work/broken"
-head -c 60 "$work/room/images/1.png" >"$work/broken/images/1.png"
+head -c 200 "$work/room/mesh.ply" >"$work/broken/mesh.ply"
 run 4 submit "$work/broken" --watch
-has "$err" "images/1.png"
+has "$err" "mesh.ply: "
 run 4 submit "$work/broken" --json
 jq -e '.exit_status == 4 and (.problems | length) > 0' <<<"$err" >/dev/null || fail "no problems in JSON: $err"
 mkdir "$work/text"
