@@ -106,6 +106,7 @@ static enum status check(const struct arguments *a, const struct reading *readin
     } else if (as_json) {
         facts = cJSON_CreateObject();
         json_add(facts, "problems", cJSON_Duplicate(problems, true));
+        json_add(facts, "warnings", facts_warnings(&room.scene));
     }
     if (as_json)
         print_json(facts);

@@ -304,8 +304,10 @@ static enum status load_room(struct evaluator *e, struct error *err) {
     cJSON *problems = cJSON_CreateArray();
     enum status status = bundle_load(e->room, NULL, &limits, e->pool, &e->scene, problems, err);
     cJSON_Delete(problems);
-    if (status != STATUS_OK)
+    if (status != STATUS_OK) {
+        scene_release(&e->scene);
         return status;
+    }
     e->emits = mem_calloc(e->scene.mesh.triangle_count, sizeof *e->emits);
     e->median = training_median(&e->scene);
     return STATUS_OK;

@@ -243,11 +243,11 @@ enum status bundle_load(const char *dir, const struct reading *given, const stru
         scene->source = mem_strdup(match.source->name);
         scene->named_count = t.named_count;
         check_frames_meet_mesh(scene, &f);
-        move_warnings(&f, scene);
     }
 out:
     if (status != STATUS_OK)
         scene_release(scene);
+    move_warnings(&f, scene);
     findings_release(&f);
     transforms_release(&t);
     source_match_release(&match);

@@ -37,8 +37,8 @@ enum status bundle_unpack(const char *archive, const char *dir, const struct bun
 
 /* Reads an unpacked bundle: cameras, mesh, photographs. Collects as many problems as possible, each an object
  * {"file", "reason"} with an optional "hint", in the array `problems`; then returns STATUS_INPUT with a summary in
- * *err. Other statuses are failures of the machine. `reading` says how it is to be read (NULL: as the bundle says). On
- * success the scene is the caller's (scene_release); otherwise it is empty. */
+ * *err. Other statuses are failures of the machine. `reading` says how it is to be read (NULL: as the bundle says). The
+ * scene is the caller's in any case (scene_release); unless STATUS_OK it has nothing but warnings. */
 enum status bundle_load(const char *dir, const struct reading *reading, const struct bundle_limits *limits,
                         struct parallel *pool, struct scene *scene, cJSON *problems, struct error *err);
 

@@ -65,8 +65,15 @@ static cJSON *exposure_facts(const struct scene *scene) {
     return facts;
 }
 
+cJSON *facts_warnings(const struct scene *scene) {
+    cJSON *warnings = cJSON_CreateArray();
+    for (size_t i = 0; i < scene->warning_count; i++)
+        cJSON_AddItemToArray(warnings, json_new_string(scene->warning[i]));
+    return warnings;
+}
+
 cJSON *facts_of(const struct scene *scene) {
-    cJSON *facts = cJSON_CreateObject(), *warnings = cJSON_CreateArray();
+    cJSON *facts = cJSON_CreateObject();
     size_t test_count = 0, hdr_count = 0, mask_count = 0;
     uint64_t pixel_count = 0;
     for (size_t i = 0; i < scene->photograph_count; i++) {
@@ -90,8 +97,6 @@ cJSON *facts_of(const struct scene *scene) {
     if (color)
         json_add_string(facts, "photographs", color);
     mem_free(color);
-    for (size_t i = 0; i < scene->warning_count; i++)
-        cJSON_AddItemToArray(warnings, json_new_string(scene->warning[i]));
-    json_add(facts, "warnings", warnings);
+    json_add(facts, "warnings", facts_warnings(scene));
     return facts;
 }

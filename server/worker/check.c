@@ -38,6 +38,13 @@ static void tell_problems(struct progress *progress, const cJSON *problems) {
         progress_problem(progress, text_of(problem, "file"), text_of(problem, "reason"), text_of(problem, "hint"));
 }
 
+/* All that there is to tell of a scene that is rejected, besides its problems. */
+static void tell_warnings(struct progress *progress, const struct scene *scene) {
+    cJSON *facts = cJSON_CreateObject();
+    json_add(facts, "warnings", facts_warnings(scene));
+    progress_scene(progress, facts);
+}
+
 /* The facts, with the pictures that were drawn of them. */
 static enum status tell_facts(struct progress *progress, const struct order *order, const struct scene_check *room,
                               struct parallel *pool, struct error *err) {
@@ -77,6 +84,8 @@ enum status task_check(const struct order *order, struct progress *progress, str
         tell_problems(progress, problems);
         if (status == STATUS_OK)
             status = tell_facts(progress, order, &room, pool, err);
+        else
+            tell_warnings(progress, &room.scene);
         if (status != STATUS_OK)
             file_remove_tree(files, NULL); /* a rejected scene keeps only its archive */
         scene_check_release(&room);

@@ -353,7 +353,7 @@ static enum status load_scene(struct worker_run *run, const struct settings *set
         if (status != STATUS_OK)
             scene_release(scene);
     }
-    for (size_t i = 0; status == STATUS_OK && i < scene->warning_count; i++)
+    for (size_t i = 0; i < scene->warning_count; i++)
         progress_log(run->progress, "warning", scene->warning[i]);
     char *color = status == STATUS_OK ? photo_color_fact(scene) : NULL;
     if (color) {
@@ -379,7 +379,7 @@ static enum status open_checkpoint(struct worker_run *run, struct error *err) {
 
 static enum status reconstruct(struct worker_run *run, const struct settings *settings, struct parallel *pool,
                                struct error *err) {
-    struct scene scene;
+    struct scene scene = {0};
     struct reconstruction r = {0};
     const struct reconstruct_hooks hooks = {
         .user = run,
@@ -397,8 +397,10 @@ static enum status reconstruct(struct worker_run *run, const struct settings *se
         .preview = write_preview,
     };
     enum status status = load_scene(run, settings, pool, &scene, err);
-    if (status != STATUS_OK)
+    if (status != STATUS_OK) {
+        scene_release(&scene);
         return status;
+    }
     tell_pixels(run, &scene);
     double now = clock_sec();
     run->next_checkpoint = now + run->order->checkpoint_interval_sec;

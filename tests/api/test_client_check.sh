@@ -70,6 +70,13 @@ so '.state == "ready" and .reading == {"mesh": "walls.ply"}'
 id=$(jq -r .id <<<"$out")
 run 0 scenes set "${id:0:8}" exposures=ignored scale=0.5 --json
 so '.state == "ready" and .reading == {"exposures": "ignored", "scale": 0.5}'
+# A photograph that was left out is told also where the mesh is the fault.
+make_room "$work/broken"
+head -c 60 "$work/room/images/1.png" >"$work/broken/images/1.png"
+head -c 200 "$work/room/walls.ply" >"$work/broken/mesh.ply"
+run 4 submit "$work/broken" --dry-run
+has "$err" "mesh.ply: "
+has "$err" "warning: images/1.png"
 run 2 scenes set
 run 2 scenes set "$id" scale=big
 run 2 scenes set "$id" --pin

@@ -68,7 +68,10 @@ static enum status load(struct scene *scene, cJSON **problems, struct error *err
     limits.photograph_pixels = 1000000;
     *problems = cJSON_CreateArray();
     *err = (struct error){.message = ""};
-    return bundle_load(work, NULL, &limits, pool, scene, *problems, err);
+    enum status status = bundle_load(work, NULL, &limits, pool, scene, *problems, err);
+    if (status != STATUS_OK)
+        scene_release(scene);
+    return status;
 }
 
 static bool has_warning(const struct scene *scene, const char *part) {
@@ -413,10 +416,12 @@ static void test_single_folder(void) {
     scene_release(&scene);
     limits.photograph_pixels = 40;
     CHECK(bundle_load(outer, NULL, &limits, pool, &scene, problems, &err) == STATUS_INPUT);
+    scene_release(&scene);
     CHECK(strstr(err.message, "48 pixels"));
     struct reading reading = reading_default();
     reading.transforms = "../transforms.json";
     CHECK(bundle_load(outer, &reading, &limits, pool, &scene, problems, &err) == STATUS_INPUT);
+    scene_release(&scene);
     cJSON_Delete(problems);
     file_remove_tree(outer, NULL);
     mem_free(outer);
@@ -524,8 +529,8 @@ static void test_real(const char *root, const char *room, const char *transforms
         cJSON_Delete(facts);
         if (strncmp(room, "rooms/", 6) == 0)
             check_truth(dir, &scene);
-        scene_release(&scene);
     }
+    scene_release(&scene);
     cJSON_Delete(problems);
     mem_free(dir);
 }

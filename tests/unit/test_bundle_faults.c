@@ -247,6 +247,7 @@ static void check_folders(void) {
     struct reading reading = reading_default();
     reading.transforms = "./";
     CHECK(bundle_load(root, &reading, &limits, pool, &scene, NULL, &err) == STATUS_INPUT);
+    scene_release(&scene);
     CHECK_STRING(err.message, "\"./\" is no name of a file");
     put("transforms.json",
         "{\"fl_x\":3,\"frames\":[{\"file_path\":\"images/0\"," MATRIX ",\"mask_path\":\"room.bin/other.png\"}]}");

@@ -43,8 +43,7 @@ static enum status list_bundle(struct error *err) {
     struct parallel *pool = parallel_new(1);
     enum status status = bundle_load(dir, NULL, &limits, pool, &scene, problems, err);
     CHECK_THAT(status == STATUS_INPUT || cJSON_GetArraySize(problems) == 0, "a problem is told");
-    if (status == STATUS_OK)
-        scene_release(&scene);
+    scene_release(&scene);
     parallel_free(pool);
     cJSON_Delete(problems);
     return status;

@@ -16,6 +16,8 @@ static bool load(const char *name, const struct reading *reading, struct scene *
     char *dir = file_join(captures, name);
     bool ok = bundle_load(dir, reading, &limits, pool, scene, problems, &err) == STATUS_OK;
     CHECK_THAT(ok, "%s: %s", name, err.message);
+    if (!ok)
+        scene_release(scene);
     cJSON_Delete(problems);
     mem_free(dir);
     return ok;
