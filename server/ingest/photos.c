@@ -11,11 +11,10 @@
 #include "common/file.h"
 #include "common/image.h"
 #include "common/mem.h"
-#include "server/ingest/path.h"
 #include "server/ingest/photo_color.h"
 #include "server/ingest/photo_fit.h"
+#include "server/ingest/photo_pixels.h"
 
-#define HALF_LARGEST 65504.0f
 /* Memory of a picture that is being decoded, bytes a pixel: 16 of four channels as float, 6 that are kept of it, and the
  * decoder's own coefficients or planes. An estimate; it only bounds how many are decoded at the same time. */
 #define DECODE_PIXEL_BYTES 32
@@ -28,7 +27,7 @@ struct outcome {
     bool is_broken;   /* the picture, or its mask, could not be decoded */
     int orientation;
     enum exposure_source source;
-    size_t not_finite_count, clamped_count; /* pixels */
+    struct photo_counts counts;
 };
 
 /* Memory that decoders use at the same time. */
@@ -47,7 +46,7 @@ struct loading {
     const struct photos_options *options;
     struct gate gate;
     uint64_t pixels;               /* of all pictures together */
-    char **path;                   /* [frame_count] of the picture, below dir; NULL where absent */
+    char **path;                   /* [frame_count] of the picture, below dir; NULL where absent; of the frames */
     struct photograph *photograph; /* [frame_count] */
     struct outcome *outcome;       /* [frame_count] */
     struct photo_color *color;     /* [frame_count] */
@@ -56,23 +55,7 @@ struct loading {
     float clip;
 };
 
-/* --- finding files ----------------------------------------------------------------------- */
-
-/* Path of a frame's picture: as named or, for names without extension (instant-ngp), with one added. NULL when there
- * is none. */
-static char *find_picture(const char *dir, const char *name) {
-    static const char *const extensions[] = {"png", "jpg", "jpeg", "exr", "tif", "tiff", "webp", "heic", "avif",
-                                             "PNG", "JPG", "JPEG", "EXR", "TIF", "TIFF", "WEBP", "HEIC", "AVIF"};
-    if (file_is_in(dir, name))
-        return mem_strdup(name);
-    for (size_t i = 0; i < sizeof extensions / sizeof *extensions; i++) {
-        char *longer = mem_printf("%s.%s", name, extensions[i]);
-        if (file_is_in(dir, longer))
-            return longer;
-        mem_free(longer);
-    }
-    return NULL;
-}
+/* --- names ------------------------------------------------------------------------------- */
 
 struct named {
     const char *file;
@@ -85,14 +68,14 @@ static int by_file(const void *a, const void *b) {
     return order ? order : (x->number > y->number) - (x->number < y->number);
 }
 
-/* Reports pictures with two poses, one of which must be wrong. Compares resolved paths, so "a" and "a.png" are the
- * same. */
+/* Reports pictures with two poses, one of which must be wrong. The readers of sources have found the files, so "a" and
+ * "a.png" are the same. */
 static void find_duplicates(const struct loading *l, const char *name, struct findings *f) {
     size_t count = l->transforms->frame_count;
     struct named *sorted = mem_array(count, sizeof *sorted);
     for (size_t i = 0; i < count; i++) {
         const struct transforms_frame *frame = &l->transforms->frame[i];
-        sorted[i] = (struct named){l->path[i] ? l->path[i] : frame->file, frame->number};
+        sorted[i] = (struct named){frame->file, frame->number};
     }
     if (count > 1)
         qsort(sorted, count, sizeof *sorted, by_file);
@@ -101,100 +84,6 @@ static void find_duplicates(const struct loading *l, const char *name, struct fi
             findings_problem(f, name, "frames[%zu] and frames[%zu] both name %s", sorted[i - 1].number,
                              sorted[i].number, sorted[i].file);
     mem_free(sorted);
-}
-
-/* --- pixels ------------------------------------------------------------------------------ */
-
-static uint16_t *make_srgb_table(void) {
-    uint16_t *table = mem_array(65536, sizeof *table);
-    for (size_t i = 0; i < 65536; i++)
-        table[i] = image_half_from_float(image_srgb_to_linear((float)i / 65535.0f));
-    return table;
-}
-
-static void convert_srgb(const struct loading *l, const struct image *image, struct photograph *photo) {
-    size_t count = (size_t)image->width * image->height, stride = image->channel_count;
-    for (size_t i = 0; i < count; i++)
-        for (size_t c = 0; c < 3; c++) {
-            float code = clampf(image->pixel[i * stride + c], 0.0f, 1.0f);
-            photo->pixel[i][c] = l->half_of_srgb[(size_t)(code * 65535.0f + 0.5f)];
-        }
-}
-
-/* Values above the range of half become lower bounds, as clipped ones; negative ones (from filters or colours outside
- * of Rec. 709) become 0. */
-static void convert_linear(const struct image *image, struct photograph *photo, struct outcome *outcome) {
-    size_t count = (size_t)image->width * image->height, stride = image->channel_count;
-    for (size_t i = 0; i < count; i++) {
-        const float *in = image->pixel + i * stride;
-        bool finite = isfinite(in[0]) && isfinite(in[1]) && isfinite(in[2]);
-        outcome->not_finite_count += !finite;
-        outcome->clamped_count += finite && fmaxf(in[0], fmaxf(in[1], in[2])) > HALF_LARGEST;
-        for (size_t c = 0; c < 3; c++) {
-            float value = finite ? clampf(in[c], 0.0f, HALF_LARGEST) : NAN;
-            photo->pixel[i][c] = image_half_from_float(value);
-        }
-    }
-    if (outcome->clamped_count > 0 && photo->is_hdr)
-        photo->clip = HALF_LARGEST;
-}
-
-/* Transparent pixels of a PNG have no content. An EXR's alpha only marks whether a ray hit surface; the light behind
- * it is real. */
-static void mask_by_alpha(const struct image *image, struct photograph *photo) {
-    size_t count = (size_t)image->width * image->height;
-    int alpha = image_channel(image, "A");
-    if (alpha < 0)
-        return;
-    photo->mask = spill_take(photo->spill, count, sizeof *photo->mask);
-    for (size_t i = 0; i < count; i++)
-        photo->mask[i] = image->pixel[i * image->channel_count + (size_t)alpha] < 0.5f ? 0 : 255;
-}
-
-/* Whether a mask is of the photograph's size, upright or as stored before the photograph was turned. */
-static bool mask_fits(const struct image *mask, const struct camera *camera, int *turn) {
-    bool is_upright = mask->width == camera->width && mask->height == camera->height;
-    if (is_upright && mask->width != mask->height)
-        *turn = 1;
-    return is_upright ||
-           (image_orientation_swaps(*turn) && mask->width == camera->height && mask->height == camera->width);
-}
-
-/* Black mask pixels are excluded (nerfstudio's convention). `turn` is that of the photograph. */
-static enum status load_mask(const struct loading *l, const char *name, int turn, struct photograph *photo,
-                             struct outcome *outcome) {
-    struct image image;
-    struct error *err = &outcome->err;
-    if (!file_is_in(l->dir, name))
-        return error_set(err, STATUS_INPUT, "the mask is not in the bundle");
-    char *path = file_join(l->dir, name);
-    enum status status = image_probe(path, &image, NULL, err);
-    outcome->is_broken = status == STATUS_INPUT;
-    if (status != STATUS_OK)
-        goto out;
-    if (!mask_fits(&image, &photo->camera, &turn))
-        status = error_set(err, STATUS_INPUT, "the mask is %u x %u pixels, its photograph %u x %u", image.width,
-                           image.height, photo->camera.width, photo->camera.height);
-    image_release(&image);
-    if (status == STATUS_OK) {
-        status = image_read_stored(path, &image, err);
-        outcome->is_broken = status == STATUS_INPUT;
-    }
-    if (status != STATUS_OK)
-        goto out;
-    image_orient(&image, turn);
-    size_t count = (size_t)image.width * image.height;
-    if (!photo->mask) {
-        photo->mask = spill_take(photo->spill, count, sizeof *photo->mask);
-        memset(photo->mask, 255, count);
-    }
-    for (size_t i = 0; i < count; i++)
-        if (!(image.pixel[i * image.channel_count] > 0.0f))
-            photo->mask[i] = 0;
-    image_release(&image);
-out:
-    mem_free(path);
-    return status;
 }
 
 /* --- one photograph ---------------------------------------------------------------------- */
@@ -255,11 +144,11 @@ static enum status keep_pixels(const struct loading *l, const struct image *imag
         memcpy(photo->clipped, image->clipped, count);
     }
     if (info->encoding == IMAGE_SRGB)
-        convert_srgb(l, image, photo);
+        photo_pixels_from_srgb(l->half_of_srgb, image, photo);
     else
-        convert_linear(image, photo, outcome);
+        photo_pixels_from_linear(image, photo, &outcome->counts);
     if (!photo->is_hdr)
-        mask_by_alpha(image, photo);
+        photo_pixels_mask_by_alpha(image, photo);
     return STATUS_OK;
 }
 
@@ -291,7 +180,8 @@ static enum status load_photograph(const struct loading *l, size_t index) {
         status = keep_pixels(l, &image, &info, frame->mask, photo, outcome);
     image_release(&image);
     if (status == STATUS_OK && frame->mask) {
-        status = load_mask(l, frame->mask, l->fit[index].turn, photo, outcome);
+        status = photo_pixels_load_mask(l->dir, frame->mask, l->fit[index].turn, photo, &outcome->is_broken,
+                                        &outcome->err);
         outcome->mask_failed = status != STATUS_OK;
     }
     return status;
@@ -368,10 +258,10 @@ static void warn_about_pixels(const struct loading *l, struct findings *f) {
             continue;
         sources[o->source]++;
         rotated += o->orientation > 1;
-        if (o->not_finite_count > 0)
-            findings_warning(f, "%s: %zu pixels are not finite and are not used", name, o->not_finite_count);
-        if (o->clamped_count > 0)
-            findings_warning(f, "%s: %zu pixels are above 65504 and count as clipped there", name, o->clamped_count);
+        if (o->counts.not_finite > 0)
+            findings_warning(f, "%s: %zu pixels are not finite and are not used", name, o->counts.not_finite);
+        if (o->counts.clamped > 0)
+            findings_warning(f, "%s: %zu pixels are above 65504 and count as clipped there", name, o->counts.clamped);
     }
     if (rotated > 0)
         findings_warning(f,
@@ -469,12 +359,12 @@ enum status photos_load(const char *dir, const char *name, const struct transfor
         .path = mem_calloc(t->frame_count, sizeof *l.path),
         .photograph = mem_calloc(t->frame_count, sizeof *l.photograph),
         .outcome = mem_calloc(t->frame_count, sizeof *l.outcome),
-        .half_of_srgb = make_srgb_table(),
+        .half_of_srgb = photo_pixels_table(),
     };
     /* through the table, so that a pixel of this code value is not below it after rounding */
     l.clip = image_float_from_half(l.half_of_srgb[(size_t)(IMAGE_CLIP_SHARE * 65535.0f + 0.5f)]);
     for (size_t i = 0; i < t->frame_count; i++)
-        l.path[i] = find_picture(dir, t->frame[i].file);
+        l.path[i] = file_is_in(dir, t->frame[i].file) ? t->frame[i].file : NULL;
     l.color = mem_calloc(t->frame_count, sizeof *l.color);
     l.fit = mem_calloc(t->frame_count, sizeof *l.fit);
     find_duplicates(&l, name, f);
@@ -490,8 +380,6 @@ enum status photos_load(const char *dir, const char *name, const struct transfor
     photo_color_warn(l.color, t->frame_count, f);
     pthread_cond_destroy(&l.gate.freed);
     pthread_mutex_destroy(&l.gate.mutex);
-    for (size_t i = 0; i < t->frame_count; i++)
-        mem_free(l.path[i]);
     mem_free(l.path);
     mem_free(l.color);
     mem_free(l.fit);

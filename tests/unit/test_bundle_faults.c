@@ -219,7 +219,7 @@ static void check_folders(void) {
         {TRANSFORMS, "room.gltf", "mesh.ply", "no mesh"},
         {TRANSFORMS, "room.bin", "room.gltf", "room.bin is not a buffer: it is no regular file"},
         {TRANSFORMS, "mask.png", "mask.png", "not a regular file"},
-        {TRANSFORMS, "images/1.png", "images/1.png", "not a regular file"},
+        {TRANSFORMS, "images/2.png", "images/2.png", "not a regular file"},
         {COLMAP, "cameras.txt", "0.png", "no cameras"},
         {COLMAP, "images.txt", "0.png", "no cameras"},
         {COLMAP, "room.obj", "mesh.ply", "no mesh"},

@@ -221,6 +221,15 @@ static void names(void) {
     CHECK_THAT(load(work), "%s", told);
     check_names("images/a.jpg", "images/b.JPG", "images/c.jpeg");
     CHECK(scene.photograph[0].mask && scene.photograph[0].mask[0] == 0 && !scene.photograph[1].mask);
+    image_init_rgb(&black, 48, 32); /* of a photograph twice as large; its left half is white */
+    for (size_t i = 0; i < (size_t)48 * 32; i++)
+        black.pixel[3 * i] = black.pixel[3 * i + 1] = black.pixel[3 * i + 2] = i % 48 < 24;
+    CHECK(image_write_png(mask, &black, 1, NULL) == STATUS_OK);
+    image_release(&black);
+    put_frames("images/a.jpg", "images/b.JPG", "images/c.jpeg", "masks/a.png");
+    CHECK_THAT(load(work) && scene.photograph[0].mask, "%s", told);
+    for (size_t i = 0; i < (size_t)24 * 16 && scene.photograph[0].mask; i++)
+        CHECK(scene.photograph[0].mask[i] == (i % 24 < 12 ? 255 : 0));
     put_frames("../in/images/a.jpg", "../in/images/b.jpg", "../in/images/c.jpeg", "masks/a.png");
     CHECK_THAT(load(work) && scene.photograph[0].mask, "%s", told);
     /* a mask that is missing is no photograph of its name */

@@ -1,0 +1,116 @@
+/* photo_pixels.c -- see photo_pixels.h. */
+#include "server/ingest/photo_pixels.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "common/file.h"
+#include "common/mem.h"
+
+#define HALF_LARGEST 65504.0f
+
+/* --- pixels ------------------------------------------------------------------------------ */
+
+uint16_t *photo_pixels_table(void) {
+    uint16_t *table = mem_array(65536, sizeof *table);
+    for (size_t i = 0; i < 65536; i++)
+        table[i] = image_half_from_float(image_srgb_to_linear((float)i / 65535.0f));
+    return table;
+}
+
+void photo_pixels_from_srgb(const uint16_t *half_of_srgb, const struct image *image, struct photograph *photo) {
+    size_t count = (size_t)image->width * image->height, stride = image->channel_count;
+    for (size_t i = 0; i < count; i++)
+        for (size_t c = 0; c < 3; c++) {
+            float code = clampf(image->pixel[i * stride + c], 0.0f, 1.0f);
+            photo->pixel[i][c] = half_of_srgb[(size_t)(code * 65535.0f + 0.5f)];
+        }
+}
+
+void photo_pixels_from_linear(const struct image *image, struct photograph *photo, struct photo_counts *counts) {
+    size_t count = (size_t)image->width * image->height, stride = image->channel_count;
+    for (size_t i = 0; i < count; i++) {
+        const float *in = image->pixel + i * stride;
+        bool finite = isfinite(in[0]) && isfinite(in[1]) && isfinite(in[2]);
+        counts->not_finite += !finite;
+        counts->clamped += finite && fmaxf(in[0], fmaxf(in[1], in[2])) > HALF_LARGEST;
+        for (size_t c = 0; c < 3; c++) {
+            float value = finite ? clampf(in[c], 0.0f, HALF_LARGEST) : NAN;
+            photo->pixel[i][c] = image_half_from_float(value);
+        }
+    }
+    if (counts->clamped > 0 && photo->is_hdr)
+        photo->clip = HALF_LARGEST;
+}
+
+void photo_pixels_mask_by_alpha(const struct image *image, struct photograph *photo) {
+    size_t count = (size_t)image->width * image->height;
+    int alpha = image_channel(image, "A");
+    if (alpha < 0)
+        return;
+    photo->mask = spill_take(photo->spill, count, sizeof *photo->mask);
+    for (size_t i = 0; i < count; i++)
+        photo->mask[i] = image->pixel[i * image->channel_count + (size_t)alpha] < 0.5f ? 0 : 255;
+}
+
+/* --- masks ------------------------------------------------------------------------------- */
+
+static bool is_of_aspect(uint32_t width, uint32_t height, const struct camera *camera) {
+    uint64_t a = (uint64_t)width * camera->height, b = (uint64_t)height * camera->width;
+    return (a > b ? a - b : b - a) <= (width > height ? width : height); /* a pixel of rounding */
+}
+
+/* Whether a mask is of the photograph's size or a multiple of it, upright or, as stored before the photograph was
+ * turned, to be turned alike: else *turn becomes 1. */
+static bool fits(const struct image *mask, const struct camera *camera, int *turn) {
+    bool is_upright = is_of_aspect(mask->width, mask->height, camera);
+    if (is_upright && mask->width != mask->height)
+        *turn = 1;
+    return is_upright || (image_orientation_swaps(*turn) && is_of_aspect(mask->height, mask->width, camera));
+}
+
+/* Excludes the pixels whose centre lies in a black one of the mask. */
+static void exclude(const struct image *mask, struct photograph *photo) {
+    size_t width = photo->camera.width, height = photo->camera.height;
+    if (!photo->mask) {
+        photo->mask = spill_take(photo->spill, width * height, sizeof *photo->mask);
+        memset(photo->mask, 255, width * height);
+    }
+    for (size_t y = 0; y < height; y++) {
+        size_t row = (2 * y + 1) * mask->height / (2 * height) * mask->width;
+        for (size_t x = 0; x < width; x++) {
+            size_t at = row + (2 * x + 1) * mask->width / (2 * width);
+            if (!(mask->pixel[at * mask->channel_count] > 0.0f))
+                photo->mask[y * width + x] = 0;
+        }
+    }
+}
+
+enum status photo_pixels_load_mask(const char *dir, const char *name, int turn, struct photograph *photo,
+                                   bool *is_broken, struct error *err) {
+    struct image image;
+    if (!file_is_in(dir, name))
+        return error_set(err, STATUS_INPUT, "the mask is not in the bundle");
+    char *path = file_join(dir, name);
+    enum status status = image_probe(path, &image, NULL, err);
+    *is_broken = status == STATUS_INPUT;
+    if (status != STATUS_OK)
+        goto out;
+    if (!fits(&image, &photo->camera, &turn))
+        status = error_set(err, STATUS_INPUT, "the mask is %u x %u pixels, its photograph %u x %u", image.width,
+                           image.height, photo->camera.width, photo->camera.height);
+    image_release(&image);
+    if (status == STATUS_OK) {
+        status = image_read_stored(path, &image, err);
+        *is_broken = status == STATUS_INPUT;
+    }
+    if (status != STATUS_OK)
+        goto out;
+    image_orient(&image, turn);
+    exclude(&image, photo);
+    image_release(&image);
+out:
+    mem_free(path);
+    return status;
+}
