@@ -18,8 +18,8 @@ ALL_CFLAGS = -std=c11 -D_GNU_SOURCE -I. $(WARNINGS) -fno-math-errno -ffp-contrac
              -fstack-protector-strong -pthread $(WERROR) $(SANITIZE) $(EXR_CFLAGS) $(CPPFLAGS) $(CFLAGS)
 ALL_LDFLAGS = -pthread $(SANITIZE) $(LDFLAGS)
 
-# deploy/install-deps.sh puts these in place; the variables are only expanded when a compiler runs.
-EXR_CFLAGS = $(shell pkg-config --cflags OpenEXR)
+# deploy/install-deps.sh puts these in place; pkg-config runs once, when the first compiler does.
+EXR_CFLAGS = $(eval EXR_CFLAGS := $(shell pkg-config --cflags OpenEXR))$(EXR_CFLAGS)
 EXR_LIBS = -lOpenEXRCore
 COMMON_LIBS = -lcjson -lm
 IMAGE_LIBS = $(EXR_LIBS) -lpng -ljpeg -ltiff -lheif -lwebpdemux -lwebp -llcms2 -lz
@@ -39,12 +39,18 @@ TEST_SRC = $(wildcard tests/unit/*.c tests/gradient/*.c tests/render/*.c tests/a
                       tests/soak/*.c)
 BENCH_SRC = $(wildcard tests/bench/*.c)
 FUZZ_SRC = $(wildcard tests/fuzz/test_*.c)
+# Tests that are not built, as names without .c.
+UNBUILT ?=
+built = $(filter-out $(UNBUILT:%=tests/%.c),$(1))
+# Hundreds of tests are linked with nearly all of the engine: gold, where it is, takes a third of ld's time.
+GOLD = $(if $(shell command -v ld.gold),-fuse-ld=gold)
+TEST_LDFLAGS = $(ALL_LDFLAGS) $(GOLD)
 
 obj = $(patsubst %.c,$(B)/obj/%.o,$(1))
-TEST_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(TEST_SRC))
+TEST_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(call built,$(TEST_SRC)))
 PRELOAD = $(patsubst tests/%.c,$(B)/tests/%.so,$(wildcard tests/chaos/preload/*.c))
 BENCH_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(BENCH_SRC))
-FUZZ_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(FUZZ_SRC))
+FUZZ_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(call built,$(FUZZ_SRC)))
 
 # The goals that build first and then run something build on all processors, unless told otherwise.
 BUILD = echo building... && $(MAKE) -s $(if $(filter -j%,$(MAKEFLAGS)),,-j$(shell nproc))
@@ -99,13 +105,13 @@ $(B)/unbake: $(call obj,client/main.c $(CLIENT_LIB_SRC) $(CLIENT_COMMON_SRC))
 
 $(B)/tests/%: $(B)/obj/tests/%.o $(B)/libserver.a $(B)/libclient.a $(B)/libcommon.a
 	@mkdir -p $(@D)
-	$(CC) $(ALL_LDFLAGS) -o $@ $< $(B)/libclient.a $(B)/libserver.a $(B)/libcommon.a $(SERVER_LIBS) -lcurl $(TEST_LIBS)
+	$(CC) $(TEST_LDFLAGS) -o $@ $< $(B)/libclient.a $(B)/libserver.a $(B)/libcommon.a $(SERVER_LIBS) -lcurl $(TEST_LIBS)
 # What runs a fuzz target: driver.c, or libFuzzer where make fuzz says so.
 FUZZ_DRIVER = $(B)/obj/tests/fuzz/driver.o
 $(B)/tests/fuzz/%: $(B)/obj/tests/fuzz/%.o $(B)/obj/tests/fuzz/seeds.o $(FUZZ_DRIVER) \
                    $(B)/libclient.a $(B)/libserver.a $(B)/libcommon.a
 	@mkdir -p $(@D)
-	$(CC) $(ALL_LDFLAGS) -o $@ $^ $(SERVER_LIBS) -lcurl
+	$(CC) $(TEST_LDFLAGS) -o $@ $^ $(SERVER_LIBS) -lcurl
 $(B)/tests/unit/test_image_formats: TEST_LIBS = -lwebpmux
 $(B)/tests/bench/perturb_mesh: TEST_LIBS = $(if $(wildcard /usr/include/meshoptimizer.h),-lmeshoptimizer)
 
@@ -128,7 +134,7 @@ demo: deps ## make a room, reconstruct it, show where the pictures are
 	@tests/demo.sh $(B)
 
 test: deps ## build and run all tests, the quick ones also under the sanitizers; T=name: only those (T=adam)
-	@+$(BUILD) tests $(if $(T),,benches asan-build tsan-build)
+	@+$(BUILD) tests $(if $(T),,benches asan-build tsan-build SANITIZED_TESTS=quick)
 	@tests/run.sh "$(T)" $(B) $(if $(T),,build/asan build/tsan)
 
 CHECK_BIN = $(filter $(B)/tests/unit/% $(B)/tests/gradient/% $(B)/tests/render/test_furnace \
@@ -168,14 +174,15 @@ tsan: deps ## run all tests under the thread sanitizer
 	@+$(BUILD) tsan-build
 	@tests/run.sh "$(T)" build/tsan
 
-# Lines of calls are all that a sanitizer's report wants of -g, which takes a sixth of a build's time; gold,
-# where it is, links in half of ld's.
-SANITIZED = CFLAGS="-O1 -g1" $(if $(shell command -v ld.gold),LDFLAGS="$(LDFLAGS) -fuse-ld=gold")
+# Lines of calls are all that a sanitizer's report wants of -g, which takes a sixth of a build's time.
+# With SANITIZED_TESTS=quick what run.sh does not run under the sanitizer every day is not built either.
+SANITIZED = CFLAGS="-O1 -g1"
+unbuilt = $(if $(SANITIZED_TESTS),UNBUILT="$(shell tests/run.sh --slow $(1))")
 asan-build:
-	@$(MAKE) --no-print-directory B=build/asan $(SANITIZED) \
+	@$(MAKE) --no-print-directory B=build/asan $(SANITIZED) $(call unbuilt,asan) \
 	    SANITIZE="-fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer" tests
 tsan-build:
-	@$(MAKE) --no-print-directory B=build/tsan $(SANITIZED) SANITIZE="-fsanitize=thread" tests
+	@$(MAKE) --no-print-directory B=build/tsan $(SANITIZED) $(call unbuilt,tsan) SANITIZE="-fsanitize=thread" tests
 
 chaos: deps ## kill, cut off and mislead the daemon at length; writes build/chaos.json; T=name runs one
 	@+$(BUILD) tests
@@ -196,7 +203,7 @@ fuzzers: $(FUZZ_BIN)
 # clang has another way to say that a sanitizer is there. The kernels, which parse nothing, are checked, but do
 # not guide the search: that takes half of their time.
 fuzz-build:
-	@$(MAKE) --no-print-directory B=build/fuzz CC=clang CFLAGS="-O1 -g" FUZZ_DRIVER= LDFLAGS=-fsanitize=fuzzer \
+	@$(MAKE) --no-print-directory B=build/fuzz CC=clang CFLAGS="-O1 -g" GOLD= FUZZ_DRIVER= LDFLAGS=-fsanitize=fuzzer \
 	    CPPFLAGS=-D__SANITIZE_ADDRESS__=1 KERNEL_CFLAGS=-fno-sanitize=fuzzer-no-link \
 	    SANITIZE="-fsanitize=fuzzer-no-link,address,undefined,float-cast-overflow -fno-sanitize-recover=all \
 	    -fno-omit-frame-pointer" fuzzers

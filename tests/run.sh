@@ -1,9 +1,11 @@
 #!/bin/bash
 # run.sh NAME BUILD...: runs the tests that were built under each BUILD, all of them or those with
-# NAME in their names, TEST_LANES (2) at a time. One line a test; a failing test's output follows its line.
+# NAME in their names, TEST_LANES (processors + 1) at a time. One line a test; a failing test's output follows its line.
 # Last: "N passed, N failed, N skipped". Tests of build/asan and build/tsan have asan/ or tsan/ before
 # their names; of several builds these run only what is worth its time there. With TEST_SET=check only what a change
 # needs while it is written: unit, gradient and closed forms, and one small job.
+#
+# run.sh --slow asan|tsan: the names of those that do not run under this sanitizer.
 set -u
 only=$1
 shift
@@ -25,6 +27,11 @@ gradient/test_path render/test_calibrate_light render/test_detail unit/test_eval
 api/test_http_durable api/test_http_threads api/test_client_commands chaos/test_power_cut chaos/test_disk_faults
 chaos/test_memory_faults
 $(cd tests && echo fuzz/test_*.c | sed 's/\.c//g')"
+
+if [ "$only" = --slow ]; then
+    case $1 in asan) echo $slow_asan ;; tsan) echo $slow_tsan ;; esac
+    exit
+fi
 
 # What `make check` runs, as patterns of names, and what of it takes longer than the rest together.
 check="unit/* gradient/* render/test_furnace render/test_principled api/test_one_job"
@@ -61,9 +68,10 @@ run_one() {
     echo "${text%% *}" >>"$outcomes"
 }
 
-# Two at a time: many a test waits for a daemon more than it computes.
+# One more at a time than there are processors: many a test waits for a daemon more than it computes.
+lanes=${TEST_LANES:-$(($(nproc) + 1))}
 start_one() {
-    [ "$(jobs -pr | wc -l)" -lt "${TEST_LANES:-2}" ] || wait -n
+    [ "$(jobs -pr | wc -l)" -lt "$lanes" ] || wait -n
     run_one "$@" &
 }
 
