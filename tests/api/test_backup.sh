@@ -10,8 +10,8 @@ refused() { # WANTED-STATUS PART COMMAND...
     equal $? "$wanted" "exit status of $*"
     grep -qF -- "$part" "$work/err" || fail "$*: $(cat "$work/err")"
 }
-quick="--set texture_size=64 --set iterations=3 --set texels_per_iteration=256 --set report_samples=1"
-endless="--set texture_size=64 --set iterations=1000000000 --set texels_per_iteration=64"
+quick=$tiny
+endless="--set texture_size=64 --set texels_per_metre=2 --set iterations=1000000000 --set texels_per_iteration=64"
 
 mkdir -m 750 "$data"
 make_room "$work/room"

@@ -2,8 +2,8 @@
 # The client against the real daemon: submit, watch, show, get with its resumption, what is asked
 # of jobs, exit statuses, --json of every command, mistakes.
 . tests/api/client.sh "$@"
-quick="--set texture_size=64 --set iterations=3 --set texels_per_iteration=256 --set report_samples=1"
-long="--set texture_size=64 --set iterations=1000000000 --set texels_per_iteration=64"
+quick=$tiny
+long="--set texture_size=64 --set texels_per_metre=2 --set iterations=1000000000 --set texels_per_iteration=64"
 
 # so FILTER: $out must be JSON, and FILTER true of it.
 so() {

@@ -5,7 +5,7 @@
 export XDG_CONFIG_HOME=$work/config
 unset UNBAKE_TOKEN UNBAKE_CA
 tokens=$XDG_CONFIG_HOME/unbake/tokens
-quick="--set texture_size=64 --set iterations=1000000000 --set texels_per_iteration=64"
+quick="--set texture_size=64 --set texels_per_metre=2 --set iterations=1000000000 --set texels_per_iteration=64"
 
 daemon_start
 run 4 login <<<"unbake_1_nothing"

@@ -2,7 +2,7 @@
 # `watch` goes on where it was while the daemon is killed and started again, and Ctrl-C leaves the
 # job alone.
 . tests/api/client.sh "$@"
-long="--set texture_size=64 --set iterations=1000000000 --set texels_per_iteration=64"
+long="--set texture_size=64 --set texels_per_metre=2 --set iterations=1000000000 --set texels_per_iteration=64"
 
 running_attempt() { # NUMBER
     "$build/unbake" show 1 --json | jq -e ".state == \"running\" and .attempt >= $1"

@@ -5,8 +5,7 @@ set -u
 . tests/api/client.sh "$@"
 make_room "$work/room"
 daemon_start --set checkpoint_interval_sec=0.1
-run 0 submit "$work/room" --set texture_size=64 --set iterations=300 --set texels_per_iteration=512 \
-    --set report_samples=1 --watch -q
+run 0 submit "$work/room" $tiny --watch -q
 run 1 submit "$work/room" --set segmentation=given --watch -q # it has no object_id: the input is at fault
 call GET /v1/jobs/4242; call POST /nothing -d '{}'; call DELETE /v1/jobs; call GET "/v1/jobs?x=1"
 curl -sN -m 60 "$url/v1/events" >"$work/stream" & background=$!

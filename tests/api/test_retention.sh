@@ -2,8 +2,8 @@
 # What is kept for how long: expiry in every listing, pins, dry runs, the collector; and a disk that
 # is nearly full, or full.
 . tests/api/client.sh "$@"
-long="--set method=listing1 --set texture_size=64 --set iterations=1000000000 --set texels_per_iteration=64"
-quick="--set method=listing1 --set texture_size=64 --set iterations=3 --set texels_per_iteration=256 --set report_samples=1"
+long="--set method=listing1 --set texture_size=64 --set texels_per_metre=2 --set iterations=1000000000 --set texels_per_iteration=64"
+quick=$tiny
 tus='Tus-Resumable: 1.0.0'
 
 so() { jq -e "$1" <<<"$out" >/dev/null 2>&1 || fail "not so: $1: $out"; }

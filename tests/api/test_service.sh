@@ -49,7 +49,7 @@ ln -s "$real/unbake" "$work/bin/unbake"
 build=$work/bin
 [ "$(id -u)" -eq 0 ] || echo "only root can give the daemon the unit's view of files: its system calls alone are tested"
 make_room "$work/room"
-quick="--set texture_size=64 --set iterations=3 --set texels_per_iteration=256 --set report_samples=1"
+quick=$tiny
 "$real/tests/api/hook" a-secret-of-sixteen-bytes >"$work/hook" & background=$!
 wait_for 60 test -s "$work/hook"
 

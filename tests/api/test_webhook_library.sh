@@ -37,7 +37,7 @@ ours='a secret of another form'
 wait_for 60 test -s "$work/hook-port"
 make_room "$work/room"
 daemon_start --set webhook_private=yes
-quick="--set texture_size=64 --set iterations=3 --set texels_per_iteration=256 --set report_samples=1"
+quick=$tiny
 for secret in "$theirs" "$ours"; do
     UNBAKE_WEBHOOK_SECRET=$secret run 0 submit "$work/room" $quick --webhook "http://127.0.0.1:$(cat "$work/hook-port")/" --watch -q
 done

@@ -18,7 +18,7 @@ tells() { wait_for 60 sh -c "[ \$(sed 1d '$work/hook' | jq -c 'select($2)' | wc 
 make_room "$work/room"
 receive 500 302 200
 daemon_start --set webhook_private=yes
-quick="--set texture_size=64 --set iterations=3 --set texels_per_iteration=256 --set report_samples=1"
+quick=$tiny
 UNBAKE_WEBHOOK_SECRET=$secret run 0 submit "$work/room" $quick --name told --label a=b --webhook "$hook/here?x=1" --watch -q
 tells 1 '.body.data.state == "succeeded"'
 tells 2 '.body.data.state == "running"' # refused, and once more
@@ -47,7 +47,7 @@ daemon_end TERM
 receive
 daemon_start
 for host in 127.0.0.1 localhost '[::1]' 0.0.0.0; do
-    UNBAKE_WEBHOOK_SECRET=$secret run 0 submit "$work/room" $quick --set method=listing1 --webhook "http://$host:${hook##*:}/" --watch -q
+    UNBAKE_WEBHOOK_SECRET=$secret run 0 submit "$work/room" $quick --webhook "http://$host:${hook##*:}/" --watch -q
 done
 wait_for 60 sh -c "[ \$(grep -c 'an address of a private network' '$work/log') -ge 4 ]"
 # Another try would end the same: none is made, and the job says so.

@@ -94,7 +94,7 @@ static bool submit(const char *name, int iterations, char path[40]) {
     struct buf body;
     char *json = mem_printf("{\"scene\":\"%s\",\"name\":\"%s\",\"settings\":{\"texture_size\":64,\"iterations\":%d,"
                             "\"texels_per_iteration\":64,\"cameras_per_texel\":1,\"samples_per_camera\":2,"
-                            "\"report_samples\":1}}",
+                            "\"gather_samples\":16,\"gloss_passes\":1,\"texels_per_metre\":2,\"report_samples\":1}}",
                             scene, name, iterations);
     bool made = ask_json(201, "POST", "/v1/jobs", json, &body);
     if (made)

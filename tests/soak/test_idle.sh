@@ -15,7 +15,7 @@ used() { cat "/proc/$daemon_pid/task"/*/schedstat | awk '{ sum += $1 } END { pri
 
 make_room "$work/room"
 daemon_start
-run 0 submit "$work/room" --set texture_size=64 --set iterations=3 --set texels_per_iteration=256 --set report_samples=1 --watch -q
+run 0 submit "$work/room" $tiny --watch -q
 # First what the job has left to do: until a second has brought a millisecond of work at most.
 for _ in $(seq 30); do
     before=$(used)

@@ -16,7 +16,8 @@
 /* Without braces: more may follow. */
 #define TINY_SETTINGS                                                                                                  \
     "\"texture_size\":64,\"iterations\":1,\"texels_per_iteration\":64,"                                                \
-    "\"cameras_per_texel\":1,\"samples_per_camera\":2,\"report_samples\":1,\"preview_interval_sec\":60"
+    "\"cameras_per_texel\":1,\"samples_per_camera\":2,\"report_samples\":1,"                                           \
+    "\"gather_samples\":16,\"gloss_passes\":1,\"preview_interval_sec\":60"
 
 static struct error err;
 static char dir[64]; /* the job's folder; in memory where possible: much is made sure to be on disk */
