@@ -14,15 +14,15 @@ export UNBAKE_SERVER=$url
 at_least() { awk "BEGIN{exit !($2 >= $3)}" || fail "$1 is $2, wanted $3 at least"; }
 at_most() { awk "BEGIN{exit !($2 <= $3)}" || fail "$1 is $2, wanted $3 at most"; }
 
-# try NAME LEAST-PSNR MOST-MSRE DEMO-ROOM-FLAG...
+# try NAME LEAST-PSNR MOST-MSRE GLOSS-PASSES DEMO-ROOM-FLAG...
 try() {
-    local name=$1 psnr=$2 msre=$3
-    shift 3
-    "$build/unbaked" demo-room "$work/$name" --width 96 --height 72 --frames 32 --test-frames 4 \
+    local name=$1 psnr=$2 msre=$3 passes=$4
+    shift 4
+    "$build/unbaked" demo-room "$work/$name" --width 96 --height 72 --frames 24 --test-frames 4 \
         --spp 24 --test-spp 64 --texture-size 512 "$@" >"$work/$name.log" 2>&1 ||
         fail "demo-room: $(tail -n 3 "$work/$name.log")"
     tar -C "$work/$name" --exclude=./truth -cf "$work/$name.tar" .
-    "$build/unbake" submit "$work/$name.tar" --watch --set texture_size=256 --set iterations=160 \
+    "$build/unbake" submit "$work/$name.tar" --watch --set texture_size=256 --set iterations=80 --set gather_samples=64 --set "gloss_passes=$passes" \
         --set texels_per_iteration=1024 --set report_samples=32 >"$work/$name.watch" 2>&1 ||
         fail "the job failed: $(tail -n 3 "$work/$name.watch")"
     "$build/unbake" get last -o "$work/$name.out" >/dev/null 2>&1 || fail "get"
@@ -43,8 +43,8 @@ base_color=.base_color_psnr_db
 msre_of=.msre
 found=.emitters_found
 false_found=.emitters_false
-try hdr 19.5 0.3
-try sdr 19.5 0.3 --sdr
+try hdr 25 0.2 2
+try sdr 25 0.2 1 --sdr
 stop_daemon
 equal "$daemon_status" 0 "the daemon's exit status"
 finish
