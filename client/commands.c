@@ -16,9 +16,9 @@ const struct client_option command_shared_options[] = {
     {"server", 0, OPTION_TEXT, "URL", "where unbaked listens; else $UNBAKE_SERVER, else " PROTOCOL_DEFAULT_SERVER},
     {"ca", 0, OPTION_TEXT, "FILE", "certificates (PEM) to trust for https; else $UNBAKE_CA, else the system's"},
     {"json", 0, OPTION_FLAG, NULL, "print JSON, also for errors (those go to stderr)"},
-    {"quiet", 'q', OPTION_FLAG, NULL, "print only what was asked for: no progress, no remarks"},
+    {"quiet", 'q', OPTION_FLAG, NULL, "print only results: no progress, no remarks"},
     {"retry", 0, OPTION_SECONDS, "SEC",
-     "how long to try while the server is away (3; fetching 60, watching and sending 600)"},
+     "how long to retry an unreachable server (3; fetching 60, watching and sending 600)"},
     {"help", 'h', OPTION_FLAG, NULL, "print this help"},
     {0},
 };
@@ -44,39 +44,39 @@ static const struct command table[] = {
      "  unbake show 17\n  unbake show last --json | jq .settings\n", 1, 1, no_options, show_run},
     {"watch", "JOB", "follow a job until it ends",
      "On a terminal one line shows stage, progress, numbers and time left; on a pipe a line is\n"
-     "printed when something changes, and every 10 s. When the server restarts, watching goes\n"
-     "on where it was. Ends with 0 when the job succeeded and 1 when it failed or was cancelled.\n"
-     "--exec runs a command then; it finds UNBAKE_JOB, UNBAKE_NAME, UNBAKE_STATE and UNBAKE_REASON in\n"
+     "printed when something changes, and every 10 s. When the server restarts, watching\n"
+     "continues. Ends with 0 when the job succeeded and 1 when it failed or was cancelled.\n"
+     "--exec then runs a command with UNBAKE_JOB, UNBAKE_NAME, UNBAKE_STATE and UNBAKE_REASON in\n"
      "its environment.\n",
      "  unbake watch last\n  unbake watch 17 --exec 'notify-send \"$UNBAKE_NAME: $UNBAKE_STATE\"'\n  unbake watch 17 --json --all | jq -c 'select(.event == \"metric\").data'\n",
      1, 1, watch_options, watch_run},
-    {"logs", "JOB", "print what the job's log says so far", "", "  unbake logs 17\n  unbake logs last --follow\n", 1, 1,
-     logs_options, logs_run},
+    {"logs", "JOB", "print the job's log", "", "  unbake logs 17\n  unbake logs last --follow\n", 1, 1, logs_options,
+     logs_run},
     {"get", "JOB [NAME...]", "fetch a job's outputs, also while it runs",
      "Fetches all outputs, or those named; a NAME may be a pattern such as 'preview/*'. Files that\n"
-     "are there already with the right SHA-256 are left alone, and a fetch that was broken off goes\n"
-     "on where it stopped (NAME.part). Each file gets its name only when its SHA-256 is right.\n",
+     "are there already with the right SHA-256 are kept, and an interrupted fetch continues where it\n"
+     "stopped (NAME.part). Each file gets its name only when its SHA-256 is right.\n",
      "  unbake get 17 -o room-textures\n  unbake get last base_color.exr 'preview/*'\n", 1, ANY_NUMBER, get_options,
      get_run},
     {"cancel", "JOB...", "end jobs for good", "", "  unbake cancel 17\n", 1, ANY_NUMBER, no_options, cancel_run},
-    {"pause", "JOB...", "stop jobs after a checkpoint, and let them wait", "", "  unbake pause 17\n", 1, ANY_NUMBER,
-     no_options, pause_run},
-    {"resume", "JOB...", "queue paused jobs again; they go on from their checkpoints", "", "  unbake resume 17\n", 1,
+    {"pause", "JOB...", "stop jobs after a checkpoint", "", "  unbake pause 17\n", 1, ANY_NUMBER, no_options,
+     pause_run},
+    {"resume", "JOB...", "queue paused jobs again; they resume from their checkpoints", "", "  unbake resume 17\n", 1,
      ANY_NUMBER, no_options, resume_run},
-    {"retry", "JOB...", "queue failed or cancelled jobs again, attempts counted anew",
-     "They go on from their checkpoints. With --from, also those that succeeded: that stage and all\n"
-     "after it are done anew. Stages are load, prepare, fuse, solve, refine, report and export.\n",
+    {"retry", "JOB...", "queue failed or cancelled jobs again, with all their attempts",
+     "They resume from their checkpoints. With --from, also jobs that succeeded: that stage and all\n"
+     "after it run again. Stages are load, prepare, fuse, solve, refine, report and export.\n",
      "  unbake retry 17\n  unbake retry 17 --from report\n", 1, ANY_NUMBER, retry_options, retry_run},
     {"redeliver", "JOB...", "send the messages of jobs' webhooks again",
-     "Those that wait are sent now; where none does, one of the present state. `unbake show` tells what became of them.\n",
+     "Queued messages are sent now; if there are none, one about the current state. `unbake show` shows the outcome.\n",
      "  unbake redeliver 17\n", 1, ANY_NUMBER, no_options, redeliver_run},
-    {"extend", "JOB", "let a job that has ended go on for longer",
-     "It goes on from its checkpoint, which the server keeps for a while.\n",
+    {"extend", "JOB", "continue a job that has ended, beyond its limit",
+     "It resumes from its checkpoint, which the server keeps for a while.\n",
      "  unbake extend 17 --looks 1000\n  unbake extend last --time 3600\n", 1, 1, extend_options, extend_run},
     {"edit", "JOB...", "change the name, priority, labels, place in the queue or time of removal", "",
      "  unbake edit 17 --priority 10\n  unbake edit 17 --before 12\n  unbake edit last --name kitchen\n", 1, ANY_NUMBER,
      edit_options, edit_run},
-    {"rm", "JOB...", "remove jobs that do not run, with their outputs", "",
+    {"rm", "JOB...", "remove jobs that are not running, with their outputs", "",
      "  unbake rm 12 13\n  unbake rm 12 --dry-run\n", 1, ANY_NUMBER, rm_options, rm_run},
     {"scenes", "[show|keep|rm SCENE...|set SCENE KEY=VALUE...]", "list uploaded rooms, show, keep or remove them",
      "A SCENE is an id or its beginning, 8 digits or more. What the server removes by itself, and when,\n"
@@ -85,19 +85,19 @@ static const struct command table[] = {
      "  unbake scenes\n  unbake scenes show 3f2a91c0\n  unbake scenes keep 3f2a91c0 --pin\n"
      "  unbake scenes rm 3f2a91c0 --dry-run\n  unbake scenes set 3f2a91c0 axes=opencv scale=0.001\n",
      0, ANY_NUMBER, collection_options, scenes_run},
-    {"uploads", "[show|keep|rm UPLOAD...]", "list uploads, show, keep or give them up",
-     "`unbake submit` of the same room goes on where an upload stopped. One that is whole has become\n"
+    {"uploads", "[show|keep|rm UPLOAD...]", "list uploads, show, keep or remove them",
+     "`unbake submit` of the same room continues where an upload stopped. A complete upload becomes\n"
      "a scene.\n",
      "  unbake uploads\n  unbake uploads keep 5f0c77d2a5e14b0e8f6f0c9f4b6f8d11 --keep-days 7\n", 0, ANY_NUMBER,
      collection_options, uploads_run},
-    {"collect", "", "remove what has expired, now (admins)",
-     "The server does so by itself once a minute or as it is configured.\n", "  unbake collect --dry-run\n", 0, 0,
+    {"collect", "", "remove now what has expired (admins)",
+     "The server does so itself, once a minute or as configured.\n", "  unbake collect --dry-run\n", 0, 0,
      collect_options, collect_run},
-    {"login", "", "keep a server's token for the commands that follow",
-     "Reads the token from stdin, asks the server whose it is, and keeps it in a file that nobody else\n"
-     "can read, ~/.config/unbake/tokens. $UNBAKE_TOKEN goes before it.\n",
+    {"login", "", "store a server's token for later commands",
+     "Reads the token from stdin, asks the server whose it is, and stores it in a file that nobody else\n"
+     "can read, ~/.config/unbake/tokens. $UNBAKE_TOKEN overrides it.\n",
      "  unbake login --server https://lab.example.org\n  unbake login <token.txt\n", 0, 0, no_options, login_run},
-    {"logout", "", "forget it", "", "  unbake logout\n", 0, 0, no_options, logout_run},
+    {"logout", "", "remove the stored token", "", "  unbake logout\n", 0, 0, no_options, logout_run},
     {"settings", "[NAME...]", "list what --set can set, with ranges and defaults", "",
      "  unbake settings\n  unbake settings texture_size\n", 0, ANY_NUMBER, no_options, settings_run},
     {"version", "", "print the versions of the client and of the server", "", "  unbake version --json\n", 0, 0,
@@ -138,7 +138,7 @@ const struct command_exit command_exit_statuses[] = {
     {CLIENT_NOT_FOUND, "no such job, scene or output"},
     {CLIENT_REFUSED, "the server refused, and said why"},
     {CLIENT_UNREACHABLE, "the server cannot be reached"},
-    {CLIENT_CONFLICT, "the present state does not allow it"},
+    {CLIENT_CONFLICT, "the current state does not allow it"},
     {CLIENT_LOCAL, "a file here cannot be read or written"},
     {CLIENT_INTERRUPTED, "interrupted; a submitted job continues"},
     {0, NULL},

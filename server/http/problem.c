@@ -18,7 +18,7 @@ static const struct problem_kind {
     {403, "forbidden", "Not allowed for this caller"},
     {404, "not-found", "Not found"},
     {405, "method-not-allowed", "Method not allowed"},
-    {409, "conflict", "Conflict with the present state"},
+    {409, "conflict", "Conflict with the current state"},
     {412, "stale", "Precondition failed"},
     {413, "too-large", "Body too large"},
     {415, "media-type", "Unsupported media type"},

@@ -46,7 +46,7 @@ static enum status trim_log(const char *path, int fd, struct error *err) {
     ssize_t got = pread(fd, tail, LOG_KEEP, length - LOG_KEEP);
     enum status status = STATUS_OK;
     if (got < 0 || ftruncate(fd, 0) != 0)
-        status = error_set_errno(err, errno, "cannot cut %s", path);
+        status = error_set_errno(err, errno, "cannot truncate %s", path);
     else
         status = file_write_all(fd, tail, (size_t)got, path, err);
     mem_free(tail);

@@ -210,8 +210,8 @@ static enum status place_before(struct store *store, int64_t id, int64_t next, s
                                  " AND owner_id = (SELECT owner_id FROM jobs WHERE id = ?2)",
                                  "iinn", next, id, (int)JOB_QUEUED, (int)JOB_PAUSED);
     if (status == STATUS_OK && turn == INT64_MIN)
-        return error_set(err, STATUS_INPUT, "job %lld is no waiting job of the same owner: nothing goes before it",
-                         (long long)next);
+        return error_set(err, STATUS_INPUT,
+                         "job %lld is not a queued job of the same owner, so no job can go before it", (long long)next);
     if (status == STATUS_OK)
         status = sql_int(&store->sql, 0, &priority, err, "SELECT priority FROM jobs WHERE id = ?", "i", next);
     if (status == STATUS_OK)

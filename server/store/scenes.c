@@ -257,8 +257,8 @@ enum status store_scene_patch(struct store *store, const struct caller *who, con
     if (retention->pin == KEEP_PIN_OFF || retention->sets_expiry)
         status = is_others_too(store, id, sees_all(who) ? NOT_A_USER : who->user_id, &others, err);
     if (others) {
-        error_set(err, STATUS_CONFLICT, "others keep scene %s, too: its end is not one user's to set", id);
-        status = error_hint(err, "It can be pinned; DELETE gives up your share of it alone.");
+        error_set(err, STATUS_CONFLICT, "others own scene %s too, so you cannot set when it is removed", id);
+        status = error_hint(err, "You can pin it; DELETE ends only your ownership.");
     }
     if (status == STATUS_OK)
         status = sql_run(&store->sql, err, "UPDATE scenes SET " RETENTION_SET " WHERE id = ?4", "nnit",

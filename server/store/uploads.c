@@ -90,7 +90,8 @@ enum status store_upload_get(struct store *store, const char *id, struct upload_
         if (hash && (size_t)sqlite3_column_bytes(stmt, 10) == hash_size)
             memcpy(hash, sqlite3_column_blob(stmt, 10), hash_size);
         else if (hash)
-            status = error_set(err, STATUS_CORRUPT, "the hash of upload %s is of another program", id);
+            status =
+                error_set(err, STATUS_CORRUPT, "the hash state of upload %s is of another version of the program", id);
         sqlite3_reset(stmt);
     }
     store_unlock(store);

@@ -59,7 +59,7 @@ static enum status count_tail(struct upload_session *s, struct error *err) {
 /* Truncates to the counted bytes: what follows is undefined after a reboot or a disk error. */
 static enum status cut_tail(struct upload_session *s, struct error *err) {
     if (ftruncate(s->fd, (off_t)s->received) != 0)
-        return error_set_errno(err, errno, "cannot cut upload %s", s->id);
+        return error_set_errno(err, errno, "cannot truncate upload %s", s->id);
     if (fallocate(s->fd, FALLOC_FL_KEEP_SIZE, 0, (off_t)s->length) != 0 && errno != EOPNOTSUPP)
         return error_set_errno(err, errno, "cannot reserve %llu bytes for upload %s", (unsigned long long)s->length,
                                s->id);

@@ -137,7 +137,7 @@ static void check_spoiled(void) {
     spoil(); /* the next part does */
     struct upload_writer *writer;
     system_break(" ftruncate ", EIO);
-    IS(upload_writer_take(rig.api->resumables, id, HALF, false, &writer, &err), STATUS_IO, "cannot cut");
+    IS(upload_writer_take(rig.api->resumables, id, HALF, false, &writer, &err), STATUS_IO, "cannot truncate");
     CHECK(writer == NULL);
     system_break(" fallocate ", ENOSPC);
     IS(upload_writer_take(rig.api->resumables, id, HALF, false, &writer, &err), STATUS_NO_SPACE,
