@@ -4,6 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "common/mem.h"
+
 bool utf8_valid(const char *text, size_t length, size_t *bad) {
     const unsigned char *s = (const unsigned char *)text;
     size_t i = 0;
@@ -90,4 +92,43 @@ size_t utf8_show(const char *text, size_t length, char shown[UTF8_SHOWN_SIZE]) {
         snprintf(shown, UTF8_SHOWN_SIZE, "<U+%04X>", (unsigned)(character & 0x1fffff));
     }
     return size;
+}
+
+/* Appends a character; returns the bytes. */
+static size_t put_character(char *out, uint32_t c) {
+    if (c < 0x80) {
+        out[0] = (char)c;
+        return 1;
+    }
+    size_t length = c < 0x800 ? 2 : c < 0x10000 ? 3 : 4;
+    static const unsigned char mark[5] = {0, 0, 0xc0, 0xe0, 0xf0};
+    for (size_t i = length; i-- > 1; c >>= 6)
+        out[i] = (char)(0x80 | (c & 0x3f));
+    out[0] = (char)(mark[length] | c);
+    return length;
+}
+
+char *utf8_from_utf16(const void *data, size_t size, size_t *out_length) {
+    const unsigned char *s = data;
+    bool big = size >= 2 && s[0] == 0xfe && s[1] == 0xff;
+    *out_length = 0;
+    if (!big && !(size >= 2 && s[0] == 0xff && s[1] == 0xfe))
+        return NULL;
+    size_t units = size / 2;
+    char *out = mem_array(units, 3);
+    for (size_t i = 1; i < units; i++) {
+        uint32_t c = big ? (uint32_t)s[2 * i] << 8 | s[2 * i + 1] : (uint32_t)s[2 * i + 1] << 8 | s[2 * i];
+        if (c >= 0xd800 && c < 0xe000) {
+            const unsigned char *next = s + 2 * i + 2;
+            uint32_t low = i + 1 == units ? 0
+                           : big          ? (uint32_t)next[0] << 8 | next[1]
+                                          : (uint32_t)next[1] << 8 | next[0];
+            bool is_pair = c < 0xdc00 && low >= 0xdc00 && low < 0xe000;
+            c = is_pair ? 0x10000 + ((c & 0x3ff) << 10) + (low & 0x3ff) : 0xfffd;
+            i += is_pair;
+        }
+        *out_length += put_character(out + *out_length, c);
+    }
+    out[*out_length] = '\0';
+    return out;
 }

@@ -14,6 +14,10 @@ bool utf8_valid(const char *text, size_t length, size_t *bad);
  * 0). */
 size_t utf8_next(const char *text, size_t length, uint32_t *character);
 
+/* Text in UTF-16 that begins with a byte order mark, as UTF-8 without it: NUL-terminated, *out_length bytes, the
+ * caller's (mem_free). Lone surrogates become U+FFFD. NULL when data[size] has no such mark. */
+char *utf8_from_utf16(const void *data, size_t size, size_t *out_length);
+
 enum utf8_kind {
     UTF8_VISIBLE,
     /* Invisible, but used in text: soft hyphen, joiners, direction marks, tags. Names may contain them (messengers

@@ -5,19 +5,34 @@
 
 static void add_lens(cJSON *frame, const struct camera *camera) {
     static const char *const radial[6] = {"k1", "k2", "k3", "k4", "k5", "k6"};
-    bool is_fisheye = camera->model == CAMERA_OPENCV_FISHEYE;
-    json_add_string(frame, "camera_model", is_fisheye ? "OPENCV_FISHEYE" : "FULL_OPENCV");
+    static const char *const name[] = {
+        [CAMERA_OPENCV] = "FULL_OPENCV",
+        [CAMERA_OPENCV_FISHEYE] = "OPENCV_FISHEYE",
+        [CAMERA_THIN_PRISM_FISHEYE] = "THIN_PRISM_FISHEYE",
+        [CAMERA_FOV] = "FOV",
+    };
+    bool has_octic = camera->k8 != 0.0f; /* then there is no denominator: k4 is nerfstudio's */
+    json_add_string(frame, "camera_model", has_octic ? "OPENCV" : name[camera->model]);
     json_add_int(frame, "w", camera->width);
     json_add_int(frame, "h", camera->height);
     json_add_number(frame, "fl_x", (double)camera->fx);
     json_add_number(frame, "fl_y", (double)camera->fy);
     json_add_number(frame, "cx", (double)camera->cx);
     json_add_number(frame, "cy", (double)camera->cy);
-    for (int i = 0; i < (is_fisheye ? 4 : 6); i++)
-        json_add_number(frame, radial[i], (double)camera->k[i]);
-    if (!is_fisheye) {
-        json_add_number(frame, "p1", (double)camera->p[0]);
-        json_add_number(frame, "p2", (double)camera->p[1]);
+    if (camera->model == CAMERA_FOV) {
+        json_add_number(frame, "omega", (double)camera->k[0]);
+        return;
+    }
+    int count = camera->model == CAMERA_OPENCV && !has_octic ? 6 : 4;
+    for (int i = 0; i < count; i++)
+        json_add_number(frame, radial[i], (double)(i == 3 && has_octic ? camera->k8 : camera->k[i]));
+    if (camera->model == CAMERA_OPENCV_FISHEYE)
+        return;
+    json_add_number(frame, "p1", (double)camera->p[0]);
+    json_add_number(frame, "p2", (double)camera->p[1]);
+    if (camera->model == CAMERA_THIN_PRISM_FISHEYE) {
+        json_add_number(frame, "sx1", (double)camera->s[0]);
+        json_add_number(frame, "sy1", (double)camera->s[1]);
     }
 }
 

@@ -6,13 +6,11 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 #include "common/image.h"
 #include "common/mem.h"
 #include "server/ingest/path.h"
-
-/* A distortion that is left out may move corners by so much: less than poses are known to. */
-#define OCTIC_MAX_PIXELS 0.25
 
 /* State of reading a file. */
 struct context {
@@ -117,7 +115,35 @@ static char *photograph(struct context *c, const char *key) {
 
 /* --- lens -------------------------------------------------------------------------------- */
 
-static enum camera_model read_model(struct context *c) {
+/* Reports a lens that is not modelled, with what to do. */
+static void unknown_model(struct context *c, const char *name) {
+    static const struct {
+        const char *name, *hint;
+    } others[] = {
+        {"EQUIRECTANGULAR",
+         "cut the panoramas: ns-process-data images --camera-type equirectangular makes perspective views"},
+        {"OMNIDIRECTIONALSTEREO_L", "render perspective views"},
+        {"OMNIDIRECTIONALSTEREO_R", "render perspective views"},
+        {"VR180_L", "render perspective views"},
+        {"VR180_R", "render perspective views"},
+        {"ORTHOPHOTO", "perspective or fisheye photographs are needed"},
+        {"FISHEYE624", "undistort the photographs, or calibrate as OPENCV_FISHEYE or THIN_PRISM_FISHEYE"},
+    };
+    struct error err;
+    error_set(&err, STATUS_INPUT,
+              "%s: unknown camera_model \"%.80s\"; known are PINHOLE, SIMPLE_PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, "
+              "FULL_OPENCV, OPENCV_FISHEYE, SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE, THIN_PRISM_FISHEYE and FOV",
+              c->place, name);
+    error_hint(&err, "colmap image_undistorter makes pinhole photographs of any");
+    for (size_t i = 0; i < sizeof others / sizeof *others; i++)
+        if (strcasecmp(name, others[i].name) == 0)
+            error_hint(&err, "%s", others[i].hint);
+    findings_error(c->findings, c->name, &err);
+    c->ok = false;
+}
+
+/* *is_rational: k4 to k6 are of OpenCV's denominator, as the model's name says. */
+static enum camera_model read_model(struct context *c, bool *is_rational) {
     static const struct {
         const char *name;
         enum camera_model model;
@@ -127,12 +153,19 @@ static enum camera_model read_model(struct context *c) {
         {"SIMPLE_RADIAL", CAMERA_OPENCV},
         {"RADIAL", CAMERA_OPENCV},
         {"OPENCV", CAMERA_OPENCV},
+        {"PERSPECTIVE", CAMERA_OPENCV},
         {"FULL_OPENCV", CAMERA_OPENCV},
         {"OPENCV_FISHEYE", CAMERA_OPENCV_FISHEYE},
+        {"FISHEYE", CAMERA_OPENCV_FISHEYE},
+        {"SIMPLE_RADIAL_FISHEYE", CAMERA_OPENCV_FISHEYE},
+        {"RADIAL_FISHEYE", CAMERA_OPENCV_FISHEYE},
+        {"THIN_PRISM_FISHEYE", CAMERA_THIN_PRISM_FISHEYE},
+        {"FOV", CAMERA_FOV},
     };
     const char *name = string(c, holder(c, "camera_model"), "camera_model");
     struct error err;
     bool fisheye = false;
+    *is_rational = name && strcasecmp(name, "FULL_OPENCV") == 0;
     if (!name) {
         const cJSON *object = holder(c, "is_fisheye");
         if (json_bool(object, "is_fisheye", c->place, false, &fisheye, &err) != STATUS_OK) {
@@ -142,13 +175,36 @@ static enum camera_model read_model(struct context *c) {
         return fisheye ? CAMERA_OPENCV_FISHEYE : CAMERA_OPENCV;
     }
     for (size_t i = 0; i < sizeof models / sizeof *models; i++)
-        if (strcmp(name, models[i].name) == 0)
+        if (strcasecmp(name, models[i].name) == 0)
             return models[i].model;
-    problem(c,
-            "unknown camera_model \"%.80s\"; known are PINHOLE, SIMPLE_PINHOLE, SIMPLE_RADIAL, "
-            "RADIAL, OPENCV, FULL_OPENCV and OPENCV_FISHEYE",
-            name);
+    unknown_model(c, name);
     return CAMERA_OPENCV;
+}
+
+static bool has(const struct context *c, const char *key) {
+    const cJSON *value = cJSON_GetObjectItemCaseSensitive(holder(c, key), key);
+    return value && !cJSON_IsNull(value);
+}
+
+/* The lens's polynomials. Beside k5 and k6, k4 is OpenCV's, of the denominator; alone, it is nerfstudio's, of the eighth
+ * power of the radius (its camera_utils.py; ns-process-data writes it for RealityCapture's lenses). */
+static void read_distortion(struct context *c, struct lens *lens) {
+    static const char *const radial[6] = {"k1", "k2", "k3", "k4", "k5", "k6"};
+    bool is_rational;
+    lens->model = read_model(c, &is_rational);
+    for (int i = 0; i < 6; i++)
+        lens->k[i] = number(c, radial[i], 0.0);
+    lens->k8 = 0.0;
+    if (lens->model == CAMERA_OPENCV && !is_rational && !has(c, "k5") && !has(c, "k6")) {
+        lens->k8 = lens->k[3];
+        lens->k[3] = 0.0;
+    }
+    lens->p[0] = number(c, "p1", 0.0);
+    lens->p[1] = number(c, "p2", 0.0);
+    lens->s[0] = number(c, "sx1", 0.0);
+    lens->s[1] = number(c, "sy1", 0.0);
+    if (lens->model == CAMERA_FOV)
+        lens->k[0] = number(c, "omega", 0.0);
 }
 
 /* A value that must be positive if present. */
@@ -180,8 +236,7 @@ static double angle(struct context *c, const char *key) {
 }
 
 static void read_lens(struct context *c, struct lens *lens) {
-    static const char *const radial[6] = {"k1", "k2", "k3", "k4", "k5", "k6"};
-    lens->model = read_model(c);
+    read_distortion(c, lens);
     lens->width = side(c, "w");
     lens->height = side(c, "h");
     lens->fl_x = positive(c, "fl_x");
@@ -190,10 +245,6 @@ static void read_lens(struct context *c, struct lens *lens) {
     lens->cy = number(c, "cy", NAN);
     lens->angle_x = angle(c, "camera_angle_x");
     lens->angle_y = angle(c, "camera_angle_y");
-    for (int i = 0; i < 6; i++)
-        lens->k[i] = number(c, radial[i], 0.0);
-    lens->p[0] = number(c, "p1", 0.0);
-    lens->p[1] = number(c, "p2", 0.0);
 }
 
 enum status transforms_camera(const struct transforms_frame *frame, uint32_t width, uint32_t height,
@@ -225,17 +276,12 @@ enum status transforms_camera(const struct transforms_frame *frame, uint32_t wid
         return error_set(err, STATUS_INPUT,
                          "a focal length of %.6g x %.6g pixels cannot belong to a picture of %u x %u", fx, fy, width,
                          height);
-    double corner = 0.5 * hypot(width, height) / fx, octic_pixels = fx * fabs(lens->k8) * pow(corner, 9);
-    if (octic_pixels > OCTIC_MAX_PIXELS) {
-        error_set(err, STATUS_INPUT,
-                  "the lens has a distortion of the eighth power of the radius (%.3g), %.2g pixels at "
-                  "the corners, which is not modelled",
-                  lens->k8, octic_pixels);
-        return error_hint(err, "export photographs without distortion, or calibrate without k4");
-    }
     if (!(fabs(cx) < 10.0 * width && fabs(cy) < 10.0 * height))
         return error_set(err, STATUS_INPUT, "the principal point %.6g, %.6g lies far outside the picture of %u x %u",
                          cx, cy, width, height);
+    if (lens->model == CAMERA_FOV && !(lens->k[0] >= 0.0 && lens->k[0] < 3.1))
+        return error_set(err, STATUS_INPUT, "the lens's omega is %.9g, it must be an angle in radians below pi",
+                         lens->k[0]);
     *camera = (struct camera){
         .model = lens->model,
         .width = width,
@@ -248,8 +294,11 @@ enum status transforms_camera(const struct transforms_frame *frame, uint32_t wid
     pose_to_rigid(&frame->world_from_camera, offset, &camera->world_from_camera, &camera->camera_from_world);
     for (int i = 0; i < 6; i++)
         camera->k[i] = (float)lens->k[i];
-    for (int i = 0; i < 2; i++)
+    camera->k8 = (float)lens->k8;
+    for (int i = 0; i < 2; i++) {
         camera->p[i] = (float)lens->p[i];
+        camera->s[i] = (float)lens->s[i];
+    }
     camera_find_fold(camera);
     return STATUS_OK;
 }

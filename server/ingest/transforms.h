@@ -1,11 +1,15 @@
 /* transforms.h -- reads transforms.json of nerfstudio and instant-ngp.
  *
  * Per frame, else at the top level: fl_x fl_y cx cy w h, camera_angle_x / _y (radians), k1 to k6, p1, p2,
- * camera_model (PINHOLE, SIMPLE_PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV, OPENCV_FISHEYE) or is_fisheye,
- * exposure, exposure_time (s), iso, f_number. Per frame: file_path, transform_matrix, mask_path, split (train, test,
- * val), is_bad (left out). At the top level: test_frames, further ones that are held out; applied_transform and
- * applied_scale. At the top level: `mesh` or ply_file_path, and the lists train_filenames, val_filenames, test_filenames. val
- * counts as test. Everything else is ignored. k4 to k6 are OpenCV's: with a pinhole lens, the denominator. */
+ * camera_model (PINHOLE, SIMPLE_PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV, OPENCV_FISHEYE or FISHEYE,
+ * SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE, THIN_PRISM_FISHEYE with sx1 sy1, FOV with omega; in any letters) or
+ * is_fisheye, exposure, exposure_time (s), iso, f_number. Per frame: file_path, transform_matrix, mask_path, split
+ * (train, test, val), is_bad (left out). At the top level: test_frames, further ones that are held out;
+ * applied_transform and applied_scale; `mesh` or ply_file_path; the lists train_filenames, val_filenames,
+ * test_filenames. val counts as test. Everything else is ignored.
+ *
+ * With a lens that is no fisheye, k4 is nerfstudio's, of the eighth power of the radius, unless k5 or k6 is there or
+ * the model is FULL_OPENCV: then k4 to k6 are OpenCV's, of the denominator. */
 #ifndef UNBAKE_INGEST_TRANSFORMS_H
 #define UNBAKE_INGEST_TRANSFORMS_H
 
@@ -25,8 +29,7 @@ struct lens {
     enum camera_model model;
     /* NAN if absent. */
     double width, height, fl_x, fl_y, cx, cy, angle_x, angle_y;
-    double k[6], p[2];
-    double k8;        /* OPENCV: coefficient of the eighth power of the radius, which other tools have and OpenCV not */
+    double k[6], k8, p[2], s[2]; /* as in struct camera */
     bool is_relative; /* fl_x, fl_y are shares of the picture's longer side; cx, cy, too, from the picture's centre */
 };
 

@@ -1,14 +1,18 @@
-/* camera.c -- see camera.h. The models are those of OpenCV's calib3d and fisheye pages:
+/* camera.c -- see camera.h. The models are those of OpenCV's calib3d and fisheye pages, and of COLMAP's models.h:
  *
  *   OPENCV          r^2 = x^2 + y^2
- *                   s = (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6)
+ *                   s = (1 + k1 r^2 + k2 r^4 + k3 r^6 + k8 r^8) / (1 + k4 r^2 + k5 r^4 + k6 r^6)
  *                   x' = s x + 2 p1 x y + p2 (r^2 + 2 x^2),  y' = s y + p1 (r^2 + 2 y^2) + 2 p2 x y
  *   OPENCV_FISHEYE  t = atan r,  t' = t (1 + k1 t^2 + k2 t^4 + k3 t^6 + k4 t^8)
  *                   (x', y') = t' (x, y) / r
+ *   THIN_PRISM_FISHEYE  (a, b) = t (x, y) / r,  s = 1 + k1 t^2 + k2 t^4 + k3 t^6 + k4 t^8
+ *                   x' = s a + 2 p1 a b + p2 (t^2 + 2 a^2) + s1 t^2
+ *                   y' = s b + 2 p2 a b + p1 (t^2 + 2 b^2) + s2 t^2
+ *   FOV             r' = atan(2 r tan(w / 2)) / w,  (x', y') = r' (x, y) / r
  *
- * with (x, y) = (X / Z, Y / Z). The Jacobian determinant is positive at the axis; where it stops
- * being so, the picture folds over. The radial part's fold is found once (camera_find_fold); the
- * tangential part's sign is looked at point by point, since it costs nothing there. */
+ * with (x, y) = (X / Z, Y / Z). The Jacobian determinant is positive at the axis; where it stops being so, the picture
+ * folds over. The radial part's fold is found once (camera_find_fold); the sign of the tangential and prism parts is
+ * looked at point by point, since it costs nothing there. */
 #include "server/scene/camera.h"
 
 #include <math.h>
@@ -16,11 +20,12 @@
 
 #define HALF_PI (0.5 * PI)
 #define FOLD_STEPS 4096 /* of the march towards the fold */
+#define FOV_LEAST 1e-7  /* radians of FOV's angle; below it there is no distortion in single precision */
 #define NEWTON_STEPS 50
 #define NEWTON_PIXELS 1e-6 /* residual at which the inverse is taken as found */
 
 static bool has_distortion(const struct camera *c) {
-    float sum = fabsf(c->p[0]) + fabsf(c->p[1]);
+    float sum = fabsf(c->k8) + fabsf(c->p[0]) + fabsf(c->p[1]) + fabsf(c->s[0]) + fabsf(c->s[1]);
     for (int i = 0; i < 6; i++)
         sum += fabsf(c->k[i]);
     return sum != 0.0f;
@@ -30,9 +35,10 @@ static bool has_distortion(const struct camera *c) {
 static double radial(const struct camera *c, double r2, double *d_scale) {
     double k1 = (double)c->k[0], k2 = (double)c->k[1], k3 = (double)c->k[2];
     double k4 = (double)c->k[3], k5 = (double)c->k[4], k6 = (double)c->k[5];
-    double above = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+    double k8 = (double)c->k8;
+    double above = 1.0 + r2 * (k1 + r2 * (k2 + r2 * (k3 + r2 * k8)));
     double below = 1.0 + r2 * (k4 + r2 * (k5 + r2 * k6));
-    double d_above = k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3);
+    double d_above = k1 + r2 * (2.0 * k2 + r2 * (3.0 * k3 + r2 * 4.0 * k8));
     double d_below = k4 + r2 * (2.0 * k5 + r2 * 3.0 * k6);
     *d_scale = (d_above * below - above * d_below) / (below * below);
     return above / below;
@@ -50,22 +56,53 @@ static double fisheye(const struct camera *c, double t, double *derivative) {
     return t * sum;
 }
 
-/* Distorted (x', y') and its Jacobian {dx'/dx, dx'/dy = dy'/dx, dy'/dy}. */
-static void opencv(const struct camera *c, double x, double y, double out[2], double jacobian[3]) {
+/* Distorted (x', y') and its Jacobian {dx'/dx, dx'/dy, dy'/dx, dy'/dy}. */
+static void opencv(const struct camera *c, double x, double y, double out[2], double jacobian[4]) {
     double p1 = (double)c->p[0], p2 = (double)c->p[1], r2 = x * x + y * y, d_scale;
     double scale = radial(c, r2, &d_scale);
     out[0] = scale * x + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x);
     out[1] = scale * y + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y;
     jacobian[0] = scale + 2.0 * x * x * d_scale + 2.0 * p1 * y + 6.0 * p2 * x;
-    jacobian[1] = 2.0 * x * y * d_scale + 2.0 * p1 * x + 2.0 * p2 * y;
-    jacobian[2] = scale + 2.0 * y * y * d_scale + 6.0 * p1 * y + 2.0 * p2 * x;
+    jacobian[1] = jacobian[2] = 2.0 * x * y * d_scale + 2.0 * p1 * x + 2.0 * p2 * y;
+    jacobian[3] = scale + 2.0 * y * y * d_scale + 6.0 * p1 * y + 2.0 * p2 * x;
+}
+
+/* The same of THIN_PRISM_FISHEYE, from (a, b). */
+static void thin_prism(const struct camera *c, double a, double b, double out[2], double jacobian[4]) {
+    double p1 = (double)c->p[0], p2 = (double)c->p[1], s1 = (double)c->s[0], s2 = (double)c->s[1];
+    double t2 = a * a + b * b, scale = 1.0, d_scale = 0.0, power = 1.0; /* d_scale: by t^2 */
+    for (int i = 0; i < 4; i++) {
+        d_scale += (i + 1) * (double)c->k[i] * power;
+        power *= t2;
+        scale += (double)c->k[i] * power;
+    }
+    out[0] = scale * a + 2.0 * p1 * a * b + p2 * (t2 + 2.0 * a * a) + s1 * t2;
+    out[1] = scale * b + 2.0 * p2 * a * b + p1 * (t2 + 2.0 * b * b) + s2 * t2;
+    double mixed = 2.0 * a * b * d_scale + 2.0 * p1 * a + 2.0 * p2 * b;
+    jacobian[0] = scale + 2.0 * a * a * d_scale + 2.0 * p1 * b + 6.0 * p2 * a + 2.0 * s1 * a;
+    jacobian[1] = mixed + 2.0 * s1 * b;
+    jacobian[2] = mixed + 2.0 * s2 * a;
+    jacobian[3] = scale + 2.0 * b * b * d_scale + 2.0 * p2 * a + 6.0 * p1 * b + 2.0 * s2 * b;
+}
+
+static void distort(const struct camera *c, double x, double y, double out[2], double jacobian[4]) {
+    (c->model == CAMERA_THIN_PRISM_FISHEYE ? thin_prism : opencv)(c, x, y, out, jacobian);
+}
+
+/* Whether the map keeps its orientation. */
+static bool is_upright(const double jacobian[4]) {
+    return jacobian[0] * jacobian[3] - jacobian[1] * jacobian[2] > 0.0 && jacobian[0] > 0.0;
+}
+
+static bool is_fisheye(const struct camera *c) {
+    return c->model == CAMERA_OPENCV_FISHEYE || c->model == CAMERA_THIN_PRISM_FISHEYE;
 }
 
 /* Derivative of the distorted radius by the undistorted one, and that radius; not finite or not
  * positive where the model has broken down (a denominator that went through zero included). */
 static double radial_growth(const struct camera *c, double r, double *distorted) {
     double derivative;
-    if (c->model == CAMERA_OPENCV_FISHEYE) {
+    if (is_fisheye(c)) {
         *distorted = fisheye(c, r, &derivative);
         return derivative;
     }
@@ -78,16 +115,15 @@ static double radial_growth(const struct camera *c, double r, double *distorted)
 
 void camera_find_fold(struct camera *c) {
     c->fold = 0.0f;
-    if (!has_distortion(c))
+    if (!has_distortion(c) || c->model == CAMERA_FOV)
         return;
     /* March over the angle in even steps to just below 90 degrees. Twice the picture's corner leaves room for the
      * tangential part. */
     double dx = fmax(fabs((double)c->cx), fabs((double)c->width - (double)c->cx)) / (double)c->fx;
     double dy = fmax(fabs((double)c->cy), fabs((double)c->height - (double)c->cy)) / (double)c->fy;
     double reach = 2.0 * hypot(dx, dy), inside = 0.0, outside = 0.0, distorted;
-    bool is_fisheye = c->model == CAMERA_OPENCV_FISHEYE;
     for (int i = 1; i < FOLD_STEPS; i++) {
-        double angle = HALF_PI * i / FOLD_STEPS, r = is_fisheye ? angle : tan(angle);
+        double angle = HALF_PI * i / FOLD_STEPS, r = is_fisheye(c) ? angle : tan(angle);
         if (!(radial_growth(c, r, &distorted) > 0.0)) {
             outside = r;
             break;
@@ -112,13 +148,13 @@ static bool project_opencv(const struct camera *c, float x, float y, float *u, f
     if (c->fold > 0.0f && !(r2 < c->fold * c->fold))
         return false;
     const float *k = c->k, p1 = c->p[0], p2 = c->p[1];
-    float above = 1.0f + r2 * (k[0] + r2 * (k[1] + r2 * k[2]));
+    float above = 1.0f + r2 * (k[0] + r2 * (k[1] + r2 * (k[2] + r2 * c->k8)));
     float below = 1.0f + r2 * (k[3] + r2 * (k[4] + r2 * k[5]));
     float scale = above / below;
     if (p1 != 0.0f || p2 != 0.0f) {
-        double out[2], jacobian[3];
+        double out[2], jacobian[4];
         opencv(c, (double)x, (double)y, out, jacobian);
-        if (!(jacobian[0] * jacobian[2] - jacobian[1] * jacobian[1] > 0.0) || !(jacobian[0] > 0.0))
+        if (!is_upright(jacobian))
             return false;
     }
     *u = scale * x + 2.0f * p1 * x * y + p2 * (r2 + 2.0f * x * x);
@@ -138,14 +174,44 @@ static bool project_fisheye(const struct camera *c, float x, float y, float *u, 
     return true;
 }
 
+static bool project_thin_prism(const struct camera *c, float x, float y, float *u, float *v) {
+    double r = hypot((double)x, (double)y), t = atan(r), scale = r > 1e-8 ? t / r : 1.0, out[2], jacobian[4];
+    if (c->fold > 0.0f && !(t < (double)c->fold))
+        return false;
+    thin_prism(c, scale * (double)x, scale * (double)y, out, jacobian);
+    *u = (float)out[0];
+    *v = (float)out[1];
+    return is_upright(jacobian);
+}
+
+static bool project_fov(const struct camera *c, float x, float y, float *u, float *v) {
+    double r = hypot((double)x, (double)y), omega = (double)c->k[0], scale = 1.0;
+    if (r > 1e-12 && fabs(omega) > FOV_LEAST)
+        scale = atan(2.0 * r * tan(0.5 * omega)) / (omega * r);
+    else if (fabs(omega) > FOV_LEAST)
+        scale = 2.0 * tan(0.5 * omega) / omega;
+    *u = (float)(scale * (double)x);
+    *v = (float)(scale * (double)y);
+    return true;
+}
+
+/* The lens, from the plane at distance 1 to the distorted one. */
+static bool project_lens(const struct camera *c, float x, float y, float *u, float *v) {
+    switch (c->model) {
+    case CAMERA_OPENCV_FISHEYE: return project_fisheye(c, x, y, u, v);
+    case CAMERA_THIN_PRISM_FISHEYE: return project_thin_prism(c, x, y, u, v);
+    case CAMERA_FOV: return project_fov(c, x, y, u, v);
+    case CAMERA_OPENCV: break;
+    }
+    return project_opencv(c, x, y, u, v);
+}
+
 bool camera_project(const struct camera *c, vec3 point, float *x, float *y, float *depth_m) {
     vec3 p = rigid_point(&c->camera_from_world, point);
     if (!(p.z > 0.0f))
         return false;
     float u, v;
-    bool inside = c->model == CAMERA_OPENCV_FISHEYE ? project_fisheye(c, p.x / p.z, p.y / p.z, &u, &v)
-                                                    : project_opencv(c, p.x / p.z, p.y / p.z, &u, &v);
-    if (!inside)
+    if (!project_lens(c, p.x / p.z, p.y / p.z, &u, &v))
         return false;
     u = c->fx * u + c->cx;
     v = c->fy * v + c->cy;
@@ -157,21 +223,21 @@ bool camera_project(const struct camera *c, vec3 point, float *x, float *y, floa
 
 /* Newton's method in the plane, the step halved until it stays where the map is one-to-one and
  * the residual shrinks. (x, y) begins at the distorted place and ends at the undistorted one. */
-static bool invert_opencv(const struct camera *c, double *x, double *y) {
-    double goal[2] = {*x, *y}, out[2], j[3];
+static bool invert_plane(const struct camera *c, double *x, double *y) {
+    double goal[2] = {*x, *y}, out[2], j[4];
     double fold = c->fold > 0.0f ? (double)c->fold : INFINITY;
     double scale = fmin(1.0, 0.99 * fold / fmax(hypot(*x, *y), 1e-30));
     *x *= scale;
     *y *= scale;
-    opencv(c, *x, *y, out, j);
+    distort(c, *x, *y, out, j);
     double tolerance = NEWTON_PIXELS / (double)fmaxf(fabsf(c->fx), fabsf(c->fy));
     double residual = hypot(out[0] - goal[0], out[1] - goal[1]);
     for (int i = 0; i < NEWTON_STEPS && residual > tolerance; i++) {
-        double det = j[0] * j[2] - j[1] * j[1];
+        double det = j[0] * j[3] - j[1] * j[2];
         if (!(fabs(det) > 1e-12))
             return false;
         double ex = out[0] - goal[0], ey = out[1] - goal[1];
-        double sx = (j[2] * ex - j[1] * ey) / det, sy = (j[0] * ey - j[1] * ex) / det;
+        double sx = (j[3] * ex - j[1] * ey) / det, sy = (j[0] * ey - j[2] * ex) / det;
         double next_x, next_y, next_residual = INFINITY, length = 1.0;
         do {
             next_x = *x - length * sx;
@@ -179,7 +245,7 @@ static bool invert_opencv(const struct camera *c, double *x, double *y) {
             length *= 0.5;
             if (hypot(next_x, next_y) >= fold)
                 continue;
-            opencv(c, next_x, next_y, out, j);
+            distort(c, next_x, next_y, out, j);
             next_residual = hypot(out[0] - goal[0], out[1] - goal[1]);
         } while (!(next_residual < residual) && length > 1e-6);
         if (!(next_residual < residual))
@@ -188,10 +254,10 @@ static bool invert_opencv(const struct camera *c, double *x, double *y) {
         *y = next_y;
         residual = next_residual;
     }
-    return residual <= tolerance && j[0] > 0.0 && j[0] * j[2] - j[1] * j[1] > 0.0;
+    return residual <= tolerance && is_upright(j);
 }
 
-/* As invert_opencv, for the angle t of a distorted angle: safeguarded by bisection, since t'(t)
+/* As invert_plane, for the angle t of a distorted angle: safeguarded by bisection, since t'(t)
  * grows on all of [0, fold). */
 static bool invert_fisheye(const struct camera *c, double bent, double *t) {
     double low = 0.0, high = c->fold > 0.0f ? (double)c->fold : HALF_PI, derivative;
@@ -213,20 +279,47 @@ static bool invert_fisheye(const struct camera *c, double bent, double *t) {
     return false;
 }
 
-bool camera_direction(const struct camera *c, float px, float py, vec3 *direction) {
-    double x = ((double)px - (double)c->cx) / (double)c->fx;
-    double y = ((double)py - (double)c->cy) / (double)c->fy, z = 1.0;
-    if (c->model == CAMERA_OPENCV_FISHEYE) {
-        double bent = hypot(x, y), t;
-        if (!invert_fisheye(c, bent, &t))
+static bool invert_fov(const struct camera *c, double *x, double *y) {
+    double bent = hypot(*x, *y), omega = (double)c->k[0], angle = bent * fabs(omega);
+    if (!(fabs(omega) > FOV_LEAST) || bent == 0.0)
+        return true;
+    if (!(angle < HALF_PI))
+        return false;
+    double scale = tan(angle) / (2.0 * tan(0.5 * fabs(omega)) * bent);
+    *x *= scale;
+    *y *= scale;
+    return true;
+}
+
+/* From the distorted plane to the direction (x, y, *z), of any length. */
+static bool invert_lens(const struct camera *c, double *x, double *y, double *z) {
+    *z = 1.0;
+    if (c->model == CAMERA_FOV)
+        return invert_fov(c, x, y);
+    if (c->model == CAMERA_OPENCV)
+        return !has_distortion(c) || invert_plane(c, x, y);
+    double bent = hypot(*x, *y), t = bent;
+    if (c->model == CAMERA_THIN_PRISM_FISHEYE) {
+        if (has_distortion(c) && !invert_plane(c, x, y))
             return false;
-        double scale = bent > 1e-12 ? sin(t) / bent : 1.0;
-        x *= scale;
-        y *= scale;
-        z = cos(t);
-    } else if (has_distortion(c) && !invert_opencv(c, &x, &y)) {
+        bent = t = hypot(*x, *y);
+    } else if (!invert_fisheye(c, bent, &t)) {
         return false;
     }
+    if (!(t < HALF_PI))
+        return false;
+    double scale = bent > 1e-12 ? sin(t) / bent : 1.0;
+    *x *= scale;
+    *y *= scale;
+    *z = cos(t);
+    return true;
+}
+
+bool camera_direction(const struct camera *c, float px, float py, vec3 *direction) {
+    double x = ((double)px - (double)c->cx) / (double)c->fx;
+    double y = ((double)py - (double)c->cy) / (double)c->fy, z;
+    if (!invert_lens(c, &x, &y, &z))
+        return false;
     double length = sqrt(x * x + y * y + z * z);
     vec3 local = {(float)(x / length), (float)(y / length), (float)(z / length)};
     *direction = vec3_normalize(rigid_direction(&c->world_from_camera, local));

@@ -1,8 +1,12 @@
 /* camera.h -- pinhole and fisheye cameras with lens distortion.
  *
- * Camera axes: x right, y down, z forward. Pixel (i, j) covers [i, i+1) x [j, j+1), its centre
- * is at +0.5. Distortion: OPENCV (k1 k2 k3 k4 k5 k6, p1 p2: Brown-Conrady, rational) and
- * OPENCV_FISHEYE (k1..k4, Kannala-Brandt), as OpenCV's calibration page defines them. */
+ * Camera axes: x right, y down, z forward. Pixel (i, j) covers [i, i+1) x [j, j+1), its centre is at +0.5. Distortion:
+ *
+ *   OPENCV              k1 to k6, p1 p2 (Brown-Conrady, rational), as OpenCV's calibration page defines it, and k8, the
+ *                       eighth power of the radius, which nerfstudio and others have. Pinhole: all zero
+ *   OPENCV_FISHEYE      k1 to k4 (Kannala-Brandt), as OpenCV's fisheye page defines it
+ *   THIN_PRISM_FISHEYE  k1 to k4, p1 p2, s1 s2, as COLMAP defines it
+ *   FOV                 k[0] is the angle omega in radians (Devernay & Faugeras 2001), as COLMAP defines it */
 #ifndef UNBAKE_SCENE_CAMERA_H
 #define UNBAKE_SCENE_CAMERA_H
 
@@ -11,21 +15,23 @@
 
 #include "common/vec.h"
 
-enum camera_model { CAMERA_OPENCV, CAMERA_OPENCV_FISHEYE }; /* pinhole: OPENCV, all zero */
+enum camera_model { CAMERA_OPENCV, CAMERA_OPENCV_FISHEYE, CAMERA_THIN_PRISM_FISHEYE, CAMERA_FOV };
 
 struct camera {
     enum camera_model model;
     uint32_t width, height; /* pixels */
     float fx, fy, cx, cy;   /* pixels */
     float k[6];             /* radial */
-    float p[2];             /* tangential; OPENCV only */
+    float k8;               /* radial, of the eighth power; OPENCV only */
+    float p[2];             /* tangential; OPENCV and THIN_PRISM_FISHEYE */
+    float s[2];             /* thin prism; THIN_PRISM_FISHEYE only */
     float fold;             /* set by camera_find_fold, see there; 0: no limit */
     struct rigid camera_from_world, world_from_camera;
 };
 
 /* Finds where the distortion stops growing and sets `fold`, the limit up to which the model is one-to-one: tan of the
- * angle from the axis (OPENCV) or that angle in radians (OPENCV_FISHEYE); well outside the picture if it never folds;
- * 0 without distortion. Beyond it the polynomial maps directions outside the view into the picture. Call once after
+ * angle from the axis (OPENCV) or that angle in radians (fisheye); well outside the picture if it never folds; 0 without
+ * distortion and for FOV, which never folds. Beyond it the polynomial maps directions outside the view into the picture. Call once after
  * size and lens parameters are set. */
 void camera_find_fold(struct camera *camera);
 

@@ -73,6 +73,7 @@ static void add_binary(struct seeds *s) {
 void fuzz_seeds(struct seeds *s) {
     s->mutants = 10000;
     seeds_text(s, "0" CAMERAS);
+    seeds_text(s, "01 FOV 64 48 50 51 32 24 0.9\n2 THIN_PRISM_FISHEYE 64 48 50 51 32 24 .1 0 .01 .02 0 0 .003 .004\n");
     seeds_text(s, "2" IMAGES);
     add_binary(s);
 }

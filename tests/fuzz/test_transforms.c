@@ -17,6 +17,10 @@ static const char opencv[] =
     "\"transform_matrix\":[[0,-1,0,1e3],[1,0,0,-2],[0,0,1,0.5]]},"
     "{\"file_path\":\"sub\\\\c.png\",\"is_fisheye\":true,\"camera_angle_x\":2.5,\"k4\":0.3,"
     "\"transform_matrix\":[[0.6,0.8,0,0],[-0.8,0.6,0,0],[0,0,1,0],[0,0,0,1]]}]}";
+static const char prism[] = "{\"camera_model\":\"THIN_PRISM_FISHEYE\",\"fl_x\":50,\"k1\":0.1,\"p1\":0.01,\"sx1\":0.02,"
+                            "\"frames\":[{\"file_path\":\"a\",\"camera_model\":\"fov\",\"omega\":0.9,"
+                            "\"transform_matrix\":[[1,0,0,0],[0,1,0,0],[0,0,1,0]]},{\"file_path\":\"b\",\"k4\":-0.2,"
+                            "\"transform_matrix\":[[1,0,0,9e5],[0,1,0,0],[0,0,1,0]]}]}";
 static const char fisheye[] = "{\"camera_model\":\"OPENCV_FISHEYE\",\"camera_angle_x\":1.5,\"k1\":-0.4,\"frames\":["
                               "{\"file_path\":\"a\",\"transform_matrix\":[[1,0,0,0],[0,1,0,0],[0,0,1,0]]}]}";
 
@@ -82,10 +86,10 @@ static void replace_all(struct seeds *s, cJSON *root, cJSON *node) {
 }
 
 void fuzz_seeds(struct seeds *s) {
-    static const char *const texts[] = {opencv, fisheye};
+    static const char *const texts[] = {opencv, fisheye, prism};
     s->mutants = 5000;
     seeds_data(s, "conformance/room_transforms.json", "");
-    for (int i = 0; i < 2; i++) {
+    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
         cJSON *tree = cJSON_Parse(texts[i]);
         seeds_text(s, texts[i]);
         replace_all(s, tree, tree);

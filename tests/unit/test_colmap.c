@@ -101,9 +101,9 @@ static void test_both(void) {
     CHECK(colmap_images_parse(images.data, images.length, "images.bin", true, c, "", &t, &f, &err) == STATUS_INPUT);
     transforms_release(&t);
     colmap_cameras_free(c);
-    cameras.data[12] = 7; /* FOV */
+    cameras.data[12] = 99;
     CHECK(!colmap_cameras_parse(cameras.data, cameras.length, "cameras.bin", true, &err));
-    CHECK_STRING(err.message, "cameras.bin: unknown camera model number 7");
+    CHECK_STRING(err.message, "cameras.bin: unknown camera model number 99");
     buf_release(&cameras);
     buf_release(&images);
     cJSON_Delete(f.problems);
@@ -112,7 +112,7 @@ static void test_both(void) {
 
 static void test_refused(void) {
     static const char *const bad_cameras[][2] = {
-        {"1 FOV 640 480 500 510 320 240 1\n", "unknown camera model FOV"},
+        {"1 ACME 640 480 500 510 320 240 1\n", "unknown camera model ACME"},
         {"1\n", "line 1: there is no camera model"},
         {"x PINHOLE 640 480 1 1 1 1\n", "not a number"},
         {"-1 PINHOLE 640 480 1 1 1 1\n", "no id"},

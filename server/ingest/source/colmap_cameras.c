@@ -13,7 +13,7 @@
 #define MAX_PARAMETERS 12
 
 /* Parameters of each model, in order: f both focal lengths, F G one each, x y the principal point, 1 to 6 radial, p q
- * tangential. */
+ * tangential, s t thin prism. */
 static const struct model {
     const char *name;
     int id;
@@ -27,8 +27,10 @@ static const struct model {
     {"OPENCV", 4, CAMERA_OPENCV, "FGxy12pq"},
     {"OPENCV_FISHEYE", 5, CAMERA_OPENCV_FISHEYE, "FGxy1234"},
     {"FULL_OPENCV", 6, CAMERA_OPENCV, "FGxy12pq3456"},
+    {"FOV", 7, CAMERA_FOV, "FGxy1"},
     {"SIMPLE_RADIAL_FISHEYE", 8, CAMERA_OPENCV_FISHEYE, "fxy1"},
     {"RADIAL_FISHEYE", 9, CAMERA_OPENCV_FISHEYE, "fxy12"},
+    {"THIN_PRISM_FISHEYE", 10, CAMERA_THIN_PRISM_FISHEYE, "FGxy12pq34st"},
 };
 
 struct colmap_camera {
@@ -65,6 +67,8 @@ static enum status add_camera(const struct colmap_cursor *r, struct colmap_camer
         case 'y': lens.cy = value[i]; break;
         case 'p': lens.p[0] = value[i]; break;
         case 'q': lens.p[1] = value[i]; break;
+        case 's': lens.s[0] = value[i]; break;
+        case 't': lens.s[1] = value[i]; break;
         default: lens.k[model->parameters[i] - '1'] = value[i];
         }
     }

@@ -1,7 +1,7 @@
 /* colmap_cameras.h -- lenses of a COLMAP reconstruction, from cameras.bin or cameras.txt.
  *
  * Camera models: SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV, OPENCV_FISHEYE,
- * SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE. Counts in a file are checked against its size. */
+ * SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE, THIN_PRISM_FISHEYE, FOV. Counts in a file are checked against its size. */
 #ifndef UNBAKE_INGEST_SOURCE_COLMAP_CAMERAS_H
 #define UNBAKE_INGEST_SOURCE_COLMAP_CAMERAS_H
 

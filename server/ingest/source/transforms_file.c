@@ -6,8 +6,19 @@
 #include <string.h>
 
 #include "common/mem.h"
+#include "common/utf8.h"
 #include "server/ingest/path.h"
 #include "server/ingest/source/photo_folder.h"
+
+/* UTF-8, or UTF-16 as PowerShell's > writes it. */
+static enum status parse(const struct mapping *file, const char *path, cJSON **tree, struct error *err) {
+    size_t length;
+    char *text = utf8_from_utf16(file->data, file->size, &length);
+    enum status status = text ? json_parse(text, length, path, tree, err)
+                              : json_parse((const char *)file->data, file->size, path, tree, err);
+    mem_free(text);
+    return status;
+}
 
 enum status transforms_file_read(const struct source_place *place, const char *path, struct transforms *t,
                                  struct findings *f, struct error *err) {
@@ -19,7 +30,7 @@ enum status transforms_file_read(const struct source_place *place, const char *p
     if (status == STATUS_OK && file.size > TRANSFORMS_MAX_BYTES)
         status = error_set(&own, STATUS_LIMIT, "%s is larger than %zu bytes", path, (size_t)TRANSFORMS_MAX_BYTES);
     if (status == STATUS_OK)
-        status = json_parse(file.data, file.size, path, &tree, &own);
+        status = parse(&file, path, &tree, &own);
     mapping_close(&file);
     if (status != STATUS_OK)
         return findings_settle(f, path, status, &own, err);
