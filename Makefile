@@ -55,7 +55,7 @@ FUZZ_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(call built,$(FUZZ_SRC)))
 # The goals that build first and then run something build on all processors, unless told otherwise.
 BUILD = echo building... && $(MAKE) -s $(if $(filter -j%,$(MAKEFLAGS)),,-j$(shell nproc))
 
-.PHONY: all help deps man deb demo test tests check check-build benches bench fidelity rooms sensitivity paper chaos soak asan tsan asan-build tsan-build fuzz \
+.PHONY: all help deps man deb demo test tests check check-build benches bench fidelity rooms sensitivity paper many chaos soak asan tsan asan-build tsan-build fuzz \
         fuzzers fuzz-build portable format coverage coverage-build install clean
 .SECONDARY:
 .DELETE_ON_ERROR:
@@ -165,6 +165,10 @@ paper: ## repeat the paper's experiments (hours; PAPER=short: minutes, to see th
 	@deploy/install-deps.sh bench
 	@+$(BUILD) all $(B)/tests/bench/reconstruct_room $(B)/tests/bench/perturb_mesh
 	@tests/bench/paper.sh $(B)
+
+many: deps ## reconstruct from 300 photographs of 12 megapixels (hours), print the peak memory; MANY_FACTOR, MANY_MIB
+	@+$(BUILD) all $(B)/tests/bench/reconstruct_room $(B)/tests/bench/enlarge_room
+	@tests/bench/many_photographs.sh $(B)
 
 asan: deps ## run all tests under the address and undefined-behaviour sanitizers
 	@+$(BUILD) asan-build

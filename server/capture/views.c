@@ -30,6 +30,7 @@
 #define DARK_SHARE 1e-3f /* least observed radiance in ratios, as a share of the median; by hand */
 
 #define NO_SURFACE UINT32_MAX
+#define BAND 8 /* rows of pixels a work item */
 
 struct corner {
     vec3 point;
@@ -86,20 +87,16 @@ static bool are_adjacent(const struct corner *a, const struct corner *b, float f
 /* 8-bit hash of a segment. */
 static uint8_t owner_mark(uint32_t segment) { return (uint8_t)(rng_mix32(segment) >> 24); }
 
-/* One row of pixels. Corners are traced twice, by the rows above and below: simpler than sharing them between threads.
- */
-static void mark_row(void *user, size_t row, int thread) {
-    (void)thread;
-    const struct edge_job *job = user;
+/* One row of pixels, given the corners above them, [width + 1], in whose place it leaves those below. */
+static void mark_row(const struct edge_job *job, uint32_t y, struct corner *corners) {
     const struct photograph *photo = &job->views->scene->photograph[job->views->train[job->train]];
     const struct camera *camera = &photo->camera;
-    uint8_t *out = job->views->shows[job->train] + row * camera->width;
-    uint8_t *owner = job->views->owner[job->train] + row * camera->width;
-    uint32_t y = (uint32_t)row;
-    struct corner left_top = trace_corner(job, camera, 0, y);
-    struct corner left_low = trace_corner(job, camera, 0, y + 1);
+    uint8_t *out = job->views->shows[job->train] + (size_t)y * camera->width;
+    uint8_t *owner = job->views->owner[job->train] + (size_t)y * camera->width;
+    struct corner left_top = corners[0], left_low = trace_corner(job, camera, 0, y + 1);
+    corners[0] = left_low;
     for (uint32_t x = 0; x < camera->width; x++) {
-        struct corner top = trace_corner(job, camera, x + 1, y);
+        struct corner top = corners[x + 1];
         struct corner low = trace_corner(job, camera, x + 1, y + 1);
         bool mixed = differ(&left_top, &top, camera->fx) || differ(&left_top, &left_low, camera->fx) ||
                      differ(&left_top, &low, camera->fx) || differ(&top, &left_low, camera->fx);
@@ -111,9 +108,24 @@ static void mark_row(void *user, size_t row, int thread) {
         /* geometry thinner than a pixel may hide between the corners */
         if (!mixed && low.segment == NO_SURFACE)
             out[x] = centre_meets(job, camera, x, y) ? VIEWS_MIXED : VIEWS_OPEN;
+        corners[x + 1] = low;
         left_top = top;
         left_low = low;
     }
+}
+
+/* BAND rows. Threads share no corners: those between two bands are traced twice. */
+static void mark_band(void *user, size_t band, int thread) {
+    (void)thread;
+    const struct edge_job *job = user;
+    const struct camera *camera = &job->views->scene->photograph[job->views->train[job->train]].camera;
+    struct corner *corners = mem_array((size_t)camera->width + 1, sizeof *corners);
+    uint32_t first = (uint32_t)band * BAND;
+    for (uint32_t x = 0; x <= camera->width; x++)
+        corners[x] = trace_corner(job, camera, x, first);
+    for (uint32_t y = first; y < first + BAND && y < camera->height; y++)
+        mark_row(job, y, corners);
+    mem_free(corners);
 }
 
 /* Gives the neighbours of pixels of class `of` at least class of - 1. */
@@ -164,7 +176,7 @@ void views_update_median(struct views *v) {
 void views_update_edges(struct views *v, uint32_t train, struct parallel *pool) {
     const struct camera *camera = &v->scene->photograph[v->train[train]].camera;
     struct edge_job job = {.views = v, .train = train};
-    parallel_for(pool, camera->height, mark_row, &job);
+    parallel_for(pool, (camera->height + BAND - 1) / BAND, mark_band, &job);
     make_edges(v->edge[train], v->shows[train], camera->width, camera->height);
 }
 
