@@ -38,8 +38,8 @@ forbid "server/ingest server/export" "server/($(echo "$engine_order" | cut -d' '
     'ingest and export see only scene'
 forbid server/ingest 'server/export/' 'ingest does not see export'
 forbid server/export 'server/ingest/' 'export does not see ingest'
-forbid server/check "server/($(echo "$engine_order" | cut -d' ' -f4- | tr ' ' '|')|export|http|net|uploads|data|store|job|worker|admin)/" \
-    'check sees scene, render, capture and ingest'
+forbid server/check "server/($(echo "$engine_order" | cut -d' ' -f4- | tr ' ' '|' | sed 's/state|//')|export|http|net|uploads|data|store|job|worker|admin)/" \
+    'check sees scene, render, capture, state and ingest'
 forbid "$(for folder in $engine_order ingest export http net uploads data store job admin; do echo "server/$folder"; done)" \
     'server/check/' 'only the worker sees check'
 forbid "$(for folder in $engine_order ingest export; do echo "server/$folder"; done)" \

@@ -7,9 +7,11 @@
 
 #include "common/clock.h"
 #include "common/file.h"
+#include "common/machine.h"
 #include "common/mem.h"
 #include "common/settings.h"
 #include "server/check/check_pictures.h"
+#include "server/check/check_table.h"
 #include "server/ingest/facts.h"
 #include "server/ingest/pixels.h"
 
@@ -74,12 +76,14 @@ static void print_json(const cJSON *json) {
 }
 
 /* Everything that is known of the room; the caller's. */
-static enum status find_facts(const struct arguments *a, const struct scene_check *room, struct parallel *pool,
-                              cJSON **facts, struct error *err) {
+static enum status find_facts(const struct arguments *a, const struct scene_check *room,
+                              const struct settings *settings, struct parallel *pool, cJSON **facts,
+                              struct error *err) {
     const char *dir = arguments_value(a, "--pictures", NULL);
     double begin = clock_sec();
     *facts = facts_of(&room->scene);
     scene_check_facts(room, *facts);
+    check_table_add(*facts, room, settings, (double)machine_memory_available(""), pool);
     enum status status = dir ? file_make_dirs(dir, err) : STATUS_OK;
     if (dir && status == STATUS_OK)
         status = check_pictures_write(room, dir, pool, cJSON_AddArrayToObject(*facts, "previews"), err);
@@ -90,19 +94,18 @@ static enum status find_facts(const struct arguments *a, const struct scene_chec
 }
 
 /* Checks the room and prints what was found. */
-static enum status check(const struct arguments *a, const struct reading *reading, const cJSON *settings,
+static enum status check(const struct arguments *a, const struct reading *reading, const struct settings *settings,
                          struct parallel *pool, bool *fits, struct error *err) {
     struct bundle_limits limits = bundle_default_limits();
     struct spill *pixels = pixels_new_temporary(pool);
     struct scene_check room;
     cJSON *problems = cJSON_CreateArray(), *facts = NULL;
     bool as_json = arguments_have(a, "--json");
-    (void)settings;
     pixels_use(pixels, &limits);
     enum status status = scene_check(&room, a->words[0], reading, &limits, pool, problems, err);
     *fits = status == STATUS_OK && room.fit.verdict != FIT_NO;
     if (status == STATUS_OK) {
-        status = find_facts(a, &room, pool, &facts, err);
+        status = find_facts(a, &room, settings, pool, &facts, err);
     } else if (as_json) {
         facts = cJSON_CreateObject();
         json_add(facts, "problems", cJSON_Duplicate(problems, true));
@@ -127,7 +130,8 @@ int check_command(int argc, char **argv) {
     struct arguments a;
     struct error err;
     struct reading reading = reading_default();
-    cJSON *given = NULL, *settings = NULL;
+    struct settings settings;
+    cJSON *given = NULL, *wanted = NULL;
     bool fits = false;
     if (!arguments_read(&a, argc, argv, check_flags))
         return EXIT_USAGE;
@@ -139,19 +143,23 @@ int check_command(int argc, char **argv) {
         return COMMAND_MISUSED;
     enum status status = collect(&a, "--scene-set", reading_parse_assignment, &given, &err);
     if (status == STATUS_OK)
-        status = collect(&a, "--set", settings_parse_assignment, &settings, &err);
+        status = collect(&a, "--set", settings_parse_assignment, &wanted, &err);
     if (status == STATUS_OK)
         status = reading_parse(given, &reading, &err);
+    settings_init(&settings);
+    if (status == STATUS_OK)
+        status = settings_apply(&settings, wanted, NULL, &err);
     bool is_usage = status != STATUS_OK;
     if (status == STATUS_OK) {
         struct parallel *pool = parallel_new((int)threads);
-        status = check(&a, &reading, settings, pool, &fits, &err);
+        status = check(&a, &reading, &settings, pool, &fits, &err);
         parallel_free(pool);
     }
     if (status != STATUS_OK)
         fprintf(stderr, "unbaked check: %s\n", err.message);
     reading_release(&reading);
     cJSON_Delete(given);
-    cJSON_Delete(settings);
+    cJSON_Delete(wanted);
+    settings_release(&settings);
     return is_usage ? EXIT_USAGE : status == STATUS_OK && fits ? EXIT_SUCCESS : EXIT_FAILURE;
 }

@@ -8,6 +8,7 @@
 /* Standard deviations of the score for wrong poses. Among some 2,000 hypotheses the best wrong one reaches 3.5 by
  * chance. */
 #define SIGNIFICANT 6.0
+#define SUSPECTED 3.0
 /* A remedy agrees better by so many standard deviations (consistency_compare), and by this factor: small errors of
  * poses are no misfit. */
 #define REMEDY_SURE 5.0
@@ -84,7 +85,11 @@ static bool is_plain(const struct search_result *r) {
 static void judge_disagreement(struct fit_result *fit) {
     const struct photo_agreement *a = &fit->search.given;
     double expected = a->null_deviation > 0.0 ? EXPECTED_CORRELATION * a->shared_share / a->null_deviation : 0.0;
-    if (a->hit_share < HITS_FEW) {
+    bool agrees_in_part = a->z > SUSPECTED && a->correlation > CORRELATION_FITS;
+    if (a->hit_share < HITS_FEW && agrees_in_part) {
+        tell(fit, mem_printf("most rays miss the mesh, but the photographs seem to agree where they meet it: it may be "
+                             "incomplete"));
+    } else if (a->hit_share < HITS_FEW) {
         fit->verdict = FIT_NO;
         tell(fit, mem_printf("most rays miss the mesh, and no other axes, scale or order of the frames that were tried "
                              "(%zu) mend it: the poses may be of another place or origin",
@@ -93,7 +98,10 @@ static void judge_disagreement(struct fit_result *fit) {
         tell(fit, mem_printf("only %.0f %% of the photographs' area shows detail: whether they agree cannot be told",
                              100.0 * fit->detail));
     } else if (expected < POWER) {
-        tell(fit, mem_printf("the photographs see too few points in common: whether they agree cannot be told"));
+        tell(
+            fit,
+            mem_printf(
+                "the photographs, and the points that they have in common, are too few: whether they agree cannot be told"));
     } else {
         fit->verdict = FIT_NO;
         tell(fit, mem_printf("the photographs show detail and see common points, but do not agree about them, and no "

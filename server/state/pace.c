@@ -91,7 +91,7 @@ static void plan_texels(struct reconstruction *r, double valid) {
                     settings_number(r->settings, "detail_steps") * valid);
 }
 
-void pace_start(struct reconstruction *r, const struct reconstruct_hooks *hooks) {
+static void plan_all(struct reconstruction *r) {
     double pixels = 0.0, held_out = 0.0, every = settings_number(r->settings, "hold_out_every");
     plan_init(&r->plan, settings_number(r->settings, "time_limit_sec"));
     for (size_t i = 0; i < r->scene->photograph_count; i++) {
@@ -109,7 +109,17 @@ void pace_start(struct reconstruction *r, const struct reconstruct_hooks *hooks)
     const char *name = solves(r) ? "refine_looks" : "listing1_looks";
     plan_refine(r, windows * settings_number(r->settings, name), windows * settings_of_quality(r->settings, name));
     plan_report(r, held_out);
+}
+
+void pace_start(struct reconstruction *r, const struct reconstruct_hooks *hooks) {
+    plan_all(r);
     plan_pass_time(&r->plan, hooks->worked_sec(hooks->user)); /* reading the scene */
+}
+
+double pace_forecast_sec(const struct scene *scene, const struct settings *settings, struct parallel *pool) {
+    struct reconstruction r = {.scene = (struct scene *)scene, .settings = settings, .pool = pool}; /* is only read */
+    plan_all(&r);
+    return plan_left_sec(&r.plan);
 }
 
 void pace_measure_room(struct reconstruction *r) {

@@ -14,6 +14,8 @@
 
 /* Plans before the first stage, by the expected number of texels. */
 void pace_start(struct reconstruction *r, const struct reconstruct_hooks *hooks);
+/* What pace_start forecasts, without a job: seconds, with no time limit. */
+double pace_forecast_sec(const struct scene *scene, const struct settings *settings, struct parallel *pool);
 /* Reports the beginning of a stage and the time left. */
 void pace_begin_stage(struct reconstruction *r, const struct reconstruct_hooks *hooks, const char *stage);
 /* Plans again when the surface is mapped and its number of texels is known. */

@@ -7,10 +7,12 @@
 #include <unistd.h>
 
 #include "common/file.h"
+#include "common/machine.h"
 #include "common/mem.h"
 #include "common/parallel.h"
 #include "server/data/layout.h"
 #include "server/check/check_pictures.h"
+#include "server/check/check_table.h"
 #include "server/ingest/facts.h"
 #include "server/ingest/pixels.h"
 #include "server/worker/pixel_memory.h"
@@ -45,12 +47,22 @@ static void tell_warnings(struct progress *progress, const struct scene *scene) 
     progress_scene(progress, facts);
 }
 
+/* What a job may use; 0 where that is not known. */
+static double memory_of_jobs(const struct order *order) {
+    uint64_t available = machine_memory_available("");
+    return (double)(order->memory_bytes > 0 && order->memory_bytes < available ? order->memory_bytes : available);
+}
+
 /* The facts, with the pictures that were drawn of them. */
 static enum status tell_facts(struct progress *progress, const struct order *order, const struct scene_check *room,
                               struct parallel *pool, struct error *err) {
     char *previews = layout_previews(order->dir);
     cJSON *facts = facts_of(&room->scene);
+    struct settings settings; /* of a job for which nothing is set */
+    settings_init(&settings);
     scene_check_facts(room, facts);
+    check_table_add(facts, room, &settings, memory_of_jobs(order), pool);
+    settings_release(&settings);
     enum status status = file_make_dirs(previews, err);
     if (status == STATUS_OK)
         status = check_pictures_write(room, previews, pool, cJSON_AddArrayToObject(facts, "previews"), err);

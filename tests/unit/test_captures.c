@@ -2,14 +2,14 @@
  *
  * A line of captures.tsv is: capture, outcome, and what is named, apart by tabs. Outcomes are
  *
- *   ready    the bundle is read, and nothing of the third column need be said
- *   warns    the bundle is read, with a warning that has the third column in it
- *   remedy   the bundle is read, and the check of fit says or takes the third column, a remedy; here only that it is read
+ *   ready    the bundle is read and its mesh and photographs fit, and nothing of the third column need be said
+ *   warns    the same, with a warning that has the third column in it
+ *   remedy   the bundle is read, and the check of fit says or takes the third column
  *   refused  a problem has the third column in it, in its file, reason or hint
  *
  * Who changes what becomes of one changes its line: UNBAKE_CAPTURES=print makes this test print all of them, with what
  * was said in full. */
-#include "server/ingest/bundle.h"
+#include "server/check/scene_check.h"
 
 #include "common/file.h"
 #include "common/mem.h"
@@ -24,22 +24,37 @@ static const char *data_folder(void) {
 
 struct outcome {
     bool is_ready;
+    bool fits;  /* as it was given */
     char *said; /* warnings, or problems as JSON */
     char *source;
 };
 
+/* What the check says where the capture does not fit. */
+static void say_fit(const struct scene_check *room, struct buf *said) {
+    cJSON *facts = cJSON_CreateObject();
+    scene_check_facts(room, facts);
+    const cJSON *fit = cJSON_GetObjectItem(facts, "fit"), *evidence = cJSON_GetObjectItem(fit, "evidence");
+    const char *remedy = cJSON_GetStringValue(cJSON_GetObjectItem(fit, "remedy_text"));
+    if (room->fit.verdict == FIT_NO || room->was_taken)
+        buf_printf(said, " | %s",
+                   remedy ? remedy
+                          : cJSON_GetStringValue(cJSON_GetArrayItem(evidence, cJSON_GetArraySize(evidence) - 1)));
+    cJSON_Delete(facts);
+}
+
 static struct outcome load(const char *name, struct parallel *pool) {
     struct bundle_limits limits = bundle_default_limits();
-    struct scene scene;
+    struct scene_check room;
+    struct reading reading = reading_default();
     struct error err = {.message = ""};
     struct buf said;
     cJSON *problems = cJSON_CreateArray(), *problem;
     char *dir = mem_printf("%s/captures/%s", data_folder(), name);
-    enum status status = bundle_load(dir, NULL, &limits, pool, &scene, problems, &err);
+    enum status status = scene_check(&room, dir, &reading, &limits, pool, problems, &err);
     CHECK_THAT(status == STATUS_OK || status == STATUS_INPUT, "%s: %s", name, err.message);
     buf_init(&said, 1 << 20);
-    for (size_t i = 0; i < scene.warning_count; i++)
-        buf_printf(&said, "%s%s", i ? " | " : "", scene.warning[i]);
+    for (size_t i = 0; i < room.scene.warning_count; i++)
+        buf_printf(&said, "%s%s", i ? " | " : "", room.scene.warning[i]);
     cJSON_ArrayForEach(problem, problems) {
         static const char *const members[] = {"file", "reason", "hint"};
         for (int i = 0; i < 3; i++) {
@@ -47,11 +62,13 @@ static struct outcome load(const char *name, struct parallel *pool) {
             buf_printf(&said, "%s%s", i ? ": " : problem->prev != problem ? " | " : "", text ? text : "");
         }
     }
-    struct outcome outcome = {status == STATUS_OK, mem_strdup(buf_text(&said)),
-                              mem_strdup(scene.source ? scene.source : "")};
+    if (status == STATUS_OK)
+        say_fit(&room, &said);
+    struct outcome outcome = {status == STATUS_OK, room.fit.verdict != FIT_NO && !room.was_taken,
+                              mem_strdup(buf_text(&said)), mem_strdup(room.scene.source ? room.scene.source : "")};
     CHECK_THAT(!strstr(outcome.said, dir), "%s tells where the bundle lies: %s", name, outcome.said);
     buf_release(&said);
-    scene_release(&scene);
+    scene_check_release(&room);
     cJSON_Delete(problems);
     mem_free(dir);
     return outcome;
@@ -60,11 +77,13 @@ static struct outcome load(const char *name, struct parallel *pool) {
 static void check_line(char *line, struct parallel *pool, bool prints) {
     char *name = strsep(&line, "\t"), *wanted = strsep(&line, "\t"), *part = line ? line : (char *)"";
     struct outcome o = load(name, pool);
-    bool is_refused = wanted && strcmp(wanted, "refused") == 0,
-         must_say = is_refused || (wanted && strcmp(wanted, "warns") == 0);
+    bool is_refused = wanted && strcmp(wanted, "refused") == 0, has_remedy = wanted && strcmp(wanted, "remedy") == 0,
+         must_say = is_refused || has_remedy || (wanted && strcmp(wanted, "warns") == 0);
     if (prints)
         printf("%-28s %-8s %-16s %s\n", name, o.is_ready ? "ready" : "refused", o.source, o.said);
     CHECK_THAT(o.is_ready == !is_refused, "%s is %s: %s", name, o.is_ready ? "ready" : "refused", o.said);
+    CHECK_THAT(is_refused || o.fits == !has_remedy, "%s: mesh and photographs %s: %s", name,
+               o.fits ? "fit" : "do not fit", o.said);
     if (must_say)
         CHECK_THAT(part[0] && strstr(o.said, part), "%s does not say \"%s\": %s", name, part, o.said);
     else if (part[0] && strcmp(wanted, "ready") == 0)

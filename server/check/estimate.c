@@ -1,0 +1,28 @@
+/* estimate.c -- see estimate.h. */
+#include "server/check/estimate.h"
+
+#include <math.h>
+
+#include "common/spill.h"
+#include "server/state/pace.h"
+
+#define MIB 1048576.0
+#define BASE_BYTES (25.0 * MIB) /* program and libraries */
+#define TEXEL_BYTES 95.0        /* of the square */
+#define TRIANGLE_BYTES 500.0    /* mesh, acceleration structure, adjacency, charts */
+#define PIXEL_BYTES 25.0        /* 11 to 13 of a photograph with what is found of it, 14 while detail is solved */
+
+double estimate_memory_bytes(const struct scene *scene, double side) {
+    double pixels = 0.0;
+    for (size_t i = 0; i < scene->photograph_count; i++)
+        pixels += (double)scene->photograph[i].camera.width * (double)scene->photograph[i].camera.height;
+    double pixel_bytes = PIXEL_BYTES * pixels;
+    if (scene->spill)
+        pixel_bytes = fmin(pixel_bytes, (double)spill_memory_bytes(scene->spill));
+    return BASE_BYTES + pixel_bytes + TRIANGLE_BYTES * (double)scene->mesh.triangle_count + TEXEL_BYTES * side * side;
+}
+
+double estimate_time_sec(const struct scene *scene, const struct settings *settings, struct parallel *pool) {
+    double limit = settings_number(settings, "time_limit_sec"), sec = pace_forecast_sec(scene, settings, pool);
+    return limit > 0.0 ? fmin(limit, sec) : sec;
+}

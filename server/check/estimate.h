@@ -1,0 +1,21 @@
+/* estimate.h -- memory and time that a job on a scene will take.
+ *
+ * Memory is a sum of what grows with the photographs' pixels, with triangles and with texels; it was measured on rooms
+ * of 20,000 to 38 million pixels, 2,000 to 400,000 triangles and 256 to 8192 texels a side, and is right within a
+ * third. Time is the first forecast of a job (state/pace.h), which is right within a factor of two on machines like the
+ * one that it was measured on. */
+#ifndef UNBAKE_CHECK_ESTIMATE_H
+#define UNBAKE_CHECK_ESTIMATE_H
+
+#include "common/parallel.h"
+#include "common/settings.h"
+#include "server/scene/scene.h"
+
+/* Bytes at the peak, with textures of `side` texels a side. Pixels beyond the budget of the scene's spill lie on the
+ * disk. */
+double estimate_memory_bytes(const struct scene *scene, double side);
+
+/* Seconds with as many threads as the pool has; that of time_limit_sec where it is set and less. */
+double estimate_time_sec(const struct scene *scene, const struct settings *settings, struct parallel *pool);
+
+#endif
