@@ -28,6 +28,7 @@ static void start(void) {
     job_count = 0;
     MUST(store_open(&store, fuzz_folder(), NULL) == STATUS_OK);
     MUST(store_scene_add(store, SCENE, "room", 10, 0, &existed, NULL) == STATUS_OK);
+    MUST(store_scene_ready(store, SCENE, NULL, "{}", NULL) == STATUS_OK);
     char *out = file_join(fuzz_folder(), "out/preview"), *file = file_join(fuzz_folder(), "out/a.exr");
     MUST(file_make_dirs(out, NULL) == STATUS_OK);
     fuzz_write(file, (const uint8_t *)"0123456789", 10);
