@@ -7,9 +7,9 @@
 #include "server/state/pace.h"
 
 #define MIB 1048576.0
-#define BASE_BYTES (25.0 * MIB) /* program and libraries */
-#define TEXEL_BYTES 95.0        /* of the square */
-#define TRIANGLE_BYTES 500.0    /* mesh, acceleration structure, adjacency, charts */
+#define BASE_BYTES (40.0 * MIB) /* program and libraries */
+#define TEXEL_BYTES 100.0       /* of the square */
+#define TRIANGLE_BYTES 200.0    /* mesh, acceleration structure, adjacency, charts */
 #define PIXEL_BYTES 25.0        /* 11 to 13 of a photograph with what is found of it, 14 while detail is solved */
 
 double estimate_memory_bytes(const struct scene *scene, double side) {

@@ -1,9 +1,9 @@
 /* estimate.h -- memory and time that a job on a scene will take.
  *
- * Memory is a sum of what grows with the photographs' pixels, with triangles and with texels; it was measured on rooms
- * of 20,000 to 38 million pixels, 2,000 to 400,000 triangles and 256 to 8192 texels a side, and is right within a
- * third. Time is the first forecast of a job (state/pace.h), which is right within a factor of two on machines like the
- * one that it was measured on. */
+ * Memory is a sum of what grows with the photographs' pixels, with triangles and with texels. It was measured on rooms
+ * of .06 to 6 million pixels, 12 to 400,000 triangles and 256 to 2048 texels a side, where it is right within a
+ * quarter; beyond them it is taken to grow on. Time is the first forecast of a job (state/pace.h), which is right within
+ * a factor of two on machines like the one that it was measured on. */
 #ifndef UNBAKE_CHECK_ESTIMATE_H
 #define UNBAKE_CHECK_ESTIMATE_H
 

@@ -185,10 +185,8 @@ char *hypothesis_text(const struct hypothesis *h, const struct reading *loaded) 
         glue = ", ";
     }
     cJSON_ArrayForEach(member, before)
-        if (!cJSON_HasObjectItem(now, member->string)) {
-            buf_printf(&text, "%sno %s", glue, member->string);
-            glue = ", ";
-        }
+        if (!cJSON_HasObjectItem(now, member->string))
+            buf_printf(&text, "; give no %s", member->string);
     cJSON_Delete(now);
     cJSON_Delete(before);
     reading_release(&reading);

@@ -38,23 +38,36 @@ static bool respects(const struct reading *remedy, const struct reading *given) 
     return respected;
 }
 
+/* Where the bundle cannot be read by the remedy (coordinates out of range, say), it is read as it was given again. */
+static enum status give_back(struct scene_check *room, const char *dir, const struct bundle_limits *limits,
+                             struct parallel *pool, cJSON *problems, struct error *err) {
+    unload(room);
+    fit_release(&room->given);
+    reading_release(&room->reading);
+    room->reading = room->given_reading;
+    room->given_reading = reading_default();
+    room->was_taken = false;
+    return load(room, dir, limits, pool, problems, err);
+}
+
 static enum status take(struct scene_check *room, const char *dir, const struct bundle_limits *limits,
-                        struct parallel *pool, struct error *err) {
+                        struct parallel *pool, cJSON *problems, struct error *err) {
     struct reading remedy = hypothesis_reading(&room->fit.search.best, &room->reading);
     if (!respects(&remedy, &room->reading)) {
         reading_release(&remedy);
         return STATUS_OK;
     }
-    cJSON *problems = cJSON_CreateArray();
+    cJSON *ignored = cJSON_CreateArray();
     room->given = room->fit;
     room->fit = (struct fit_result){0};
     room->given_reading = room->reading;
     room->reading = remedy;
     room->was_taken = true;
     unload(room);
-    enum status status = load(room, dir, limits, pool, problems, err);
-    cJSON_Delete(problems);
-    return status;
+    enum status status = load(room, dir, limits, pool, ignored, err);
+    cJSON_Delete(ignored);
+    bool is_unreadable = status == STATUS_INPUT || status == STATUS_LIMIT;
+    return is_unreadable ? give_back(room, dir, limits, pool, problems, err) : status;
 }
 
 enum status scene_check(struct scene_check *room, const char *dir, const struct reading *reading,
@@ -62,7 +75,7 @@ enum status scene_check(struct scene_check *room, const char *dir, const struct 
     *room = (struct scene_check){.reading = reading_copy(reading), .given_reading = reading_default()};
     enum status status = load(room, dir, limits, pool, problems, err);
     if (status == STATUS_OK && room->fit.is_overwhelming)
-        status = take(room, dir, limits, pool, err);
+        status = take(room, dir, limits, pool, problems, err);
     return status;
 }
 
