@@ -61,7 +61,7 @@ static enum status read_frame(const struct source_place *place, const char *path
     const char *name = path_base(path);
     enum status status = json_file_read(place->listing, path, &tree, &own);
     for (int i = 0; i < 12; i++) {
-        char key[8];
+        char key[16];
         snprintf(key, sizeof key, "t_%d%d", i / 4, i % 4);
         m[i / 4][i % 4] = json_member(tree, key);
     }
