@@ -9,7 +9,7 @@
 #include "common/image.h"
 #include "common/mem.h"
 #include "server/http/listener.h"
-#include "server/ingest/gltf_meshopt.h"
+#include "server/ingest/mesh/gltf_meshopt.h"
 #include "server/render/accel.h"
 #include "server/store/store.h"
 

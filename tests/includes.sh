@@ -77,7 +77,7 @@ own 'jpeglib\.h' common/jpeg.c
 own 'libheif/' common/heif.c
 own 'tiffio\.h' common/tiff.h
 own 'webp/' common/webp.c
-own 'meshoptimizer' server/ingest/gltf_meshopt.c
+own 'meshoptimizer' server/ingest/mesh/gltf_meshopt.c
 own 'expat\.h' server/ingest/source/xml.c
 own 'seccomp\.h' server/worker/confine_calls.c
 

@@ -8,7 +8,7 @@
 #include "common/file.h"
 #include "common/image.h"
 #include "common/mem.h"
-#include "server/ingest/ply_header.h"
+#include "server/ingest/mesh/ply_header.h"
 
 #define PLY_LIMIT ((size_t)1 << 34)
 #define NO_TEXEL SIZE_MAX

@@ -9,7 +9,7 @@
 #include "common/json.h"
 #include "common/mem.h"
 #include "server/evaluate/recovered.h"
-#include "server/ingest/ply.h"
+#include "server/ingest/mesh/ply.h"
 #include "server/ingest/transforms.h"
 #include "server/render/film.h"
 #include "server/scene/latlong.h"

@@ -14,7 +14,7 @@
 #include "server/ingest/archive.h"
 #include "server/ingest/applied.h"
 #include "server/ingest/mesh_choice.h"
-#include "server/ingest/mesh_file.h"
+#include "server/ingest/mesh/mesh_file.h"
 #include "server/ingest/path.h"
 #include "server/ingest/photos.h"
 #include "server/ingest/reading_apply.h"

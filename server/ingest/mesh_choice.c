@@ -9,7 +9,7 @@
 #include "common/buf.h"
 #include "common/file.h"
 #include "common/mem.h"
-#include "server/ingest/mesh_file.h"
+#include "server/ingest/mesh/mesh_file.h"
 #include "server/ingest/path.h"
 #include "server/ingest/source/missing.h"
 

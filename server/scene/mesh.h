@@ -24,7 +24,7 @@ struct mesh {
     char **name;       /* [name_count] of the object with that object_id in the input; none: NULL; owned */
     size_t face_count; /* faces of the input, the dropped ones included */
     double offset[3];  /* metres, whole; a position plus this is where the input has it. 0 unless the input lies so far
-                       * from its origin that single precision would blur it (server/ingest/positions.h) */
+                       * from its origin that single precision would blur it (server/ingest/mesh/positions.h) */
 };
 
 struct mesh_report {

@@ -7,7 +7,7 @@
 
 #include "common/json.h"
 #include "common/mem.h"
-#include "server/ingest/mesh_file.h"
+#include "server/ingest/mesh/mesh_file.h"
 
 #define JSON_LIMIT ((size_t)1 << 30) /* bytes; our files are far smaller */
 

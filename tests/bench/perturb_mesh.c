@@ -26,7 +26,7 @@
 
 #include "common/mem.h"
 #include "common/rng.h"
-#include "server/ingest/ply.h"
+#include "server/ingest/mesh/ply.h"
 #include "server/scene/adjacency.h"
 #include "server/scene/mesh.h"
 

@@ -1,5 +1,5 @@
 /* test_gltf.c -- the glTF reader, and the mesh checks behind it, on damaged files. */
-#include "server/ingest/gltf.h"
+#include "server/ingest/mesh/gltf.h"
 
 #include "common/mem.h"
 #include "tests/fuzz/mesh.h"

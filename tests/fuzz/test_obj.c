@@ -1,5 +1,5 @@
 /* test_obj.c -- the OBJ reader, and the mesh checks behind it, on damaged files. */
-#include "server/ingest/obj.h"
+#include "server/ingest/mesh/obj.h"
 
 #include "tests/fuzz/mesh.h"
 

@@ -1,5 +1,5 @@
 /* test_ply.c -- the PLY reader, and the mesh checks behind it, on damaged files. */
-#include "server/ingest/ply.h"
+#include "server/ingest/mesh/ply.h"
 
 #include "tests/fuzz/mesh.h"
 

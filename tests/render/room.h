@@ -10,7 +10,7 @@
 #include "common/image.h"
 #include "common/json.h"
 #include "common/mem.h"
-#include "server/ingest/ply.h"
+#include "server/ingest/mesh/ply.h"
 #include "server/render/world.h"
 #include "server/scene/camera.h"
 #include "tests/check.h"

@@ -5,7 +5,7 @@
 #include <stdbool.h>
 
 #include "common/mem.h"
-#include "server/ingest/ply.h"
+#include "server/ingest/mesh/ply.h"
 #include "server/scene/mesh.h"
 #include "server/scene/segment.h"
 #include "tests/check.h"

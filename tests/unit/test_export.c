@@ -11,7 +11,7 @@
 #include "server/export/outputs.h"
 #include "server/export/pictures.h"
 #include "server/ingest/findings.h"
-#include "server/ingest/ply.h"
+#include "server/ingest/mesh/ply.h"
 #include "server/ingest/transforms.h"
 #include "tests/check.h"
 

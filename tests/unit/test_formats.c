@@ -16,7 +16,7 @@
 #include "server/export/mesh_obj.h"
 #include "server/export/pictures.h"
 #include "server/export/sink.h"
-#include "server/ingest/mesh_file.h"
+#include "server/ingest/mesh/mesh_file.h"
 #include "server/worker/read_back.h"
 #include "tests/check.h"
 

@@ -1,5 +1,5 @@
 /* The glTF reader: what it takes, what it refuses and where it says the fault lies. */
-#include "server/ingest/gltf.h"
+#include "server/ingest/mesh/gltf.h"
 
 #include "common/buf.h"
 #include "common/file.h"

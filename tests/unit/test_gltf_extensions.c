@@ -4,7 +4,7 @@
 #include "common/buf.h"
 #include "common/mem.h"
 #include "server/ingest/bundle.h"
-#include "server/ingest/gltf.h"
+#include "server/ingest/mesh/gltf.h"
 #include "tests/check.h"
 
 #define ASSET "\"asset\":{\"version\":\"2.0\"}"

@@ -1,7 +1,7 @@
 /* The OBJ reader: what it takes, what it refuses and where it says the fault lies. */
-#include "server/ingest/obj.h"
+#include "server/ingest/mesh/obj.h"
 
-#include "server/ingest/intern.h"
+#include "server/ingest/mesh/intern.h"
 #include "tests/check.h"
 
 #define SQUARE "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"

@@ -1,7 +1,7 @@
 /* The PLY reader: what it takes, what it refuses and where it says the fault lies. */
-#include "server/ingest/ply.h"
+#include "server/ingest/mesh/ply.h"
 
-#include "server/ingest/polygon.h"
+#include "server/ingest/mesh/polygon.h"
 #include "tests/check.h"
 
 #define CUBE_CORNERS "0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n1 0 1\n1 1 1\n0 1 1\n"

@@ -1,10 +1,10 @@
 /* Objects of OBJ and glTF files: their names, and materials that are only pages of a texture. */
-#include "server/ingest/texture_pages.h"
+#include "server/ingest/mesh/texture_pages.h"
 
 #include "common/file.h"
 #include "common/mem.h"
-#include "server/ingest/gltf.h"
-#include "server/ingest/obj.h"
+#include "server/ingest/mesh/gltf.h"
+#include "server/ingest/mesh/obj.h"
 #include "tests/check.h"
 
 #define TEXT(...) ((const char *const[]){__VA_ARGS__})

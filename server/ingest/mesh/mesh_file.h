@@ -1,0 +1,34 @@
+/* mesh_file.h -- reads a mesh in any supported format, chosen by the file's extension. */
+#ifndef UNBAKE_INGEST_MESH_MESH_FILE_H
+#define UNBAKE_INGEST_MESH_MESH_FILE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "common/error.h"
+#include "server/ingest/mesh/faces.h"
+#include "server/ingest/findings.h"
+#include "server/scene/mesh.h"
+
+#define MESH_FILE_FORMATS "PLY, OBJ or glTF" /* for messages */
+
+/* Whether the name has an extension of a supported format. */
+bool mesh_file_is_known(const char *name);
+
+/* As ply_read; unknown extensions are read as PLY. */
+enum status mesh_file_read(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
+                           struct faces_report *report, struct error *err);
+
+/* Warns of what was left out or changed: by the reader (report) and by mesh_check (check). */
+void mesh_file_warn(const char *name, const struct mesh *mesh, const struct faces_report *report,
+                    const struct mesh_report *check, struct findings *f);
+
+/* *has: false for a point cloud. Files that would have to be read whole to know, or are damaged, count as meshes, so
+ * that reading them reports the error. Fails only on I/O errors. */
+enum status mesh_file_has_faces(const char *path, const char *name, bool *has, struct error *err);
+
+/* Faces of a PLY file; 1 where the file is damaged, so that reading it reports the error. */
+enum status mesh_file_count_faces(const char *path, const char *name, uint64_t *count, struct error *err);
+
+#endif

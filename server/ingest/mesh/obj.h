@@ -1,0 +1,24 @@
+/* obj.h -- reads meshes from Wavefront OBJ files (appendix B1 of the Advanced Visualizer manual; polygons only, as
+ * programs write them).
+ *
+ * Reads v (x y z), vn, f with indices from 1 or negative from the last, and the names of o, g and usemtl; skips
+ * texture coordinates, materials, lines, points and curves. Lines end in LF, CR LF or CR; a byte order mark is skipped. A
+ * mesh vertex is a pair of position and normal; normals are used if every corner of every face has one that is above it
+ * in the file. Each combination of object, group and material with faces is an
+ * object_id with that name, numbered from 0 in order of first use (obj_objects.h); no object_id if there is only one. */
+#ifndef UNBAKE_INGEST_MESH_OBJ_H
+#define UNBAKE_INGEST_MESH_OBJ_H
+
+#include <stddef.h>
+
+#include "common/error.h"
+#include "server/ingest/mesh/faces.h"
+#include "server/scene/mesh.h"
+
+/* As ply_read and ply_parse; `folder` has the file's library of materials, NULL: none. Damage is STATUS_INPUT with the line of the file. */
+enum status obj_read(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
+                     struct faces_report *report, struct error *err);
+enum status obj_parse(const void *data, size_t size, const char *name, const char *folder, size_t triangle_limit,
+                      struct mesh *mesh, struct faces_report *report, struct error *err);
+
+#endif
