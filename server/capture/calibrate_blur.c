@@ -7,7 +7,7 @@
 #include "common/mem.h"
 
 /* That show a track, to compare one with the median of the others; by hand; +25 %: no change. */
-#define MIN_PHOTOGRAPHS 4
+#define MIN_PHOTOGRAPHS 4   /* +25 %: no change */
 #define MIN_OBSERVATIONS 60 /* of tracks, for a photograph to be judged; by hand; +25 %: no change */
 /* Standard deviation of a sharp photograph's blur at level 0, pixels of that level: pixel area, lens and the pyramid's
  * binomial. */

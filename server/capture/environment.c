@@ -19,7 +19,7 @@
 #define FAR_M 1e6f
 /* Places over a cell, along each side, at most. */
 /* Sample points along each side of a pixel of the map, at most; by hand; +25 %: no change. */
-#define MAX_GRID 4
+#define MAX_GRID 4 /* +25 %: no change */
 /* Weight of a look-up within a pixel of the opening's rim, where slightly wrong poses mix light and frame. By hand. */
 #define RIM_WEIGHT 0.1f /* +25 %: no change */
 /* Standard deviations of normal values in their median absolute deviation; +25 %: no change. */

@@ -31,8 +31,8 @@
 #define CONVEX_ROUNDS 4 /* the first of them, with convex weights; by hand; +25 %: no change */
 /* Standard deviations of normal residuals in their median absolute deviation; +25 %: no change. */
 #define DEVIATIONS_PER_MAD 1.48
-#define CG_STEPS 60       /* of conjugate gradients a round, at most; +25 %: no change */
-#define CG_TOLERANCE 1e-7 /* of the residual's norm, over that of the right-hand side; +25 %: no change */
+#define CG_STEPS 60       /* of conjugate gradients a round, at most */
+#define CG_TOLERANCE 1e-7 /* of the residual's norm, over that of the right-hand side */
 
 void light_fit_init(struct light_fit *f, const struct views *views, const struct overlaps *o) {
     size_t observations = o->start[o->point_count];

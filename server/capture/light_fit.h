@@ -15,7 +15,7 @@
 #define LIGHT_HELD_OUT_EVERY 4 /* one point in four is held out; by hand; +25 %: no change */
 
 /* Inverse square of the Cauchy scale: two standard deviations; by hand; +25 %: no change. */
-#define LIGHT_CAUCHY 0.25
+#define LIGHT_CAUCHY 0.25 /* +25 %: no change */
 
 /* A model is a set of faults; parameters of the others are held at 0. */
 enum { LIGHT_DRIFT = 1, LIGHT_COLOR = 2, LIGHT_VIGNETTE = 4, LIGHT_FAULTS = 8 };

@@ -11,9 +11,9 @@
 #define MIN_EXPONENT (-24) /* first octave: from 2^-24, the smallest half */
 #define SAMPLES 8192       /* differences kept for each octave; by hand; +25 %: 0 dB */
 /* An octave with fewer takes the share of the one below; by hand; +25 %: no change. */
-#define MIN_SAMPLES 512
+#define MIN_SAMPLES 512 /* +25 %: no change */
 /* Of the differences: below the median, which texture raises; by hand; +25 %: +0.05 dB. */
-#define QUANTILE 0.25
+#define QUANTILE 0.25               /* +25 %: +0.05 dB */
 #define QUANTILE_DEVIATIONS 0.3186f /* that quantile of |x| for standard normal x; +25 %: -0.06 dB */
 /* Var(b - (a + c) / 2) over that of one pixel. */
 #define DIFFERENCE_VARIANCE 1.5f /* +25 %: -0.01 dB */
@@ -24,7 +24,7 @@
  * With clipped values read as minus this, the error is .1 at most in both directions. */
 #define BLACK_DEVIATIONS 0.6f /* +25 %: no change */
 /* Floor of the relative deviation: errors of poses and colours; by hand; +25 %: no change. */
-#define MIN_SHARE 0.01f
+#define MIN_SHARE 0.01f /* +25 %: no change */
 /* Blocks: least number of differences, and bounds of the factor; by hand. */
 #define MIN_DIFFERENCES 64        /* +25 %: 0 dB */
 #define MEDIAN_DEVIATIONS 0.6745f /* median of |x| for standard normal x; +25 %: +0.04 dB */

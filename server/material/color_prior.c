@@ -12,13 +12,13 @@
  * of a black window frame must outweigh many that are mixed with the bright window. */
 #define MIXING_FLOOR 0.001 /* +25 %: -0.01 dB */
 /* Lower bound of a prior's variance, summed over the channels; +25 %: no change. */
-#define MIN_VARIANCE 1e-4f
+#define MIN_VARIANCE 1e-4f /* +25 %: no change */
 /* Cleanly measured share of a segment's texels at which its own mean and its surroundings count alike. */
 #define SHARE_KNOWN 0.003 /* +25 %: -0.02 dB */
 #define MIN_WEIGHT 8.0    /* clean texels in a cube from which it is used; +25 %: 0 dB */
 #define STRIDE 3          /* every third valid texel is used, for time; to 4: 0 dB */
 /* Grids; the finest has 2^(LEVELS - 1) cubes along the longest side of the room; to 8: no change. */
-#define LEVELS 7
+#define LEVELS 7 /* to 8: no change */
 
 /* Weighted sums over measured texels. */
 struct chart_evidence {

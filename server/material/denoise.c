@@ -13,9 +13,9 @@
 #define TILE 512      /* texels a side; does not change results */
 #define FINE_LEVELS 5 /* scales of 1 to 16 texels, filtered by tiles; the rest on the grid; to 6: 0 dB */
 /* Largest radius of the window over which power is averaged, texels; +25 %: no change. */
-#define FINE_WINDOW 80
+#define FINE_WINDOW 80 /* +25 %: no change */
 /* Texels between samples of the coarse scales: a quarter of the finest one's step; +25 %: 0 dB. */
-#define GRID 8
+#define GRID 8           /* +25 %: 0 dB */
 #define COARSE_WINDOW 24 /* the same radius on the coarse scales, samples of the grid; +25 %: no change */
 #define COARSE_STEP ((1 << FINE_LEVELS) / GRID) /* samples: step of the first coarse level */
 

@@ -23,23 +23,23 @@
 #define KEY_DIVIDE 5            /* random-number key, distinct from others of the texel */
 /* Deviation from the median, in the logarithm of base colour, at which an observation has half its weight; dark base
  * colours have OUTLIER_FLOOR added first. */
-#define OUTLIER_SCALE 0.3f /* +25 %: -0.01 dB */
-#define OUTLIER_FLOOR 0.03f
+#define OUTLIER_SCALE 0.3f  /* +25 %: -0.01 dB */
+#define OUTLIER_FLOOR 0.03f /* +25 %: 0 dB */
 /* Part of the expected radiance that is highlight at which an observation has half its weight; least base colour that
  * the expectation assumes. */
-#define HIGHLIGHT_PART 0.2f
-#define MIN_TYPICAL 0.02f
+#define HIGHLIGHT_PART 0.2f /* +25 %: -0.01 dB */
+#define MIN_TYPICAL 0.02f   /* +25 %: no change */
 /* Base colour assumed for the noise weights. With a texel's own, bright texels would outweigh dark ones wherever
  * neighbours are averaged, and dark tiles between white joints would turn grey. */
-#define TYPICAL_BASE_COLOR 0.5f
+#define TYPICAL_BASE_COLOR 0.5f /* +25 %: +0.02 dB */
 /* Lower bounds of Lambert radiance, parts of the median radiance: of the divisor, and for use by detail.h. */
-#define MIN_LAMBERT 1e-4f
-#define MIN_LAMBERT_DETAIL 1e-3f
+#define MIN_LAMBERT 1e-4f        /* +25 %: no change */
+#define MIN_LAMBERT_DETAIL 1e-3f /* +25 %: no change */
 /* Bound of one observation's base colour, against division by almost nothing. */
-#define MAX_ALBEDO 4.0f
+#define MAX_ALBEDO 4.0f /* +25 %: 0 dB */
 /* Variance by light of other surfaces at which a measured base colour and the denoised one count alike in outgoing
  * radiance. */
-#define MIXING_HALF 0.01f
+#define MIXING_HALF 0.01f /* +25 %: 0 dB */
 
 size_t divide_highlight_samples(double texels_per_pixel) {
     double samples = SAMPLES_PER_PIXEL / fmax(texels_per_pixel, 1.0);

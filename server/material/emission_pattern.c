@@ -12,19 +12,20 @@
 #include "server/state/evidence.h"
 
 /* Least texels, and least measured share of them, for a pattern. By hand. */
-#define MIN_TEXELS 64
-#define MIN_MEASURED 0.3
+#define MIN_TEXELS 64    /* +25 %: no change */
+#define MIN_MEASURED 0.3 /* +25 %: no change */
 /* Standard deviation over mean from which an emitter has a pattern. Evenly bright lamps and windows have .001 to .017
  * in six rooms, noise included. */
-#define MIN_CONTRAST 0.1
+#define MIN_CONTRAST 0.1 /* +25 %: no change */
 /* Part of an emitter's surface that may show less than its base colour reflects: outliers. */
-#define DARK_OUTLIERS 0.02
+#define DARK_OUTLIERS 0.02 /* +25 %: no change */
 /* Deviation from the median, in the logarithm of radiance, at which an observation has half its weight. */
-#define OUTLIER_SCALE 0.3f
+#define OUTLIER_SCALE 0.3f /* +25 %: no change */
 /* Of a screen whose picture changes, observations further from the median than this are dropped. */
-#define MAX_SCREEN_DEVIATION 0.7f
-#define LOG_FLOOR 0.01f /* added before a logarithm is taken; part of the segment's radiance */
-#define CHUNK 64        /* texels a work item */
+#define MAX_SCREEN_DEVIATION 0.7f /* +25 %: no change */
+/* Added before a logarithm is taken; part of the segment's radiance; +25 %: no change. */
+#define LOG_FLOOR 0.01f
+#define CHUNK 64 /* texels a work item */
 
 struct finder;
 

@@ -5,7 +5,7 @@
 #include "server/capture/halves.h"
 
 /* Exponent of the weights for the robust median: one sharp observation of a highlight must not outvote all others. */
-#define TRUST 0.5f
+#define TRUST 0.5f /* +25 %: -0.02 dB */
 
 struct measured measured_mean(struct measured_observations *observations, float scale, rgb common_noise) {
     struct measured m = {.weight = robust_weigh(observations->observation, observations->count, TRUST, scale)};

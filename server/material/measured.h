@@ -22,7 +22,7 @@ static inline rgb measured_value(const struct measured *m) { return rgb_from_hal
 /* Observations of one texel, one a photograph, of at most this many photographs: those of the greatest weights
  * (best.h). The limit bounds the time of highlights, and memory to 3 KiB a thread. In redkitchen 18 % of the observed
  * triangles have more; keeping the best instead of the first gains .09 dB of its held-out views. */
-#define MEASURED_OBSERVATIONS 48
+#define MEASURED_OBSERVATIONS 48 /* +25 %: no change */
 struct measured_observations {
     size_t count;
     struct robust_sample observation[MEASURED_OBSERVATIONS];
