@@ -17,8 +17,9 @@
 #include "common/image_codec.h"
 #include "common/mem.h"
 
-/* An empty picture of 12 MP takes some hundred bytes in either codec. More pixels a byte are no photograph. */
-#define MAX_PIXELS_PER_BYTE 65536
+/* A picture of one colour has 10,169 pixels a byte as AVIF (12 MP, libaom) and 1,546 as HEIC (x265); a photograph has
+ * noise. Bounds the memory that a small file can ask for. */
+#define MAX_PIXELS_PER_BYTE 16384
 /* Side of a square of IMAGE_MAX_PIXELS, rounded down: as libheif wants its limit. Grids may be as large in all. */
 #define LIMIT_SIDE 23170
 /* Bytes of the largest ICC profile and EXIF block that are looked at. */

@@ -15,8 +15,9 @@
 
 /* Largest allocation of the library: of one compressed strip or tile, or a tag. */
 #define MAX_ALLOCATION ((tmsize_t)1 << 31)
-/* LZMA and Zstandard compress an empty picture to nothing. More pixels a byte are no photograph. */
-#define MAX_PIXELS_PER_BYTE 65536
+/* LZMA and Zstandard compress a picture of one colour to nothing; a photograph has noise. Bounds the memory that a small
+ * file can ask for. */
+#define MAX_PIXELS_PER_BYTE 16384
 /* Directories that are looked at for one that is no thumbnail; and of a raw file. */
 #define MAX_DIRECTORIES 16
 #define PHOTOMETRIC_LINEAR_RAW 34892 /* DNG 1.4, chapter 4 */

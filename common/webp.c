@@ -15,8 +15,9 @@
 #define FILE_MAX ((uint64_t)1 << 30)
 /* Enough for the headers. */
 #define HEADER_BYTES 4096
-/* An empty picture of 12 MP takes some hundred bytes. More pixels a byte are no photograph. */
-#define MAX_PIXELS_PER_BYTE 65536
+/* A picture of one colour has 561 pixels a byte (12 MP), more when lossless; a photograph has noise. Bounds the memory
+ * that a small file can ask for. */
+#define MAX_PIXELS_PER_BYTE 16384
 
 static enum status refuse(const struct image_source *source, VP8StatusCode code, struct error *err) {
     if (code == VP8_STATUS_OUT_OF_MEMORY)

@@ -6,7 +6,8 @@
  * is_fisheye, exposure, exposure_time (s), iso, f_number. Per frame: file_path, transform_matrix, mask_path, split
  * (train, test, val), is_bad (left out). At the top level: test_frames, further ones that are held out;
  * applied_transform and applied_scale; `mesh` or ply_file_path; the lists train_filenames, val_filenames,
- * test_filenames. val counts as test. Everything else is ignored.
+ * test_filenames. val counts as test. Everything else is ignored. Numbers may be in quotes. w and h may be those of the
+ * picture at another scale, or turned upright (photo_fit.h).
  *
  * With a lens that is no fisheye, k4 is nerfstudio's, of the eighth power of the radius, unless k5 or k6 is there or
  * the model is FULL_OPENCV: then k4 to k6 are OpenCV's, of the denominator. */

@@ -28,7 +28,7 @@ for source in tests/fuzz/test_*.c; do
     "$build/tests/fuzz/test_$name" --seeds "$seeds" || continue
     case $name in # no longer than it takes to say all there is to say; the mutants of make test are longer
     archive) length=32768 ;;
-    bundle | exr | jpeg | png | progress) length=4096 ;;
+    bundle | exr | heif | jpeg | png | progress | tiff | webp) length=4096 ;;
     *) length=1024 ;;
     esac
     options=(-max_total_time="$seconds" -runs="$runs" -max_len=$length -timeout=60 -rss_limit_mb=3072
