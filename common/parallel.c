@@ -24,8 +24,6 @@ struct parallel {
     size_t count;
     void (*body)(void *user, size_t index, int thread);
     void *user;
-    void (*between)(void *user); /* NULL: nothing */
-    void *between_user;
 };
 
 static void run_indices(struct parallel *p, int slot) {
@@ -34,8 +32,6 @@ static void run_indices(struct parallel *p, int slot) {
         if (index >= p->count)
             return;
         p->body(p->user, index, slot);
-        if (p->between)
-            p->between(p->between_user);
     }
 }
 
@@ -109,11 +105,6 @@ void parallel_free(struct parallel *p) {
 }
 
 int parallel_thread_count(const struct parallel *p) { return p->thread_count; }
-
-void parallel_set_between(struct parallel *p, void (*between)(void *user), void *user) {
-    p->between = between;
-    p->between_user = user;
-}
 
 void parallel_for(struct parallel *p, size_t count, void (*body)(void *user, size_t index, int thread), void *user) {
     p->count = count;

@@ -16,9 +16,6 @@ struct parallel *parallel_new(int thread_count);
 void parallel_free(struct parallel *pool);
 int parallel_thread_count(const struct parallel *pool);
 
-/* From now on between(user) is called after each body, by the thread that ran it. */
-void parallel_set_between(struct parallel *pool, void (*between)(void *user), void *user);
-
 /* Calls body(user, index, thread) for every index in [0, count), each once; returns when all
  * have returned. thread is in [0, thread_count) and names a slot for scratch memory: no two
  * bodies with the same slot run at once. Not reentrant: a body must not call it. */

@@ -5,6 +5,9 @@
  *
  *      0 ............ used ............ reserved
  *        arrays            reserved
+ *
+ * The keeper is a thread beside those of parallel.h: readers are loops of any kind, of which the longest would not come to
+ * ask for it (one item of a parallel loop may look at all photographs).
  */
 #include "common/spill.h"
 
@@ -12,7 +15,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <pthread.h>
-#include <stdatomic.h>
+#include <signal.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -24,7 +27,7 @@
 #include "common/file.h"
 #include "common/mem.h"
 
-/* Time between two looks at what is mapped. A disk of 2 GB/s maps 20 MB in between. */
+/* Time between two looks at what is mapped. A disk of 2 GB/s maps 20 MB in between. A look takes some microseconds. */
 #define TRIM_INTERVAL_MS 10
 /* Unmapped at once, and the part of the budget that a trim frees: unmapped pages that are still in the kernel's cache
  * are mapped again for about a microsecond per 64 KiB. By hand. */
@@ -55,8 +58,9 @@ struct spill {
     struct array *array; /* [count] */
     size_t hand;         /* array at which the next trim goes on */
     size_t hand_offset;  /* and the byte in it */
-    atomic_bool has_file;
-    atomic_long trimmed_ms; /* when mapped pages were looked at last */
+    bool has_keeper, stopping;
+    pthread_t keeper;
+    pthread_cond_t stop;
 };
 
 static uint64_t file_rss(const struct spill *s) {
@@ -77,7 +81,12 @@ struct spill *spill_new(const char *dir, const struct spill_limits *limits) {
     s->statm = open("/proc/self/statm", O_RDONLY | O_CLOEXEC);
     s->base_rss = file_rss(s);
     s->fd = -1;
+    pthread_condattr_t monotonic;
+    pthread_condattr_init(&monotonic);
+    pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
     pthread_mutex_init(&s->mutex, NULL);
+    pthread_cond_init(&s->stop, &monotonic);
+    pthread_condattr_destroy(&monotonic);
     return s;
 }
 
@@ -85,6 +94,13 @@ void spill_free(struct spill *s) {
     if (!s)
         return;
     assert(s->count == 0);
+    pthread_mutex_lock(&s->mutex);
+    s->stopping = true;
+    pthread_cond_signal(&s->stop);
+    pthread_mutex_unlock(&s->mutex);
+    if (s->has_keeper)
+        pthread_join(s->keeper, NULL);
+    pthread_cond_destroy(&s->stop);
     if (s->fd >= 0)
         close(s->fd);
     if (s->statm >= 0)
@@ -93,6 +109,75 @@ void spill_free(struct spill *s) {
     mem_free(s->array);
     mem_free(s->dir);
     mem_free(s);
+}
+
+/* --- the budget ----------------------------------------------------------------------------------- */
+
+/* Unmaps the next step's worth of pages, and has the disk write what is changed of them. Returns the bytes passed over:
+ * 0 at the end of the last array. */
+static size_t unmap_step(struct spill *s) {
+    while (s->hand < s->count && (s->array[s->hand].offset < 0 || s->hand_offset >= s->array[s->hand].bytes)) {
+        s->hand++;
+        s->hand_offset = 0;
+    }
+    if (s->hand >= s->count) {
+        s->hand = 0;
+        s->hand_offset = 0;
+        return 0;
+    }
+    const struct array *a = &s->array[s->hand];
+    size_t left = a->bytes - s->hand_offset, step = left < TRIM_STEP ? left : TRIM_STEP;
+    madvise(a->base + s->hand_offset, step, MADV_DONTNEED);
+    /* Pages that are clean by the time memory is short can be dropped without waiting for the disk. */
+    (void)sync_file_range(s->fd, a->offset + (off_t)s->hand_offset, (off_t)step, SYNC_FILE_RANGE_WRITE);
+    s->hand_offset += step;
+    return step;
+}
+
+static void trim(struct spill *s) {
+    uint64_t budget = s->limits.memory_bytes, least = budget / LEAST_SHARE;
+    budget = budget > s->memory + least ? budget - s->memory : least;
+    uint64_t mapped = file_rss(s), goal = s->base_rss + budget;
+    if (mapped <= goal)
+        return;
+    goal -= budget / TRIM_SHARE;
+    uint64_t all = s->used, passed = 0;
+    bool wrapped = false;
+    while (passed <= all && file_rss(s) > goal) {
+        size_t step = unmap_step(s);
+        passed += step;
+        if (step == 0 && wrapped)
+            break;
+        wrapped = wrapped || step == 0;
+    }
+}
+
+static void *keep(void *argument) {
+    struct spill *s = argument;
+    struct timespec next;
+    pthread_mutex_lock(&s->mutex);
+    while (!s->stopping) {
+        clock_gettime(CLOCK_MONOTONIC, &next);
+        next.tv_nsec += TRIM_INTERVAL_MS * 1000000L;
+        next.tv_sec += next.tv_nsec / 1000000000L;
+        next.tv_nsec %= 1000000000L;
+        pthread_cond_timedwait(&s->stop, &s->mutex, &next);
+        trim(s);
+    }
+    pthread_mutex_unlock(&s->mutex);
+    return NULL;
+}
+
+static enum status start_keeper(struct spill *s, struct error *err) {
+    sigset_t all, old;
+    if (s->has_keeper)
+        return STATUS_OK;
+    sigfillset(&all); /* signals are the main thread's business */
+    pthread_sigmask(SIG_SETMASK, &all, &old);
+    int failure = pthread_create(&s->keeper, NULL, keep, s);
+    pthread_sigmask(SIG_SETMASK, &old, NULL);
+    s->has_keeper = failure == 0;
+    return failure == 0 ? STATUS_OK : error_set_errno(err, failure, "cannot start the thread that keeps memory small");
 }
 
 /* --- the file ------------------------------------------------------------------------------------- */
@@ -141,6 +226,8 @@ static enum status grow_file(struct spill *s, const char *what, uint64_t more, s
     enum status status = open_file(s, err);
     if (status == STATUS_OK)
         status = check_room(s, what, more, err);
+    if (status == STATUS_OK)
+        status = start_keeper(s, err);
     if (status != STATUS_OK)
         return status;
     int failure;
@@ -158,7 +245,6 @@ static enum status grow_file(struct spill *s, const char *what, uint64_t more, s
         return err->status;
     }
     s->reserved += more;
-    atomic_store(&s->has_file, true);
     return STATUS_OK;
 }
 
@@ -252,65 +338,6 @@ void spill_give(struct spill *s, void *array) {
     } else {
         mem_free(array);
     }
-    pthread_mutex_unlock(&s->mutex);
-}
-
-/* --- the budget ----------------------------------------------------------------------------------- */
-
-/* Unmaps the next step's worth of pages, and has the disk write what is changed of them. Returns the bytes passed over:
- * 0 at the end of the last array. */
-static size_t unmap_step(struct spill *s) {
-    while (s->hand < s->count && (s->array[s->hand].offset < 0 || s->hand_offset >= s->array[s->hand].bytes)) {
-        s->hand++;
-        s->hand_offset = 0;
-    }
-    if (s->hand >= s->count) {
-        s->hand = 0;
-        s->hand_offset = 0;
-        return 0;
-    }
-    const struct array *a = &s->array[s->hand];
-    size_t left = a->bytes - s->hand_offset, step = left < TRIM_STEP ? left : TRIM_STEP;
-    madvise(a->base + s->hand_offset, step, MADV_DONTNEED);
-    /* Pages that are clean by the time memory is short can be dropped without waiting for the disk. */
-    (void)sync_file_range(s->fd, a->offset + (off_t)s->hand_offset, (off_t)step, SYNC_FILE_RANGE_WRITE);
-    s->hand_offset += step;
-    return step;
-}
-
-static void trim(struct spill *s) {
-    uint64_t budget = s->limits.memory_bytes, least = budget / LEAST_SHARE;
-    budget = budget > s->memory + least ? budget - s->memory : least;
-    uint64_t mapped = file_rss(s), goal = s->base_rss + budget;
-    if (mapped <= goal)
-        return;
-    goal -= budget / TRIM_SHARE;
-    uint64_t all = s->used, passed = 0;
-    bool wrapped = false;
-    while (passed <= all && file_rss(s) > goal) {
-        size_t step = unmap_step(s);
-        passed += step;
-        if (step == 0 && wrapped)
-            break;
-        wrapped = wrapped || step == 0;
-    }
-}
-
-static long now_ms(void) {
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC_COARSE, &now);
-    return (long)now.tv_sec * 1000 + now.tv_nsec / 1000000;
-}
-
-void spill_trim(struct spill *s) {
-    if (!s || !atomic_load_explicit(&s->has_file, memory_order_relaxed))
-        return;
-    long now = now_ms(), last = atomic_load_explicit(&s->trimmed_ms, memory_order_relaxed);
-    if (now - last < TRIM_INTERVAL_MS || !atomic_compare_exchange_strong(&s->trimmed_ms, &last, now))
-        return;
-    if (pthread_mutex_trylock(&s->mutex) != 0)
-        return;
-    trim(s);
     pthread_mutex_unlock(&s->mutex);
 }
 

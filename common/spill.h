@@ -5,8 +5,8 @@
  *
  * The file has no name (it is removed as soon as it is open), so nothing is left of it when the process ends, however
  * it ends. Its blocks are allocated when space is reserved: a full disk is an error there, never a signal at a later
- * store. Pages of it count as this process's memory while they are mapped; spill_trim unmaps what is beyond the budget.
- * The kernel keeps such pages as its cache while memory is free and drops them when it is not.
+ * store. Pages of it count as this process's memory while they are mapped; a thread unmaps what is beyond the budget, whoever
+ * reads. The kernel keeps such pages as its cache while memory is free and drops them when it is not.
  *
  * A disk that fails at reading ends the process (SIGBUS), as failing memory does. */
 #ifndef UNBAKE_COMMON_SPILL_H
@@ -39,10 +39,6 @@ enum status spill_reserve(struct spill *s, const char *what, size_t count, uint6
 void *spill_take(struct spill *s, size_t count, size_t size);
 /* Of an array from spill_take of the same s, or from mem.h; NULL is fine. */
 void spill_give(struct spill *s, void *array);
-
-/* To be called now and then while arrays are read or written, from any thread, as often as one likes: unmaps pages of
- * the file where more than the budget is mapped. NULL is fine. */
-void spill_trim(struct spill *s);
 
 uint64_t spill_memory_bytes(const struct spill *s); /* the budget */
 uint64_t spill_file_bytes(struct spill *s);         /* space of the disk that the file takes; of NULL 0 */

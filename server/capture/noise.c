@@ -112,7 +112,6 @@ static void measure_shares(struct noise *noise, const struct views *v) {
         const struct photograph *photo = &v->scene->photograph[v->train[t]];
         for (uint32_t y = 0; y < photo->camera.height; y++)
             add_row(octaves, photo, v->edge[t], y);
-        spill_trim(v->scene->spill);
         rounded |= !photo->is_hdr;
     }
     float share = MAX_SHARE;
@@ -174,10 +173,8 @@ void noise_measure(struct noise *noise, const struct views *v) {
     *noise = (struct noise){.train_count = v->train_count};
     measure_shares(noise, v);
     noise->scale = mem_array(v->train_count, sizeof *noise->scale);
-    for (size_t t = 0; t < v->train_count; t++) {
+    for (size_t t = 0; t < v->train_count; t++)
         noise->scale[t] = measure_blocks(noise, &v->scene->photograph[v->train[t]], v->edge[t]);
-        spill_trim(v->scene->spill);
-    }
 }
 
 void noise_set_black(const struct noise *noise, struct scene *scene) {

@@ -166,7 +166,6 @@ void views_update_median(struct views *v) {
             if (photograph_sample(photo, x, y, &sample))
                 value[count++] = rgb_mean(sample.radiance);
         }
-        spill_trim(v->scene->spill);
     }
     float median = quantile(value, count, 0.5);
     v->median_radiance = median > 0.0f ? median : 1.0f;

@@ -97,7 +97,7 @@ static enum status find_facts(const struct arguments *a, const struct scene_chec
 static enum status check(const struct arguments *a, const struct reading *reading, const struct settings *settings,
                          struct parallel *pool, bool *fits, struct error *err) {
     struct bundle_limits limits = bundle_default_limits();
-    struct spill *pixels = pixels_new_temporary(pool);
+    struct spill *pixels = pixels_new_temporary();
     struct scene_check room;
     cJSON *problems = cJSON_CreateArray(), *facts = NULL;
     bool as_json = arguments_have(a, "--json");
@@ -120,7 +120,7 @@ static enum status check(const struct arguments *a, const struct reading *readin
     cJSON_Delete(facts);
     cJSON_Delete(problems);
     scene_check_release(&room);
-    pixels_free(pixels, pool);
+    spill_free(pixels);
     return status;
 }
 

@@ -318,7 +318,7 @@ enum status evaluate_outputs(const char *room, const char *outputs, const struct
     struct evaluator e = {.settings = settings, .pool = pool, .room = room};
     memset(v, 0, sizeof *v);
     size_t turned;
-    e.pixels = pixels_new_temporary(pool);
+    e.pixels = pixels_new_temporary();
     enum status status = load_room(&e, err);
     if (status != STATUS_OK)
         goto out;
@@ -341,7 +341,7 @@ enum status evaluate_outputs(const char *room, const char *outputs, const struct
 out:
     mem_free(e.emits);
     scene_release(&e.scene);
-    pixels_free(e.pixels, pool);
+    spill_free(e.pixels);
     return status;
 }
 

@@ -414,13 +414,10 @@ static void choose_pixels(struct detail *d) {
                 d->triangle[t][i] = NONE;
             most = d->triangle[t][i] == NONE ? most : fmaxf(most, d->weight[t][i]);
         }
-        spill_trim(spill_of(d));
     }
-    for (uint32_t t = 0; t < d->in.views->train_count; t++) {
+    for (uint32_t t = 0; t < d->in.views->train_count; t++)
         for (size_t i = 0; i < pixels_of(d, t); i++)
             d->weight[t][i] = d->triangle[t][i] == NONE ? 0.0f : d->weight[t][i] / most;
-        spill_trim(spill_of(d));
-    }
 }
 
 /* Marks the texels that may change: measured ones with enough light. */

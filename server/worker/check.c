@@ -80,7 +80,7 @@ enum status task_check(const struct order *order, struct progress *progress, str
     struct bundle_limits limits = bundle_default_limits();
     char *archive = layout_archive(order->dir), *files = layout_files(order->dir);
     struct parallel *pool = parallel_new(order->thread_count);
-    struct spill *spill = pixel_memory_new(order, pool);
+    struct spill *spill = pixel_memory_new(order);
     pixels_use(spill, &limits);
     cJSON *problems = cJSON_CreateArray();
     struct scene_check room;
@@ -104,7 +104,7 @@ enum status task_check(const struct order *order, struct progress *progress, str
     }
     reading_release(&reading);
     cJSON_Delete(problems);
-    pixels_free(spill, pool);
+    spill_free(spill);
     parallel_free(pool);
     mem_free(files);
     mem_free(archive);

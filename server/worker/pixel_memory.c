@@ -2,7 +2,6 @@
 #include "server/worker/pixel_memory.h"
 
 #include "common/machine.h"
-#include "server/ingest/pixels.h"
 
 /* With less, even one photograph is read from the disk again and again; by hand. */
 #define LEAST_BYTES ((uint64_t)64 << 20)
@@ -24,11 +23,11 @@ uint64_t pixel_memory_bytes(const struct order *order) {
     return bytes > LEAST_BYTES || order->photograph_memory_bytes > 0 ? bytes : LEAST_BYTES;
 }
 
-struct spill *pixel_memory_new(const struct order *order, struct parallel *pool) {
+struct spill *pixel_memory_new(const struct order *order) {
     const struct spill_limits limits = {
         .memory_bytes = pixel_memory_bytes(order),
         .keep_free_bytes = order->keep_free_bytes,
         .file_bytes = order->disk_bytes,
     };
-    return pixels_new(order->dir, &limits, pool);
+    return spill_new(order->dir, &limits);
 }

@@ -4,7 +4,6 @@
 
 #include <stdint.h>
 
-#include "common/parallel.h"
 #include "common/spill.h"
 #include "server/worker/order.h"
 
@@ -12,7 +11,7 @@
  * for each time that the job has run out of memory. */
 uint64_t pixel_memory_bytes(const struct order *order);
 
-/* Memory and a file in the order's folder, which the pool keeps within the budget; the caller's (pixels_free). */
-struct spill *pixel_memory_new(const struct order *order, struct parallel *pool);
+/* Memory and a file in the order's folder; the caller's (spill_free). */
+struct spill *pixel_memory_new(const struct order *order);
 
 #endif

@@ -437,11 +437,11 @@ enum status task_reconstruct(const struct order *order, struct progress *progres
     if (status == STATUS_OK) {
         run.preview_interval_sec = settings_number(&settings, "preview_interval_sec");
         pool = parallel_new(order->thread_count);
-        run.spill = pixel_memory_new(order, pool);
+        run.spill = pixel_memory_new(order);
         working_time_init(&run.worked, parallel_thread_count(pool));
         status = reconstruct(&run, &settings, pool, err);
     }
-    pixels_free(run.spill, pool);
+    spill_free(run.spill);
     parallel_free(pool);
     checkpoint_close(run.checkpoint);
     settings_release(&settings);

@@ -94,11 +94,11 @@ static enum status write_outputs(const char *dir, const struct reconstruction *r
 }
 
 /* NULL: all in memory. */
-static struct spill *new_spill(const char *out, struct parallel *pool, struct error *err) {
+static struct spill *new_spill(const char *out, struct error *err) {
     const char *mib = getenv("ROOM_PIXEL_MIB");
     if (!mib || file_make_dirs(out, err) != STATUS_OK)
         return NULL;
-    return pixels_new(out, &(struct spill_limits){.memory_bytes = (uint64_t)(atof(mib) * 1048576.0)}, pool);
+    return spill_new(out, &(struct spill_limits){.memory_bytes = (uint64_t)(atof(mib) * 1048576.0)});
 }
 
 static enum status run(int argc, char **argv, struct error *err) {
@@ -132,7 +132,7 @@ static enum status run(int argc, char **argv, struct error *err) {
     struct scene scene = {0};
     struct reconstruction r = {0};
     struct bundle_limits limits = bundle_default_limits();
-    struct spill *spill = new_spill(argv[2], pool, err);
+    struct spill *spill = new_spill(argv[2], err);
     if (spill)
         pixels_use(spill, &limits);
     limits.later_bytes = PHOTOGRAPH_LATER_BYTES;
@@ -157,7 +157,7 @@ static enum status run(int argc, char **argv, struct error *err) {
         printf("pixels in a file: %.0f MiB\n", (double)spill_file_bytes(spill) / 1048576.0);
     reconstruct_release(&r);
     scene_release(&scene);
-    pixels_free(spill, pool);
+    spill_free(spill);
     parallel_free(pool);
     cJSON_Delete(object);
     settings_release(&settings);

@@ -21,8 +21,6 @@ static void body(void *user, size_t index, int thread) {
     atomic_store(&s->busy[thread], 0);
 }
 
-static void count(void *user) { atomic_fetch_add((atomic_int *)user, 1); }
-
 int main(void) {
     static struct shared s;
     for (int threads = 1; threads <= 7; threads += 3) {
@@ -35,10 +33,6 @@ int main(void) {
         for (size_t i = 0; i < COUNT; i++)
             CHECK(s.visits[i] == 20);
         CHECK(s.clashes == 0);
-        atomic_int between = 0;
-        parallel_set_between(pool, count, &between);
-        parallel_for(pool, COUNT, body, &s);
-        CHECK(between == COUNT);
         parallel_free(pool);
     }
     return check_result();
