@@ -11,6 +11,7 @@
 /* Half the side of the neighbourhood, pixels of the thumbnail: shading of a whole wall is no detail; by hand. */
 #define NEIGHBOURHOOD 8
 #define FLOOR_SHARE 0.05f    /* of the median, added before the logarithm: noise in the dark is no detail */
+#define DETAIL_OF_NOISE 1.0f /* detail is more than this; it is three times the noise of the mean of 3 x 3 pixels */
 #define MEDIAN_OF_MAX 2048   /* values */
 #define CONTRAST_LEAST 0.02f /* of the compression's half-way point; by hand */
 
@@ -75,6 +76,23 @@ static void box_mean(const float *in, uint32_t width, uint32_t height, int radiu
     mem_free(sum);
 }
 
+/* Standard deviation of the noise of single pixels, by a mask that is blind to edges and ramps (Immerkaer 1996); fine
+ * texture counts as noise. */
+static float noise_of(const float *level, uint32_t width, uint32_t height) {
+    double sum = 0.0, count = 0.0;
+    for (size_t y = 1; y + 1 < height; y++)
+        for (size_t x = 1; x + 1 < width; x++) {
+            const float *at = level + y * width + x, *up = at - width, *down = at + width;
+            float value =
+                up[-1] + up[1] + down[-1] + down[1] - 2.0f * (up[0] + down[0] + at[-1] + at[1]) + 4.0f * at[0];
+            if (!isfinite(value))
+                continue;
+            sum += (double)fabsf(value);
+            count += 1.0;
+        }
+    return count > 0.0 ? (float)(sqrt(0.5 * PI) * sum / (6.0 * count)) : 0.0f;
+}
+
 void thumbnail_make(struct thumbnail *t, const struct photograph *photo) {
     uint32_t width = photo->camera.width, height = photo->camera.height;
     uint32_t side = width > height ? width : height;
@@ -90,11 +108,12 @@ void thumbnail_make(struct thumbnail *t, const struct photograph *photo) {
     float least = FLOOR_SHARE * t->brightness + 1e-6f;
     for (size_t i = 0; i < count; i++)
         level[i] = logf(fmaxf(level[i], 0.0f) + least) + 0.0f * level[i]; /* NAN stays NAN */
+    float detail = fmaxf(THUMBNAIL_DETAIL, DETAIL_OF_NOISE * noise_of(level, t->width, t->height));
     box_mean(level, t->width, t->height, NEIGHBOURHOOD, around);
     box_mean(level, t->width, t->height, 1, t->value);
     for (size_t i = 0; i < count; i++) {
         t->value[i] = isfinite(level[i]) ? t->value[i] - around[i] : NAN;
-        detailed += fabsf(t->value[i]) > THUMBNAIL_DETAIL;
+        detailed += fabsf(t->value[i]) > detail;
     }
     t->detail = (float)detailed / (float)count;
     float half_way = fmaxf(median_of(t->value, count, true), CONTRAST_LEAST);

@@ -14,8 +14,8 @@
 
 struct thumbnail {
     uint32_t width, height;
-    float *value;     /* [height][width] in (-1, 1), NAN where the photograph has no usable pixel; owned */
-    float detail;     /* share of the pixels that differ from their neighbourhood by more than THUMBNAIL_DETAIL */
+    float *value; /* [height][width] in (-1, 1), NAN where the photograph has no usable pixel; owned */
+    float detail; /* share of the pixels that differ from their neighbourhood by more than THUMBNAIL_DETAIL and noise */
     float brightness; /* median luminance of the stored pixels */
 };
 

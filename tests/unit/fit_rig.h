@@ -83,9 +83,9 @@ static inline void fit_point_camera(struct camera *camera, vec3 origin, vec3 for
 
 static inline float fit_random(uint32_t a, uint32_t b) { return rng_to_float(rng_mix32(rng_mix32(a + 1) ^ b)); }
 
-/* One with this contrast of the paint (0: plain walls), a gain of its own, and noise of 1 %. */
-static inline void fit_photograph(struct photograph *photo, const struct accel *accel, uint32_t number,
-                                  float contrast) {
+/* One with this contrast of the paint (0: plain walls), a gain of its own, and noise of this width. */
+static inline void fit_photograph(struct photograph *photo, const struct accel *accel, uint32_t number, float contrast,
+                                  float noise) {
     struct camera *c = &photo->camera;
     *c = (struct camera){.width = FIT_WIDTH, .height = FIT_HEIGHT, .fx = FIT_FOCAL, .fy = FIT_FOCAL};
     c->cx = 0.5f * FIT_WIDTH;
@@ -107,12 +107,12 @@ static inline void fit_photograph(struct photograph *photo, const struct accel *
         if (camera_direction(c, x, y, &direction) &&
             accel_intersect(accel, camera_origin(c), direction, 0.0f, INFINITY, &hit))
             value += contrast * (fit_paint(vec3_mad(camera_origin(c), hit.distance_m, direction), 0.25f) - 0.5f);
-        value *= gain * (1.0f + 0.02f * (fit_random(number, 100 + i) - 0.5f));
+        value *= gain * (1.0f + noise * (fit_random(number, 100 + i) - 0.5f));
         rgb_to_half(photo->pixel[i], rgb_gray(value));
     }
 }
 
-static inline void fit_rig_init(struct fit_rig *rig, float contrast) {
+static inline void fit_rig_init_noisy(struct fit_rig *rig, float contrast, float noise) {
     struct accel *accel;
     *rig = (struct fit_rig){.pool = parallel_new(2)};
     rig->scene.mesh = fit_mesh();
@@ -121,9 +121,11 @@ static inline void fit_rig_init(struct fit_rig *rig, float contrast) {
     rig->scene.photograph = mem_calloc(FIT_PHOTOGRAPHS, sizeof *rig->scene.photograph);
     CHECK(accel_new(&accel, &rig->scene.mesh, rig->pool, NULL) == STATUS_OK);
     for (uint32_t i = 0; i < FIT_PHOTOGRAPHS; i++)
-        fit_photograph(&rig->scene.photograph[i], accel, i, contrast);
+        fit_photograph(&rig->scene.photograph[i], accel, i, contrast, noise);
     accel_free(accel);
 }
+
+static inline void fit_rig_init(struct fit_rig *rig, float contrast) { fit_rig_init_noisy(rig, contrast, 0.02f); }
 
 static inline void fit_rig_release(struct fit_rig *rig) {
     scene_release(&rig->scene);

@@ -171,10 +171,10 @@ static void test_cases(void) {
 }
 
 /* Without paint and light there is nothing by which poses could be told. */
-static void test_plain_walls(void) {
+static void test_plain_walls(float noise) {
     struct fit_rig rig;
     struct fit_result fit;
-    fit_rig_init(&rig, 0.0f);
+    fit_rig_init_noisy(&rig, 0.0f, noise);
     fit_rig_judge(&rig, &fit);
     CHECK(fit.verdict == FIT_DOUBTFUL);
     CHECK(!fit.has_remedy);
@@ -189,6 +189,7 @@ static void test_plain_walls(void) {
 
 int main(void) {
     test_cases();
-    test_plain_walls();
+    test_plain_walls(0.02f);
+    test_plain_walls(0.9f); /* which is no detail */
     return check_result();
 }
