@@ -230,7 +230,8 @@ enum status bundle_load(const char *dir, const struct reading *given, const stru
     struct mesh_choice choice = {&listing, &match, &t, reading.mesh, triangle_limit(limits)};
     if (match.source) /* else what is missing has been said */
         status = mesh_choose(&choice, &mesh, &f, err);
-    applied_settle(&t, name, mesh, &f);
+    if (match.source == &source_nerfstudio)
+        applied_settle(&t, name, mesh, &f);
     reading_apply_frames(&reading, &t);
     scene->pose_axes = reading.axes != AXES_OF_FORMAT ? reading.axes : t.axes;
     if (mesh)

@@ -106,23 +106,32 @@ static uint64_t count_lines_with_faces(const struct mapping *file) {
     return count;
 }
 
-/* For comparing: exact for PLY, faces for OBJ, a guess for glTF. 0 for a point cloud. */
-static enum status count_triangles(const struct listing *l, const struct listed_file *file, uint64_t *count,
+/* Whether there are any, exact for PLY; a guess for the others. 0 for a point cloud. */
+static enum status guess_triangles(const struct listing *l, const struct listed_file *file, uint64_t *count,
                                    struct error *err) {
-    const char *extension = path_extension(file->path);
-    struct mapping content;
+    if (strcasecmp(path_extension(file->path), "ply") != 0) {
+        *count = file->bytes / GLTF_TRIANGLE_BYTES + 1;
+        return STATUS_OK;
+    }
     char *path = file_join(l->root, file->path);
+    enum status status = mesh_file_count_faces(path, file->path, count, err);
+    mem_free(path);
+    return status;
+}
+
+/* For comparing: the faces of OBJ files, which must be read whole. */
+static enum status count_triangles(const struct listing *l, struct mesh_list *c, struct error *err) {
     enum status status = STATUS_OK;
-    *count = file->bytes / GLTF_TRIANGLE_BYTES + 1;
-    if (strcasecmp(extension, "ply") == 0) {
-        status = mesh_file_count_faces(path, file->path, count, err);
-    } else if (strcasecmp(extension, "obj") == 0 && file->bytes > 0) {
-        status = mapping_open(&content, path, file->path, "an OBJ file", err);
+    for (size_t i = 0; i < c->count && status == STATUS_OK; i++) {
+        const struct listed_file *file = c->item[i].file;
+        struct mapping content;
+        if (strcasecmp(path_extension(file->path), "obj") != 0 || file->bytes == 0)
+            continue;
+        status = listing_open(l, file->path, "an OBJ file", &content, err);
         if (status == STATUS_OK)
-            *count = count_lines_with_faces(&content);
+            c->item[i].triangles = count_lines_with_faces(&content);
         mapping_close(&content);
     }
-    mem_free(path);
     return status;
 }
 
@@ -149,7 +158,7 @@ static enum status find_candidates(const struct mesh_choice *choice, struct mesh
         if (!mesh_file_is_known(file->path))
             continue;
         item.rank += has_folders_name(file->path, base);
-        enum status status = count_triangles(l, file, &item.triangles, err);
+        enum status status = guess_triangles(l, file, &item.triangles, err);
         if (status != STATUS_OK)
             return status;
         if (item.triangles > 0)
@@ -224,6 +233,8 @@ static enum status choose_among(const struct mesh_choice *choice, char **found, 
     struct mesh_list c = {0};
     enum status status = find_candidates(choice, &c, err);
     bool same = true;
+    if (status == STATUS_OK && c.count > 1)
+        status = count_triangles(choice->listing, &c, err);
     if (status == STATUS_OK && c.count > 1) {
         qsort(c.item, c.count, sizeof *c.item, by_worth);
         size_t too_fine_count = put_last_what_is_too_fine(&c, choice->triangle_limit);

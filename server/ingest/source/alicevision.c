@@ -24,15 +24,18 @@ static char *recognise(const struct listing *l, const char *base) {
     return NULL;
 }
 
-/* The element of that array whose `key` is the same text as `id`; NULL: none. */
-static const cJSON *of_id(const cJSON *tree, const char *array, const char *key, const char *id) {
-    const cJSON *item;
-    cJSON_ArrayForEach(item, cJSON_GetObjectItemCaseSensitive(tree, array)) {
-        const char *own = json_text_member(item, key);
-        if (own && id && strcmp(own, id) == 0)
-            return item;
-    }
-    return NULL;
+/* A file and where in its arrays the last view's pose and lens were. */
+struct alice_file {
+    const cJSON *tree, *pose, *intrinsic;
+    bool turns_meshes;
+    size_t unposed_count;
+};
+
+/* The element of that array with the id that the view has in its member `key`; NULL: none. */
+static const cJSON *of_view(const cJSON *tree, const char *array, const cJSON *view, const char *key,
+                            const cJSON **hint) {
+    const cJSON *id = cJSON_GetObjectItemCaseSensitive(view, key);
+    return json_find(cJSON_GetObjectItemCaseSensitive(tree, array), key, id, hint);
 }
 
 /* At least version 1.2.3 of the file. */
@@ -81,29 +84,28 @@ static enum status read_lens(const cJSON *in, const char *name, struct lens *len
     return STATUS_OK;
 }
 
-static enum status read_view(const cJSON *tree, const cJSON *view, bool turns, struct frame_list *list,
-                             size_t *unposed_count, struct error *err) {
-    const char *file = json_text_member(view, "path");
-    const cJSON *item = of_id(tree, "poses", "poseId", json_text_member(view, "poseId"));
+static enum status read_view(struct alice_file *file, const cJSON *view, struct frame_list *list, struct error *err) {
+    const char *path = json_text_member(view, "path");
+    const cJSON *item = of_view(file->tree, "poses", view, "poseId", &file->pose);
     const cJSON *pose = cJSON_GetObjectItemCaseSensitive(cJSON_GetObjectItemCaseSensitive(item, "pose"), "transform");
-    const cJSON *in = of_id(tree, "intrinsics", "intrinsicId", json_text_member(view, "intrinsicId"));
+    const cJSON *in = of_view(file->tree, "intrinsics", view, "intrinsicId", &file->intrinsic);
     double r[9], centre[3], m[3][4];
     struct lens lens;
-    if (!file)
+    if (!path)
         return error_set(err, STATUS_INPUT, "%s: a view has no path", list->name);
     if (!pose || !in) {
-        (*unposed_count)++;
+        file->unposed_count++;
         return STATUS_OK;
     }
     if (!json_numbers(cJSON_GetObjectItemCaseSensitive(pose, "rotation"), 9, r) ||
         !json_numbers(cJSON_GetObjectItemCaseSensitive(pose, "center"), 3, centre))
-        return error_set(err, STATUS_INPUT, "%s: the pose of %.200s has no rotation and center", list->name, file);
+        return error_set(err, STATUS_INPUT, "%s: the pose of %.200s has no rotation and center", list->name, path);
     enum status status = read_lens(in, list->name, &lens, err);
     for (int i = 0; i < 12; i++) {
-        double sign = turns && i >= 4 ? -1.0 : 1.0; /* the mesh's world: y and z turned around */
+        double sign = file->turns_meshes && i >= 4 ? -1.0 : 1.0; /* the mesh's world: y and z turned around */
         m[i / 4][i % 4] = sign * (i % 4 < 3 ? r[3 * (i / 4) + i % 4] : centre[i / 4]);
     }
-    return status == STATUS_OK ? frame_list_add(list, m, &lens, file, file, NULL, err) : status;
+    return status == STATUS_OK ? frame_list_add(list, m, &lens, path, path, NULL, err) : status;
 }
 
 static enum status read(const struct source_place *place, struct transforms *t, struct findings *f, struct error *err) {
@@ -111,17 +113,16 @@ static enum status read(const struct source_place *place, struct transforms *t, 
     struct error own;
     const cJSON *view;
     cJSON *tree;
-    size_t unposed_count = 0;
     enum status status = json_file_read(place->listing, place->found, &tree, &own);
-    bool turns = turns_meshes(tree);
+    struct alice_file file = {.tree = tree, .turns_meshes = turns_meshes(tree)};
     cJSON_ArrayForEach(view, cJSON_GetObjectItemCaseSensitive(tree, "views")) {
         if (status == STATUS_OK)
-            status = read_view(tree, view, turns, &list, &unposed_count, &own);
+            status = read_view(&file, view, &list, &own);
     }
     cJSON_Delete(tree);
     frame_list_finish(&list);
-    if (unposed_count > 0)
-        findings_warning(f, "%s: %zu photographs have no pose and are not used", place->found, unposed_count);
+    if (file.unposed_count > 0)
+        findings_warning(f, "%s: %zu photographs have no pose and are not used", place->found, file.unposed_count);
     photo_folder_settle(place->listing, place->base, false, t, f);
     return findings_settle(f, place->found, status, &own, err);
 }

@@ -11,57 +11,34 @@
 
 #define COLMAP_FIRST "colmap automatic_reconstructor --workspace_path . --image_path IMAGES --dense 1"
 
-/* Patterns are of paths below some folder (fnmatch), any of those between "|"; all of has[] must match, and of lacks none
- * may. Reason and hint are for the user: what it is, what is missing, what makes it. */
+/* Patterns are of paths below some folder (fnmatch), any of those between "|"; all of has[] must match there. What the
+ * first one matches is blamed. Reason and hint are for the user: what it is, what is missing, what makes it. */
 static const struct {
-    const char *has[3], *lacks;
-    const char *file; /* that is blamed: a pattern of has[0], told by its path */
-    const char *reason, *hint;
+    const char *has[2], *reason, *hint;
 } kinds[] = {
     {{"*.sens"},
-     NULL,
-     NULL,
      "no cameras: this is ScanNet's .sens file, which is not unpacked",
-     "unpack it with ScanNet's SensReader: reader --filename SCENE.sens --output_path . (or reader.py with "
-     "--export_color_images --export_poses --export_intrinsics)"},
+     "unpack it: python reader.py --filename SCENE.sens --output_path . --export_color_images --export_poses "
+     "--export_intrinsics (ScanNet/SensReader/python)"},
     {{"odometry.csv", "camera_matrix.csv"},
-     NULL,
-     NULL,
      "no cameras that are read: this is a recording of Stray Scanner, with its photographs in a video and no mesh",
-     "ns-process-data does not read it; its strayvisualizer integrates a mesh and convert_to_open3d.py writes frames; or run " COLMAP_FIRST},
+     "ffmpeg -i rgb.mp4 -vf fps=2 -q:v 2 images/%05d.jpg, then " COLMAP_FIRST},
     {{"*.blend"},
-     NULL,
-     NULL,
      "no cameras that are read: a .blend file is Blender's own",
      "in Blender, the add-on BlenderNeRF writes transforms_train.json with the photographs; export the mesh as PLY or glTF"},
     {{"*.abc"},
-     NULL,
-     NULL,
      "no cameras that are read: Alembic (.abc) is not",
      "in Meshroom use cameras.sfm of the node StructureFromMotion; in Metashape or RealityCapture export cameras as XML or CSV"},
     {{"*.usdz|*.usd|*.usda|*.usdc"},
-     NULL,
-     NULL,
      "no cameras: this is a .usdz of RoomPlan or of a phone's scanner: a model without photographs' poses",
      "export raw data: Polycam Settings, Developer mode, Raw data; or photograph the room and run " COLMAP_FIRST},
     {{"habitat/*|*semantic.json|preseg.json", "*mesh.ply"},
-     NULL,
-     NULL,
      "no cameras: this is Replica as shipped, which has no photographs",
      "take the rendered set of NICE-SLAM (download_replica.sh), or render views with ReplicaRenderer and add a transforms.json"},
-    {{"point_cloud/iteration_*/*.ply|point_cloud.ply|*.splat|*.spz", NULL},
-     NULL,
-     NULL,
+    {{"point_cloud/iteration_*/*.ply|point_cloud.ply|*.splat|*.spz"},
      "no cameras: this is a model of 3D Gaussians, not a mesh",
      "send the data set that it was trained on (images/ and sparse/), with a mesh of it"},
-    {{"*.mp4|*.mov|*.m4v|*.avi|*.mkv|*.insv"},
-     NULL,
-     NULL,
-     "no cameras: this is a video",
-     "ffmpeg -i VIDEO -vf fps=2 -q:v 2 images/%05d.jpg, then " COLMAP_FIRST},
     {{"*.xyz|*.e57|*.pts|*.ptx|*.las|*.laz", "*.obj|*.ply|*.glb"},
-     NULL,
-     NULL,
      "no cameras: this is a MatterPak or a scanner's export: a mesh and a point cloud without the photographs' poses",
      "photographs with poses are needed: of a Matterport scan only the raw data has them; or photograph the room and run " COLMAP_FIRST},
 };
@@ -83,7 +60,7 @@ static const char *match(const struct listing *l, size_t kind) {
     for (size_t i = 0; i < l->folder_count; i++) {
         const char *first = any_match(l, l->folder[i], kinds[kind].has[0]);
         bool has_all = first != NULL;
-        for (int k = 1; k < 3 && kinds[kind].has[k]; k++)
+        for (int k = 1; k < 2 && kinds[kind].has[k]; k++)
             has_all = has_all && any_match(l, l->folder[i], kinds[kind].has[k]);
         if (has_all)
             return first;
@@ -100,7 +77,7 @@ static void tell(struct findings *f, const char *file, const char *reason, const
 
 struct bundle_contents {
     size_t photographs, raw, meshes;
-    const char *first_photograph, *first_raw, *first_mesh;
+    const char *first_photograph, *first_raw, *first_mesh, *video;
 };
 
 static bool ends_in(const char *path, const char *const *extensions) {
@@ -113,10 +90,13 @@ static bool ends_in(const char *path, const char *const *extensions) {
 static struct bundle_contents look(const struct listing *l) {
     static const char *const raw[] = {"dng", "cr2", "cr3", "nef", "arw", "raf", "orf", "rw2", "pef", NULL};
     static const char *const meshes[] = {"ply", "obj", "glb", "gltf", "stl", "fbx", "dae", NULL};
+    static const char *const videos[] = {"mp4", "mov", "m4v", "avi", "mkv", "insv", NULL};
     struct bundle_contents c = {0};
     for (size_t i = l->count; i-- > 0;) {
         const char *path = l->file[i].path;
-        if (ends_in(path, meshes))
+        if (ends_in(path, videos))
+            c.video = path;
+        else if (ends_in(path, meshes))
             c.meshes++, c.first_mesh = path;
         else if (ends_in(path, raw))
             c.raw++, c.first_raw = path;
@@ -141,7 +121,10 @@ void missing_tell_cameras(const struct listing *l, const char *chosen, struct fi
             return;
         }
     }
-    if (c.raw > c.photographs) {
+    if (c.video && c.photographs <= 2) {
+        tell(f, c.video, "no cameras: this is a video",
+             "ffmpeg -i VIDEO -vf fps=2 -q:v 2 images/%05d.jpg, then " COLMAP_FIRST);
+    } else if (c.raw > c.photographs) {
         tell(f, c.first_raw, "no cameras: these are photographs as camera raw, without poses",
              "develop them to 16-bit linear TIFF (dcraw -4 -T, or darktable-cli), then " COLMAP_FIRST);
     } else if (c.photographs > 2 && c.meshes > 0) {

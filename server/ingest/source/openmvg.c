@@ -10,8 +10,6 @@
 #include "server/ingest/source/photo_folder.h"
 #include "server/ingest/source/values.h"
 
-#define NONE 4294967295.0 /* OpenMVG's id of what is not there */
-
 static char *recognise(const struct listing *l, const char *base) {
     static const char *const names[] = {"sfm_data.json", "reconstruction/sfm_data.json", "sfm_data_extrinsics.json"};
     for (int i = 0; i < 3; i++) {
@@ -22,14 +20,16 @@ static char *recognise(const struct listing *l, const char *base) {
     return NULL;
 }
 
-/* The value of that key in an array of {key, value}; NULL: none. */
-static const cJSON *of_key(const cJSON *tree, const char *array, double key) {
-    const cJSON *item;
-    cJSON_ArrayForEach(item, cJSON_GetObjectItemCaseSensitive(tree, array)) {
-        if (json_member(item, "key") == key)
-            return cJSON_GetObjectItemCaseSensitive(item, "value");
-    }
-    return NULL;
+/* A file and where in its arrays the last view's pose and lens were. */
+struct mvg_file {
+    const cJSON *tree, *pose, *intrinsic;
+    size_t unposed_count;
+};
+
+/* The value of that id in an array of {key, value}; NULL: none. */
+static const cJSON *of_key(const cJSON *tree, const char *array, const cJSON *id, const cJSON **hint) {
+    const cJSON *item = json_find(cJSON_GetObjectItemCaseSensitive(tree, array), "key", id, hint);
+    return cJSON_GetObjectItemCaseSensitive(item, "value");
 }
 
 static const cJSON *data_of(const cJSON *value) {
@@ -59,19 +59,20 @@ static enum status read_lens(const cJSON *value, const char *name, struct lens *
     return STATUS_OK;
 }
 
-static enum status read_view(const cJSON *tree, const cJSON *view, struct frame_list *list, size_t *unposed_count,
-                             struct error *err) {
+static enum status read_view(struct mvg_file *in, const cJSON *view, struct frame_list *list, struct error *err) {
+    const cJSON *tree = in->tree;
     const cJSON *data = data_of(cJSON_GetObjectItemCaseSensitive(view, "value"));
     const char *root = json_text_member(tree, "root_path"), *folder = json_text_member(data, "local_path");
     const char *file = json_text_member(data, "filename");
-    const cJSON *pose = of_key(tree, "extrinsics", json_member(data, "id_pose"));
-    const cJSON *intrinsic = of_key(tree, "intrinsics", json_member(data, "id_intrinsic"));
+    const cJSON *pose = of_key(tree, "extrinsics", cJSON_GetObjectItemCaseSensitive(data, "id_pose"), &in->pose);
+    const cJSON *intrinsic =
+        of_key(tree, "intrinsics", cJSON_GetObjectItemCaseSensitive(data, "id_intrinsic"), &in->intrinsic);
     double r[9], centre[3], rotation[3][3], m[3][4];
     struct lens lens;
     if (!file)
         return error_set(err, STATUS_INPUT, "%s: a view has no filename", list->name);
     if (!pose || !intrinsic) {
-        (*unposed_count)++;
+        in->unposed_count++;
         return STATUS_OK;
     }
     if (!json_numbers(cJSON_GetObjectItemCaseSensitive(pose, "rotation"), 9, r) ||
@@ -93,16 +94,16 @@ static enum status read(const struct source_place *place, struct transforms *t, 
     struct error own;
     const cJSON *view;
     cJSON *tree;
-    size_t unposed_count = 0;
     enum status status = json_file_read(place->listing, place->found, &tree, &own);
+    struct mvg_file in = {.tree = tree};
     cJSON_ArrayForEach(view, cJSON_GetObjectItemCaseSensitive(tree, "views")) {
         if (status == STATUS_OK)
-            status = read_view(tree, view, &list, &unposed_count, &own);
+            status = read_view(&in, view, &list, &own);
     }
     cJSON_Delete(tree);
     frame_list_finish(&list);
-    if (unposed_count > 0)
-        findings_warning(f, "%s: %zu photographs have no pose and are not used", place->found, unposed_count);
+    if (in.unposed_count > 0)
+        findings_warning(f, "%s: %zu photographs have no pose and are not used", place->found, in.unposed_count);
     photo_folder_settle(place->listing, place->base, false, t, f);
     return findings_settle(f, place->found, status, &own, err);
 }

@@ -86,6 +86,24 @@ bool json_numbers(const cJSON *array, size_t count, double *value) {
     return found == count;
 }
 
+static bool has_id(const cJSON *element, const char *key, const cJSON *id) {
+    const cJSON *own = cJSON_GetObjectItemCaseSensitive(element, key);
+    if (cJSON_IsString(own) && cJSON_IsString(id))
+        return strcmp(own->valuestring, id->valuestring) == 0;
+    return cJSON_IsNumber(own) && cJSON_IsNumber(id) && own->valuedouble == id->valuedouble;
+}
+
+const cJSON *json_find(const cJSON *array, const char *key, const cJSON *id, const cJSON **hint) {
+    const cJSON *first = cJSON_IsArray(array) ? array->child : NULL, *start = *hint ? *hint : first;
+    for (const cJSON *element = start; element; element = element->next)
+        if (has_id(element, key, id))
+            return *hint = element;
+    for (const cJSON *element = first; element != start; element = element->next)
+        if (has_id(element, key, id))
+            return *hint = element;
+    return NULL;
+}
+
 const char *json_text_member(const cJSON *object, const char *key) {
     return cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(object, key));
 }

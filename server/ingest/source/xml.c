@@ -48,11 +48,12 @@ static void XMLCALL end(void *user, const XML_Char *name) {
     struct reader *r = user;
     (void)name;
     char *text = r->at->text, *from = text + strspn(text, BLANKS);
-    size_t length = strlen(from);
+    size_t length = r->at->text_length - (size_t)(from - text);
     while (length > 0 && strchr(BLANKS, from[length - 1]))
         length--;
     memmove(text, from, length);
     text[length] = '\0';
+    r->at->text_length = length;
     r->at = r->at->parent;
     r->depth--;
 }
@@ -66,13 +67,14 @@ static bool is_blank(const char *piece, int length) {
 
 /* Comes in pieces, of which elements that hold more than line breaks have few. */
 static void XMLCALL add_text(void *user, const XML_Char *piece, int length) {
-    struct reader *r = user;
-    size_t used = strlen(r->at->text);
+    struct xml_node *node = ((struct reader *)user)->at;
+    size_t used = node->text_length;
     if (used == 0 && is_blank(piece, length))
         return;
-    r->at->text = mem_realloc_array(r->at->text, used + (size_t)length + 1, 1);
-    memcpy(r->at->text + used, piece, (size_t)length);
-    r->at->text[used + (size_t)length] = '\0';
+    node->text_length += (size_t)length;
+    node->text = mem_realloc_array(node->text, node->text_length + 1, 1);
+    memcpy(node->text + used, piece, (size_t)length);
+    node->text[node->text_length] = '\0';
 }
 
 enum status xml_parse(const char *text, size_t size, const char *name, struct xml_node **root, struct error *err) {

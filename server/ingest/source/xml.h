@@ -13,7 +13,8 @@
 struct xml_node {
     char *name;
     char **attribute; /* name, value, name, value, ..., NULL; owned */
-    char *text;       /* all of its own text; never NULL */
+    char *text;       /* [text_length] all of its own text, with a NUL; never NULL */
+    size_t text_length;
     struct xml_node *parent, *first, *last, *next;
 };
 
