@@ -200,6 +200,7 @@ size_t listing_match_count(const struct listing *l, const char *base, const char
 enum status listing_open(const struct listing *l, const char *path, const char *kind, struct mapping *m,
                          struct error *err) {
     const struct listed_file *file = listing_find(l, "", path);
+    *m = (struct mapping){0};
     if (file && file->content) {
         if (file->bytes == 0)
             return error_set(err, STATUS_INPUT, "%s is not %s: it is empty", path, kind);
@@ -207,7 +208,6 @@ enum status listing_open(const struct listing *l, const char *path, const char *
             .data = (void *)(uintptr_t)file->content, .size = (size_t)file->bytes, .is_borrowed = true};
         return STATUS_OK;
     }
-    *m = (struct mapping){0};
     if (!l->root)
         return error_set(err, STATUS_INPUT, "%s is not in the bundle", path);
     char *full = file_join(l->root, path);

@@ -47,6 +47,7 @@ static inline void source_rig_drop(struct source_rig *r, const char *path) {
             mem_free(r->file[i].path);
             mem_free((void *)(uintptr_t)r->file[i].content);
             r->file[i] = r->file[--r->count];
+            return;
         }
     }
 }
