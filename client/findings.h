@@ -13,8 +13,8 @@ void findings_print(struct client *c, const cJSON *scene);
 /* Of a scene on which a job has failed: warnings and problems, on stdout. */
 void findings_print_faults(struct client *c, const cJSON *scene);
 
-/* What somebody who submits a job should know, on stderr: warnings, a fit in doubt, a remedy that was taken, problems. Nothing
- * with --quiet or --json. */
+/* What somebody who submits a job should know, on stderr: the reading, warnings, a fit in doubt, a remedy, problems.
+ * Nothing with --quiet or --json. */
 void findings_note(struct client *c, const cJSON *scene);
 /* Adds warnings and problems to an object, where there are any. */
 void findings_add(cJSON *object, const cJSON *scene);

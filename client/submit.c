@@ -1,12 +1,10 @@
-/* submit.c -- `submit`: a room goes up, a job is queued on it.
+/* submit.c -- `submit`: sends a room and queues a job on it.
  *
- * 1. The room is read once for its SHA-256, which is the scene's id: what the server has already
- *    is not sent.
- * 2. The job is checked by the server (a dry run) before anything is sent, so that a mistyped
- *    setting does not cost an upload.
- * 3. The upload names its SHA-256; a room that changed meanwhile is refused by the server. What was
- *    broken off goes on where it was (upload.h).
- * 4. The job is queued under an idempotency key: however often the request is sent, one job. */
+ * 1. The server checks the job's settings (a dry run) before anything is sent, so that a mistyped setting does not cost
+ *    an upload.
+ * 2. The room is sent, unless its content is there already, and checked by the server (client_room.h). A job on a room
+ *    that is rejected, or whose mesh and photographs do not fit, is not queued.
+ * 3. The job is queued under an idempotency key: however often the request is sent, one job results. */
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
