@@ -190,9 +190,9 @@ static void set_window(const struct exr_reader *r, struct image_info *info) {
     int32_t y0 = data->min.y > display->min.y ? data->min.y : display->min.y;
     int32_t x1 = data->max.x < display->max.x ? data->max.x : display->max.x;
     int32_t y1 = data->max.y < display->max.y ? data->max.y : display->max.y;
-    info->window = (struct image_window){(uint32_t)((int64_t)x0 - display->min.x),
-                                         (uint32_t)((int64_t)y0 - display->min.y), (uint32_t)side(x0, x1),
-                                         (uint32_t)side(y0, y1)};
+    info->window =
+        (struct image_window){(uint32_t)((int64_t)x0 - display->min.x), (uint32_t)((int64_t)y0 - display->min.y),
+                              (uint32_t)side(x0, x1), (uint32_t)side(y0, y1)};
     info->stored_width = (uint32_t)side(data->min.x, data->max.x);
     info->stored_height = (uint32_t)side(data->min.y, data->max.y);
 }

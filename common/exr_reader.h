@@ -16,8 +16,8 @@ struct exr_reader {
     exr_compression_t compression;
     const exr_attr_chlist_t *list;
     exr_attr_box2i_t data, display;
-    struct exr_colors colors;       /* only where source->wants_color */
-    int grey;                       /* index in `list` of the Y that becomes R, G and B; or -1 */
+    struct exr_colors colors;     /* only where source->wants_color */
+    int grey;                     /* index in `list` of the Y that becomes R, G and B; or -1 */
     int target[EXR_MAX_CHANNELS]; /* channel of the picture for each of `list`; -1: not wanted */
 };
 

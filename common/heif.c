@@ -125,7 +125,7 @@ static void use_nclx(const struct heif_picture *p, const struct image_info *info
         image_color_by_exif(info, color);
         return;
     }
-    number[0] = number[0] == 2 ? 1 : number[0];   /* Rec. 709 */
+    number[0] = number[0] == 2 ? 1 : number[0];  /* Rec. 709 */
     number[1] = number[1] == 2 ? 13 : number[1]; /* sRGB */
     color_set_cicp(color, "its colr box", number, p->bits);
 }
@@ -183,9 +183,10 @@ static enum status decode(struct heif_picture *p, struct error *err) {
     if (options->version >= 4 && prefers_aom(p->source))
         options->decoder_id = "aom";
     bool is_deep = heif_image_handle_get_luma_bits_per_pixel(p->handle) > 8;
-    enum heif_chroma chroma = is_deep ? (p->has_alpha ? heif_chroma_interleaved_RRGGBBAA_LE : heif_chroma_interleaved_RRGGBB_LE)
-                              : p->has_alpha ? heif_chroma_interleaved_RGBA
-                                             : heif_chroma_interleaved_RGB;
+    enum heif_chroma chroma =
+        is_deep        ? (p->has_alpha ? heif_chroma_interleaved_RRGGBBAA_LE : heif_chroma_interleaved_RRGGBB_LE)
+        : p->has_alpha ? heif_chroma_interleaved_RGBA
+                       : heif_chroma_interleaved_RGB;
     struct heif_error result = heif_decode_image(p->handle, &p->decoded, heif_colorspace_RGB, chroma, options);
     heif_decoding_options_free(options);
     if (result.code != heif_error_Ok)

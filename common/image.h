@@ -54,7 +54,7 @@ struct image_info {
     int bits; /* per channel as stored: 8, 16, 32 */
     /* From EXIF where present, else 0. */
     double exposure_time_sec, iso, f_number;
-    int orientation;      /* EXIF orientation 1..8, 1 when absent; the reader does NOT rotate. HEIC and AVIF: 1, since
+    int orientation; /* EXIF orientation 1..8, 1 when absent; the reader does NOT rotate. HEIC and AVIF: 1, since
                            * their rotation is part of the picture and has been applied */
     /* EXR only, else 0: the part of the picture that the file has pixels of, and the size of its data window, which
      * some libraries (OpenCV, imageio) take for the picture. */

@@ -14,9 +14,9 @@ struct image_source {
     const char *name;      /* for messages */
     const uint8_t *memory; /* NULL for a file */
     int fd;
-    uint64_t size;  /* bytes */
-    int io_error;   /* errno of the first read that the system refused, else 0 */
-    bool as_stored; /* values of PNG and JPEG are not converted */
+    uint64_t size;    /* bytes */
+    int io_error;     /* errno of the first read that the system refused, else 0 */
+    bool as_stored;   /* values of PNG and JPEG are not converted */
     bool wants_color; /* only the picture's R, G, B and A */
 };
 

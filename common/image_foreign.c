@@ -33,8 +33,9 @@ static const struct {
     {0, "%PDF", 4, "PDF"},
 };
 
-static const char *const raw_extensions[] = {"dng", "cr2", "nef", "nrw", "arw", "sr2", "srf", "pef", "srw", "raf", "orf",
-                                             "rw2", "rwl", "3fr", "fff", "iiq", "erf", "kdc", "dcr", "mos", "mef", "cr3"};
+static const char *const raw_extensions[] = {"dng", "cr2", "nef", "nrw", "arw", "sr2", "srf", "pef",
+                                             "srw", "raf", "orf", "rw2", "rwl", "3fr", "fff", "iiq",
+                                             "erf", "kdc", "dcr", "mos", "mef", "cr3"};
 
 bool image_is_raw_name(const char *name) {
     const char *dot = strrchr(name, '.');

@@ -33,7 +33,7 @@ struct jpeg_reader {
     struct error *err;
     enum status status;
     JSAMPLE *row;
-    JOCTET *profile; /* ICC; libjpeg's (malloc) */
+    JOCTET *profile;         /* ICC; libjpeg's (malloc) */
     struct color_inks *inks; /* NULL unless the picture is CMYK */
     float *ink_row;
     bool is_profile_damaged;

@@ -168,9 +168,9 @@ static void find_alpha(struct tiff_reader *r) {
 }
 
 static bool is_known_sample(const struct tiff_reader *r) {
-    return r->format == SAMPLEFORMAT_IEEEFP ? r->bits == 16 || r->bits == 32 || r->bits == 64
-                                            : r->format == SAMPLEFORMAT_UINT &&
-                                                  (r->bits == 8 || r->bits == 16 || r->bits == 32);
+    return r->format == SAMPLEFORMAT_IEEEFP
+               ? r->bits == 16 || r->bits == 32 || r->bits == 64
+               : r->format == SAMPLEFORMAT_UINT && (r->bits == 8 || r->bits == 16 || r->bits == 32);
 }
 
 /* Colours and samples of the current directory. */
@@ -189,9 +189,9 @@ static void find_kind(struct tiff_reader *r) {
         TIFFSetField(r->tiff, TIFFTAG_JPEGCOLORMODE, JPEGCOLORMODE_RGB))
         photometric = PHOTOMETRIC_RGB; /* the library converts */
     r->color = photometric == PHOTOMETRIC_RGB ? TIFF_RGB : photometric == PHOTOMETRIC_SEPARATED ? TIFF_INKS : TIFF_GREY;
-    r->is_simple = is_known_sample(r) && r->sample_count >= (uint16_t)r->color &&
-                   (r->color != TIFF_GREY || photometric == PHOTOMETRIC_MINISBLACK ||
-                    photometric == PHOTOMETRIC_MINISWHITE);
+    r->is_simple =
+        is_known_sample(r) && r->sample_count >= (uint16_t)r->color &&
+        (r->color != TIFF_GREY || photometric == PHOTOMETRIC_MINISBLACK || photometric == PHOTOMETRIC_MINISWHITE);
     find_alpha(r);
 }
 

@@ -46,7 +46,9 @@ static float sample_at(const struct tiff_reader *r, const uint8_t *block, size_t
     double f64;
     switch (r->bits) {
     case 8: return (float)block[i] / 255.0f;
-    case 16: memcpy(&u16, block + 2 * i, sizeof u16); return is_float ? image_float_from_half(u16) : (float)u16 / 65535.0f;
+    case 16:
+        memcpy(&u16, block + 2 * i, sizeof u16);
+        return is_float ? image_float_from_half(u16) : (float)u16 / 65535.0f;
     case 32:
         memcpy(&u32, block + 4 * i, sizeof u32);
         memcpy(&f32, block + 4 * i, sizeof f32);

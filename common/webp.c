@@ -33,9 +33,9 @@ static enum status read_header(struct image_source *source, WebPBitstreamFeature
     uint8_t head[HEADER_BYTES];
     size_t got = image_source_read(source, 0, head, sizeof head);
     VP8StatusCode code = WebPGetFeatures(head, got, features);
-    uint64_t riff = got >= 8 ? 8 + ((uint64_t)head[4] | (uint64_t)head[5] << 8 | (uint64_t)head[6] << 16 |
-                                    (uint64_t)head[7] << 24)
-                             : 0;
+    uint64_t riff =
+        got >= 8 ? 8 + ((uint64_t)head[4] | (uint64_t)head[5] << 8 | (uint64_t)head[6] << 16 | (uint64_t)head[7] << 24)
+                 : 0;
     if (code != VP8_STATUS_OK)
         return refuse(source, code, err);
     if (riff > source->size)
@@ -43,8 +43,7 @@ static enum status read_header(struct image_source *source, WebPBitstreamFeature
     if (features->has_animation)
         return error_set(err, STATUS_INPUT, "%s: an animated WebP is not a photograph", source->name);
     uint64_t width = (uint64_t)features->width, height = (uint64_t)features->height;
-    enum status status =
-        image_header(image, source->name, width, height, features->has_alpha ? 4 : 3, image_rgba, err);
+    enum status status = image_header(image, source->name, width, height, features->has_alpha ? 4 : 3, image_rgba, err);
     if (status != STATUS_OK)
         return status;
     if (width * height / MAX_PIXELS_PER_BYTE > source->size)

@@ -160,8 +160,7 @@ static void scale_by_centres(const char *name, const struct transforms *t, struc
         }
 }
 
-static void tell_scaled(const char *name, const struct transforms *t, const struct photo_fit *fit,
-                        struct findings *f) {
+static void tell_scaled(const char *name, const struct transforms *t, const struct photo_fit *fit, struct findings *f) {
     size_t count = 0, first = 0;
     for (size_t i = 0; i < t->frame_count; i++) {
         const struct lens *stated = &t->frame[i].lens;
@@ -172,11 +171,12 @@ static void tell_scaled(const char *name, const struct transforms *t, const stru
         count++;
     }
     if (count > 0)
-        findings_warning(f,
-                         "%s: %zu pictures are smaller or larger than it says (%s: %.0f x %.0f instead of %.0f x %.0f): "
-                         "their focal lengths and principal points were multiplied by %.4g",
-                         name, count, t->frame[first].file, fit[first].lens.width, fit[first].lens.height,
-                         t->frame[first].lens.width, t->frame[first].lens.height, fit[first].scale);
+        findings_warning(
+            f,
+            "%s: %zu pictures are smaller or larger than it says (%s: %.0f x %.0f instead of %.0f x %.0f): "
+            "their focal lengths and principal points were multiplied by %.4g",
+            name, count, t->frame[first].file, fit[first].lens.width, fit[first].lens.height,
+            t->frame[first].lens.width, t->frame[first].lens.height, fit[first].scale);
 }
 
 void photo_fit_all(const char *dir, const char *name, char *const *path, const struct transforms *t,
@@ -198,7 +198,8 @@ enum status photo_fit_camera(const struct photo_fit *fit, const struct transform
     const struct lens *stated = &frame->lens;
     if (fit->window_width > 0 && !is_size(stated, fit->width, fit->height) &&
         is_size(stated, fit->window_width, fit->window_height)) {
-        error_set(err, STATUS_INPUT, "frames[%zu] says %.0f x %.0f, the size of the EXR's data window; its picture is %u x %u",
+        error_set(err, STATUS_INPUT,
+                  "frames[%zu] says %.0f x %.0f, the size of the EXR's data window; its picture is %u x %u",
                   frame->number, stated->width, stated->height, fit->width, fit->height);
         return error_hint(err, "save the pictures without overscan");
     }
@@ -207,10 +208,11 @@ enum status photo_fit_camera(const struct photo_fit *fit, const struct transform
                   "w and h are exchanged: frames[%zu] says w %.0f and h %.0f, the picture is %u x %u and has no EXIF "
                   "orientation that turns it",
                   frame->number, stated->width, stated->height, fit->width, fit->height);
-        return error_hint(err, "exchange w and h, if the poses belong to the pictures as they are; else turn the pictures");
+        return error_hint(err,
+                          "exchange w and h, if the poses belong to the pictures as they are; else turn the pictures");
     }
-    return transforms_camera(&fitted, swaps ? fit->height : fit->width, swaps ? fit->width : fit->height, offset, camera,
-                             err);
+    return transforms_camera(&fitted, swaps ? fit->height : fit->width, swaps ? fit->width : fit->height, offset,
+                             camera, err);
 }
 
 void photo_fit_apply(const struct photo_fit *fit, const struct image_info *info, struct image *image) {

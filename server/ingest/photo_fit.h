@@ -13,14 +13,14 @@
 
 /* Of one frame. */
 struct photo_fit {
-    enum status status;   /* whether the file's header could be read */
-    struct error err;     /* why not */
-    uint32_t width, height; /* as stored */
+    enum status status;                   /* whether the file's header could be read */
+    struct error err;                     /* why not */
+    uint32_t width, height;               /* as stored */
     uint32_t window_width, window_height; /* image_info.stored_width, stored_height */
-    int orientation;        /* EXIF */
-    int turn;               /* orientation that is applied to the pixels; 1: none */
-    double scale;           /* of the intrinsics; 1: none */
-    struct lens lens;       /* of the turned picture */
+    int orientation;                      /* EXIF */
+    int turn;                             /* orientation that is applied to the pixels; 1: none */
+    double scale;                         /* of the intrinsics; 1: none */
+    struct lens lens;                     /* of the turned picture */
 };
 
 /* Reads the headers of the pictures at path[] (below dir; NULL: absent) and decides; fit[frame_count]. `name` is that of

@@ -180,8 +180,8 @@ static enum status load_photograph(const struct loading *l, size_t index) {
         status = keep_pixels(l, &image, &info, frame->mask, photo, outcome);
     image_release(&image);
     if (status == STATUS_OK && frame->mask) {
-        status = photo_pixels_load_mask(l->dir, frame->mask, l->fit[index].turn, photo, &outcome->is_broken,
-                                        &outcome->err);
+        status =
+            photo_pixels_load_mask(l->dir, frame->mask, l->fit[index].turn, photo, &outcome->is_broken, &outcome->err);
         outcome->mask_failed = status != STATUS_OK;
     }
     return status;

@@ -13,8 +13,8 @@ struct scene {
     struct mesh_report mesh_report; /* what was dropped of it */
     size_t photograph_count;
     struct photograph *photograph; /* [photograph_count]; owned */
-    char *source;       /* kind of capture: "COLMAP"; NULL in scenes that were not read from a bundle; owned */
-    size_t named_count; /* frames that its files name, of which the photographs are those that can be used */
+    char *source;               /* kind of capture: "COLMAP"; NULL in scenes that were not read from a bundle; owned */
+    size_t named_count;         /* frames that its files name, of which the photographs are those that can be used */
     enum matrix_axes pose_axes; /* what the matrices of the cameras' file were taken for */
     struct spill *spill; /* for arrays with an element for each pixel of all photographs; NULL: memory; borrowed */
     size_t warning_count;

@@ -74,21 +74,22 @@ static void put_sample(const struct layout *l, uint32_t x, uint32_t y, uint16_t 
         value = s < 3 ? 1.0f - value : 0.0f;
     if (l->photometric == PHOTOMETRIC_MINISWHITE)
         value = 1.0f - value;
-    uint16_t u16 = l->format == SAMPLEFORMAT_IEEEFP ? image_half_from_float(4 * value) : (uint16_t)(value * 65535 + .5f);
+    uint16_t u16 =
+        l->format == SAMPLEFORMAT_IEEEFP ? image_half_from_float(4 * value) : (uint16_t)(value * 65535 + .5f);
     float f32 = 4 * value;
     double f64 = (double)f32;
     uint32_t u32 = (uint32_t)((double)value * 4294967295.0);
     uint8_t u8 = (uint8_t)(value * 255 + .5f);
-    const void *from = l->bits == 8    ? (const void *)&u8
-                       : l->bits == 16 ? (const void *)&u16
-                       : l->bits == 64 ? (const void *)&f64
+    const void *from = l->bits == 8                       ? (const void *)&u8
+                       : l->bits == 16                    ? (const void *)&u16
+                       : l->bits == 64                    ? (const void *)&f64
                        : l->format == SAMPLEFORMAT_IEEEFP ? (const void *)&f32
                                                           : (const void *)&u32;
     memcpy(to, from, l->bits / 8);
 }
 
-static void fill_block(const struct layout *l, uint32_t x0, uint32_t y0, uint32_t width, uint32_t height, uint16_t plane,
-                       uint8_t *block) {
+static void fill_block(const struct layout *l, uint32_t x0, uint32_t y0, uint32_t width, uint32_t height,
+                       uint16_t plane, uint8_t *block) {
     uint16_t count = l->planar == PLANARCONFIG_SEPARATE ? 1 : l->samples;
     for (uint32_t y = 0; y < height; y++)
         for (uint32_t x = 0; x < width; x++)
@@ -172,7 +173,10 @@ static void tiff(void) {
         if (!reads(scratch, &image, &info))
             continue;
         bool is_float = l->format == ieee, has_alpha = l->samples == 4 && l->photometric == rgb;
-        check_patches(what, &image, is_float ? 4 : 1, l->bits == 8 ? .5 / 255 + 1e-6 : is_float && l->bits == 16 ? 2e-3 : 1e-5);
+        check_patches(what, &image, is_float ? 4 : 1,
+                      l->bits == 8                ? .5 / 255 + 1e-6
+                      : is_float && l->bits == 16 ? 2e-3
+                                                  : 1e-5);
         CHECK(info.encoding == (is_float ? IMAGE_LINEAR : IMAGE_SRGB) && info.orientation == 1);
         CHECK(!has_alpha || middle(&image, 0)[3] == (is_float ? 4.0f : 1.0f));
         CHECK(!strstr(info.color_warning, "profile") == (l->bits != 16 || is_float) || l->photometric != rgb);
@@ -335,8 +339,14 @@ static void foreign(void) {
         char start[16];
         const char *part;
     } kinds[] = {
-        {"II*\0\x10\0\0\0CR\2", "raw"}, {"\0\0\0\x18" "ftypcrx ", "raw"}, {"FUJIFILMCCD-RAW", "raw"},
-        {"\xff\x0a", "JPEG XL"},        {"BM", "BMP"},                     {"8BPS", "Photoshop"},
+        {"II*\0\x10\0\0\0CR\2", "raw"},
+        {"\0\0\0\x18"
+         "ftypcrx ",
+         "raw"},
+        {"FUJIFILMCCD-RAW", "raw"},
+        {"\xff\x0a", "JPEG XL"},
+        {"BM", "BMP"},
+        {"8BPS", "Photoshop"},
         {"hello", "not a picture"},
     };
     for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {

@@ -68,8 +68,8 @@ static bool load_copies(const char *picture, const char *top) {
     return load(work);
 }
 
-#define JPEG "tests/data/image/exif_little.jpg"    /* 24 x 16, orientation 6 */
-#define PLAIN "tests/data/image/progressive.jpg"   /* 24 x 16, none */
+#define JPEG "tests/data/image/exif_little.jpg"  /* 24 x 16, orientation 6 */
+#define PLAIN "tests/data/image/progressive.jpg" /* 24 x 16, none */
 
 static void check_lens(double fx, double fy, double cx, double cy) {
     for (size_t i = 0; i < scene.photograph_count; i++) {
@@ -110,13 +110,13 @@ static void turned(void) {
 
 /* All eight orientations against the definition of each: where the stored first row and first column are seen. */
 static void orientations(void) {
-    static const char *const seen[9] = {NULL,         "top left",    "top right",    "bottom right", "bottom left",
-                                        "left top",   "right top",   "right bottom", "left bottom"};
+    static const char *const seen[9] = {NULL,       "top left",  "top right",    "bottom right", "bottom left",
+                                        "left top", "right top", "right bottom", "left bottom"};
     for (int o = 1; o <= 8; o++) {
         struct image image;
         image_init_rgb(&image, 5, 3);
-        image.pixel[0] = 1;                    /* row 0, column 0 */
-        image.pixel[(size_t)4 * 3 + 1] = 1;    /* row 0, last column */
+        image.pixel[0] = 1;                     /* row 0, column 0 */
+        image.pixel[(size_t)4 * 3 + 1] = 1;     /* row 0, last column */
         image.pixel[(size_t)2 * 5 * 3 + 2] = 1; /* last row, column 0 */
         image_orient(&image, o);
         uint32_t w = image.width, h = image.height;
@@ -160,7 +160,9 @@ static void broken(void) {
     put_copy("1.jpg", PLAIN, 300);
     put("3.jpg", "<html>404</html>", 16);
     CHECK_THAT(load(work) && scene.photograph_count == 3, "%s", told);
-    CHECK_THAT(strstr(told, "1.jpg: damaged JPEG: the file is cut short; it was left out") && strstr(told, "3.jpg: not a picture"), "%s", told);
+    CHECK_THAT(strstr(told, "1.jpg: damaged JPEG: the file is cut short; it was left out") &&
+                   strstr(told, "3.jpg: not a picture"),
+               "%s", told);
     put("0.jpg", "", 0);
     CHECK(!load(work));
     CHECK_THAT(strstr(told, "file: 0.jpg") && strstr(told, "file: 1.jpg") && strstr(told, "file: 3.jpg"), "%s", told);
@@ -171,7 +173,8 @@ static void data_window(void) {
     CHECK(load_copies("tests/data/image/zip.exr", "\"w\":25,\"h\":15,\"fl_x\":20"));
     const struct photograph *p = &scene.photograph[0];
     CHECK_THAT(strstr(told, "135 pixels"), "%s", told);
-    CHECK(isnan(image_float_from_half(p->pixel[2 * 25 + 2][0])) && !isnan(image_float_from_half(p->pixel[2 * 25 + 3][0])));
+    CHECK(isnan(image_float_from_half(p->pixel[2 * 25 + 2][0])) &&
+          !isnan(image_float_from_half(p->pixel[2 * 25 + 3][0])));
     CHECK(!load_copies("tests/data/image/zip.exr", "\"w\":20,\"h\":12,\"fl_x\":20"));
     CHECK_THAT(strstr(told, "data window"), "%s", told);
 }

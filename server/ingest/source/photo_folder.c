@@ -13,7 +13,7 @@
 /* --- names ------------------------------------------------------------------------------------ */
 
 bool photo_is_picture(const char *path) {
-    static const char *const extensions[] = {"png", "jpg",  "jpeg", "exr",  "hdr", "tif",
+    static const char *const extensions[] = {"png",  "jpg",  "jpeg", "exr",  "hdr", "tif",
                                              "tiff", "webp", "heic", "heif", "avif"};
     const char *extension = path_extension(path);
     for (size_t i = 0; i < sizeof extensions / sizeof *extensions; i++)
@@ -167,8 +167,8 @@ static struct choice choose_folder(const struct pictures *in, const char *base, 
                                                 "image/", "input/",  "frames/", "imgs/", "resized_images/"};
     static const char *const mask_folders[] = {"", "masks/", "mask/"};
     const char *const *folders = n->are_masks ? mask_folders : photo_folders;
-    size_t folder_count = n->are_masks ? sizeof mask_folders / sizeof *mask_folders
-                                       : sizeof photo_folders / sizeof *photo_folders;
+    size_t folder_count =
+        n->are_masks ? sizeof mask_folders / sizeof *mask_folders : sizeof photo_folders / sizeof *photo_folders;
     struct choice best = {0};
     size_t sample_count = 0, step = n->t->frame_count / SAMPLE_COUNT + 1;
     for (size_t i = 0; i < n->t->frame_count; i += step)
