@@ -78,6 +78,31 @@ static enum status find_root(const char *dir, char **root, struct error *err) {
     return STATUS_OK;
 }
 
+/* Lists *root, or `dir` above it where only that is a capture's layout ("keyframes/" alone is part of one). */
+static enum status list_bundle(const char *dir, char **root, struct listing *l, struct error *err) {
+    enum status status = listing_read(l, *root, err);
+    if (status != STATUS_OK || strcmp(*root, dir) == 0)
+        return status;
+    struct listing outer = {0};
+    struct source_match inner = sources_find(l, NULL), match = {0};
+    status = inner.source ? STATUS_OK : listing_read(&outer, dir, err);
+    if (status == STATUS_OK && !inner.source) {
+        match = sources_find(&outer, NULL);
+        struct listing unused = match.source ? *l : outer;
+        *l = match.source ? outer : *l;
+        listing_release(&unused);
+        if (match.source) {
+            mem_free(*root);
+            *root = mem_strdup(dir);
+        }
+    } else {
+        listing_release(&outer);
+    }
+    source_match_release(&inner);
+    source_match_release(&match);
+    return status;
+}
+
 /* --- cameras ----------------------------------------------------------------------------- */
 
 /* The cameras of the file that was chosen, or of whatever source the bundle is; sets *match. */
@@ -220,7 +245,7 @@ enum status bundle_load(const char *dir, const struct reading *given, const stru
     if (status == STATUS_OK)
         status = find_root(dir, &root, err);
     if (status == STATUS_OK)
-        status = listing_read(&listing, root, err);
+        status = list_bundle(dir, &root, &listing, err);
     if (status == STATUS_OK)
         status = load_cameras(&listing, chosen, &match, &t, &f, err);
     if (status != STATUS_OK)

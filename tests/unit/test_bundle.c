@@ -309,6 +309,21 @@ static size_t triangles_of(const char **file, struct error *err) {
     return count;
 }
 
+/* A folder alone at the top is the bundle's root, but not where it is part of a layout. */
+static void test_root(void) {
+    struct scene scene;
+    struct error err;
+    cJSON *problems;
+    CHECK(file_remove_tree(work, NULL) == STATUS_OK && mkdir(work, 0700) == 0);
+    CHECK(make_folder("keyframes") && make_folder("keyframes/cameras") && make_folder("keyframes/images"));
+    put("keyframes/cameras/1.json", "{}");
+    CHECK(load(&scene, &problems, &err) == STATUS_INPUT);
+    char *text = json_text(problems);
+    CHECK_THAT(strstr(text, "keyframes/cameras/1.json") != NULL && strstr(text, "no mesh"), "%s", text);
+    mem_free(text);
+    cJSON_Delete(problems);
+}
+
 /* Which of several meshes is taken: a PLY before others, one of a kind, or the one that is named. */
 static void test_formats(void) {
     struct error err;
@@ -543,6 +558,7 @@ int main(void) {
     test_exif();
     test_variants();
     test_bad();
+    test_root();
     test_formats();
     test_colmap();
     test_many();
