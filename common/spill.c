@@ -27,8 +27,11 @@
 #include "common/file.h"
 #include "common/mem.h"
 
-/* Time between two looks at what is mapped. A disk of 2 GB/s maps 20 MB in between. A look takes some microseconds. */
+/* Time between two looks at what is mapped, far below the budget and near it. A disk of 2 GB/s maps 2 MB in a
+ * millisecond, the kernel's cache up to 50 MB a thread. A look takes some microseconds. */
 #define TRIM_INTERVAL_MS 10
+#define TRIM_INTERVAL_NEAR_MS 1
+#define NEAR_SHARE 2 /* near is more than this part of the budget */
 /* Unmapped at once, and the part of the budget that a trim frees: unmapped pages that are still in the kernel's cache
  * are mapped again for about a microsecond per 64 KiB. By hand. */
 #define TRIM_STEP ((size_t)32 << 20)
@@ -134,12 +137,13 @@ static size_t unmap_step(struct spill *s) {
     return step;
 }
 
-static void trim(struct spill *s) {
+/* Returns the time until it is to be called again, ms. */
+static long trim(struct spill *s) {
     uint64_t budget = s->limits.memory_bytes, least = budget / LEAST_SHARE;
     budget = budget > s->memory + least ? budget - s->memory : least;
     uint64_t mapped = file_rss(s), goal = s->base_rss + budget;
     if (mapped <= goal)
-        return;
+        return mapped > goal - budget / NEAR_SHARE ? TRIM_INTERVAL_NEAR_MS : TRIM_INTERVAL_MS;
     goal -= budget / TRIM_SHARE;
     uint64_t all = s->used, passed = 0;
     bool wrapped = false;
@@ -150,19 +154,21 @@ static void trim(struct spill *s) {
             break;
         wrapped = wrapped || step == 0;
     }
+    return TRIM_INTERVAL_NEAR_MS;
 }
 
 static void *keep(void *argument) {
     struct spill *s = argument;
     struct timespec next;
+    long interval_ms = TRIM_INTERVAL_MS;
     pthread_mutex_lock(&s->mutex);
     while (!s->stopping) {
         clock_gettime(CLOCK_MONOTONIC, &next);
-        next.tv_nsec += TRIM_INTERVAL_MS * 1000000L;
+        next.tv_nsec += interval_ms * 1000000L;
         next.tv_sec += next.tv_nsec / 1000000000L;
         next.tv_nsec %= 1000000000L;
         pthread_cond_timedwait(&s->stop, &s->mutex, &next);
-        trim(s);
+        interval_ms = trim(s);
     }
     pthread_mutex_unlock(&s->mutex);
     return NULL;
