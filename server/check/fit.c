@@ -110,9 +110,20 @@ static void judge_disagreement(struct fit_result *fit) {
     }
 }
 
+/* Whether the mesh would agree better elsewhere. */
+static bool is_displaced(const struct search_result *r) {
+    return vec3_length(r->offset) > 0.0f && r->moved.score > REMEDY_GAIN * r->given.score &&
+           consistency_compare(&r->moved, &r->given) > REMEDY_SURE;
+}
+
 static void judge_agreement(struct fit_result *fit) {
     const struct photo_agreement *a = &fit->search.given;
-    if (!fit->search.given_has_parallax)
+    const vec3 offset = fit->search.offset;
+    if (is_displaced(&fit->search))
+        tell(fit, mem_printf("they would correlate by %.2f were the mesh moved by (%.3g, %.3g, %.3g): mesh and cameras "
+                             "may have different origins",
+                             fit->search.moved.correlation, (double)offset.x, (double)offset.y, (double)offset.z));
+    else if (!fit->search.given_has_parallax)
         tell(fit, mem_printf("they agree as well were the mesh larger or smaller: whether its size is right cannot be "
                              "told"));
     else if (a->correlation < CORRELATION_FITS)

@@ -88,6 +88,10 @@ bool hypothesis_camera(const struct hypothesis *h, const struct scene *scene, si
         camera->world_from_camera = placed_pose(h, &pose, scene->mesh.offset);
         camera->camera_from_world = rigid_inverse(&camera->world_from_camera);
     }
+    if (h->offset.x != 0.0f || h->offset.y != 0.0f || h->offset.z != 0.0f) {
+        camera->world_from_camera.translation = vec3_sub(camera->world_from_camera.translation, h->offset);
+        camera->camera_from_world = rigid_inverse(&camera->world_from_camera);
+    }
     if (h->is_pinhole) {
         camera->model = CAMERA_OPENCV;
         memset(camera->k, 0, sizeof camera->k);

@@ -17,6 +17,7 @@ struct hypothesis {
     double scale;                 /* of the mesh as loaded, units of the cameras' world */
     int shift;                    /* photograph i has the pose of photograph i + shift */
     double lens;                  /* factor of focal lengths and principal point */
+    vec3 offset;                  /* of the mesh, in its own units: another origin, which no reading can say */
     bool is_pinhole;              /* the pictures have no distortion, whatever their lens has */
 };
 

@@ -22,6 +22,8 @@ static const struct consistency_effort screening = {16, 48, 0}, refining = {24, 
 #define PARALLAX_FALL 0.7
 #define PARALLAX_STEP 1.3
 #define SURE 3.0           /* standard errors by which another hypothesis is taken up */
+#define OFFSET_ROUNDS 2    /* of all directions, at each length of step */
+#define OFFSET_GAIN 1.02   /* of a step: less is chance */
 #define SNAP 0.015         /* relative distance at which a scale is that of a unit */
 #define NEAR_DIAGONALS 2.0 /* of the mesh's: cameras farther from its centre cannot see a room */
 #define SPREAD_LEAST 0.004 /* of the cameras, in diagonals of the mesh: a walk of 4 cm in 10 m */
@@ -220,6 +222,28 @@ static bool settle(struct state *s, struct search_result *r) {
     return improved;
 }
 
+/* Moves the mesh of the given hypothesis uphill, by steps from a sixteenth of its diagonal on. */
+static void find_offset(const struct state *s, struct search_result *r) {
+    struct hypothesis h = hypothesis_given();
+    double best = refined_score(s, &h);
+    for (double step = s->diagonal / 16.0; step > s->diagonal / 300.0; step /= 2.0)
+        for (int direction = 0; direction < 6 * OFFSET_ROUNDS; direction++) {
+            struct hypothesis trial = h;
+            float *component = direction % 3 == 0   ? &trial.offset.x
+                               : direction % 3 == 1 ? &trial.offset.y
+                                                    : &trial.offset.z;
+            *component += (float)(direction % 6 < 3 ? step : -step);
+            double score = refined_score(s, &trial);
+            if (score > OFFSET_GAIN * best) {
+                best = score;
+                h = trial;
+            }
+        }
+    consistency_measure(s->c, &h, &s->full, FULL_SEED, &r->moved);
+    if (consistency_compare(&r->moved, &r->given) > SURE)
+        r->offset = h.offset;
+}
+
 static void measure_extent(struct state *s) {
     vec3 lower, upper, first = {INFINITY, INFINITY, INFINITY}, last = {-INFINITY, -INFINITY, -INFINITY};
     mesh_bounds(&s->scene->mesh, &lower, &upper);
@@ -273,6 +297,8 @@ void search_run(const struct consistency *c, const struct scene *scene, struct s
         try_turned_scales(&s);
         settle(&s, r);
     }
+    if (hypothesis_is_given(&r->best) && r->given.score > AGREES)
+        find_offset(&s, r);
     r->tried = s.tried;
     r->sure = hypothesis_is_given(&r->best) ? 0.0 : consistency_compare(&r->found, &r->given);
 }

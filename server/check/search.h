@@ -12,8 +12,10 @@ struct search_result {
     struct hypothesis best;              /* the given one where no other is better */
     struct photo_agreement given, found; /* measured in full */
     bool given_has_parallax;             /* the agreement of the given one depends on the distances of the surface */
-    double sure;  /* standard errors by which `found` agrees better than `given`; 0 for the given one */
-    size_t tried; /* hypotheses */
+    double sure; /* standard errors by which `found` agrees better than `given`; 0 for the given one */
+    vec3 offset; /* by which the mesh would have to be moved to agree better, metres; 0 where it would not */
+    struct photo_agreement moved; /* with it */
+    size_t tried;                 /* hypotheses */
 };
 
 void search_run(const struct consistency *c, const struct scene *scene, struct search_result *result);
