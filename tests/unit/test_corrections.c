@@ -32,8 +32,8 @@ static void refused(const char *settings, const char *part) {
 }
 
 static void check_photographs(void) {
-    refused("{" SETTINGS ",\"exclude\":\"b,x*\"}", "no photograph is named x*");
-    refused("{" SETTINGS ",\"exclude\":\"[ab]\"}", "exclude leaves 1 photographs; 3 are needed");
+    refused("{" SETTINGS ",\"exclude\":\"b.png,x*\"}", "no photograph is named x*");
+    refused("{" SETTINGS ",\"exclude\":\"[ab].png\"}", "exclude leaves 1 photographs; 3 are needed");
     OK(reconstruct("{" SETTINGS ",\"exclude\":\"\"}", scene, ""));
 }
 
