@@ -11,6 +11,8 @@
 #include "common/mem.h"
 #include "server/ingest/path.h"
 
+#define HEAD_BYTES 4096 /* of a file that is recognised by what it begins with */
+
 /* --- making one ----------------------------------------------------------------------------- */
 
 struct growing {
@@ -226,4 +228,23 @@ enum status listing_text(const struct listing *l, const char *path, size_t limit
         *text = mem_strndup(file.data, file.size);
     mapping_close(&file);
     return status;
+}
+
+static bool begins_with_both(const struct listing *l, const char *path, const char *word, const char *other) {
+    struct mapping file;
+    if (listing_open(l, path, "a file", &file, NULL) != STATUS_OK)
+        return false;
+    size_t size = file.size < HEAD_BYTES ? file.size : HEAD_BYTES;
+    bool found = memmem(file.data, size, word, strlen(word)) && memmem(file.data, size, other, strlen(other));
+    mapping_close(&file);
+    return found;
+}
+
+char *listing_first_with(const struct listing *l, const char *base, const char *pattern, const char *word,
+                         const char *other) {
+    const struct listed_file *file;
+    for (size_t at = 0; (file = listing_match(l, base, pattern, &at)) != NULL;)
+        if (begins_with_both(l, file->path, word, other))
+            return mem_strdup(file->path);
+    return NULL;
 }

@@ -47,6 +47,10 @@ const struct listed_file *listing_match(const struct listing *l, const char *bas
 const struct listed_file *listing_first(const struct listing *l, const char *base, const char *pattern);
 size_t listing_match_count(const struct listing *l, const char *base, const char *pattern);
 
+/* Path of the first of them that has both words in its first 4 KiB, the caller's; NULL: none. */
+char *listing_first_with(const struct listing *l, const char *base, const char *pattern, const char *word,
+                         const char *other);
+
 /* Maps the file at `path` (from the root). `kind` as for mapping_open. */
 enum status listing_open(const struct listing *l, const char *path, const char *kind, struct mapping *m,
                          struct error *err);

@@ -6,14 +6,14 @@
 
 #include "common/mem.h"
 #include "common/rng.h"
+#include "server/scene/area_sample.h"
 
 #define POINTS 256 /* surface points per bin */
 #define SEED UINT64_C(0x7265616368)
 
 struct visibility_bins {
-    const struct mesh *mesh;
+    struct area_sampler area;
     const struct accel *accel;
-    double *area_until; /* [triangle_count] cumulative area up to and including the triangle */
     float share[VISIBILITY_ROWS][VISIBILITY_COLUMNS];
 };
 
@@ -22,35 +22,24 @@ static float number(size_t bin, size_t i, uint64_t which) {
     return rng_to_float((uint32_t)(rng_key(SEED + which, bin, i) >> 32));
 }
 
-static size_t triangle_at(const struct visibility_bins *m, double area) {
-    size_t first = 0, last = m->mesh->triangle_count - 1;
-    while (first < last) {
-        size_t middle = (first + last) / 2;
-        if (m->area_until[middle] > area)
-            last = middle;
-        else
-            first = middle + 1;
-    }
-    return first;
-}
-
 /* Surface points are stratified by area; directions are random within the bin. */
 static void measure_bin(void *user, size_t bin, int thread) {
     (void)thread;
     struct visibility_bins *m = user;
-    double total = m->area_until[m->mesh->triangle_count - 1];
+    const struct mesh *mesh = m->area.mesh;
+    double total = m->area.until[mesh->triangle_count - 1];
     float sum = 0.0f;
     for (size_t i = 0; i < POINTS; i++) {
         double column = (double)(bin % VISIBILITY_COLUMNS) + (double)number(bin, i, 0);
         double row = (double)(bin / VISIBILITY_COLUMNS) + (double)number(bin, i, 1);
         vec3 direction = latlong_direction(column / VISIBILITY_COLUMNS, row / VISIBILITY_ROWS);
-        size_t t = triangle_at(m, total * ((double)i + (double)number(bin, i, 2)) / POINTS);
-        vec3 normal = vec3_normalize(mesh_cross(m->mesh, t));
+        size_t t = area_sampler_triangle(&m->area, total * ((double)i + (double)number(bin, i, 2)) / POINTS);
+        vec3 normal = vec3_normalize(mesh_cross(mesh, t));
         float cosine = vec3_dot(normal, direction);
         if (!(cosine > 0.0f))
             continue;
         float root = sqrtf(number(bin, i, 3)), along = number(bin, i, 4);
-        vec3 point = mesh_point(m->mesh, t, root * (1.0f - along), root * along);
+        vec3 point = mesh_point(mesh, t, root * (1.0f - along), root * along);
         vec3 origin = accel_offset(point, normal, direction);
         if (!accel_occluded(m->accel, origin, direction, 0.0f, INFINITY))
             sum += cosine;
@@ -73,18 +62,13 @@ static float blurred(const struct visibility_bins *m, int row, int column) {
 void visibility_measure(struct visibility *visibility, const struct mesh *mesh, const struct accel *accel,
                         struct parallel *pool) {
     struct visibility_bins *m = mem_calloc(1, sizeof *m);
-    *m = (struct visibility_bins){.mesh = mesh, .accel = accel};
-    m->area_until = mem_array(mesh->triangle_count, sizeof *m->area_until);
-    double total = 0.0;
-    for (size_t i = 0; i < mesh->triangle_count; i++) {
-        total += 0.5 * (double)vec3_length(mesh_cross(mesh, i));
-        m->area_until[i] = total;
-    }
+    m->accel = accel;
+    area_sampler_init(&m->area, mesh);
     parallel_for(pool, (size_t)VISIBILITY_ROWS * VISIBILITY_COLUMNS, measure_bin, m);
     for (int y = 0; y < VISIBILITY_ROWS; y++)
         for (int x = 0; x < VISIBILITY_COLUMNS; x++)
             visibility->share[y][x] = blurred(m, y, x);
-    visibility->area = total;
-    mem_free(m->area_until);
+    visibility->area = m->area.until[mesh->triangle_count - 1];
+    area_sampler_release(&m->area);
     mem_free(m);
 }

@@ -19,8 +19,7 @@ void area_sampler_release(struct area_sampler *s) {
     s->until = NULL;
 }
 
-/* The triangle that holds this much of the area. */
-static size_t triangle_at(const struct area_sampler *s, double area) {
+size_t area_sampler_triangle(const struct area_sampler *s, double area) {
     size_t low = 0, high = s->mesh->triangle_count - 1;
     while (low < high) {
         size_t middle = (low + high) / 2;
@@ -36,7 +35,8 @@ void area_sampler_point(const struct area_sampler *s, uint64_t seed, size_t numb
                         vec3 *normal) {
     uint64_t bits = rng_key(seed, number, 0);
     double total = s->until[s->mesh->triangle_count - 1];
-    size_t t = triangle_at(s, total * ((double)number + (double)rng_to_float((uint32_t)bits)) / (double)count);
+    size_t t =
+        area_sampler_triangle(s, total * ((double)number + (double)rng_to_float((uint32_t)bits)) / (double)count);
     float root = sqrtf(rng_to_float((uint32_t)(bits >> 32))), v = rng_to_float(rng_mix32((uint32_t)(bits >> 16)));
     *position = mesh_point(s->mesh, t, root * (1.0f - v), root * v);
     *normal = vec3_normalize(mesh_cross(s->mesh, t));

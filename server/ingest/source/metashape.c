@@ -16,23 +16,9 @@
 /* Millions of metres from the origin: the centre of the Earth, 6.4 million metres below. */
 #define GEOCENTRIC_M 5e6
 
-/* Whether the file is a document of Metashape, by its beginning: its name is the user's. */
-static bool is_document(const struct listing *l, const char *path) {
-    struct mapping file;
-    if (listing_open(l, path, "an XML file", &file, NULL) != STATUS_OK)
-        return false;
-    size_t size = file.size < 4096 ? file.size : 4096;
-    bool found = memmem(file.data, size, "<document", 9) && memmem(file.data, size, "<chunk", 6);
-    mapping_close(&file);
-    return found;
-}
-
+/* By what it begins with: its name is the user's. */
 static char *recognise(const struct listing *l, const char *base) {
-    const struct listed_file *file;
-    for (size_t at = 0; (file = listing_match(l, base, "*.xml", &at)) != NULL;)
-        if (is_document(l, file->path))
-            return mem_strdup(file->path);
-    return NULL;
+    return listing_first_with(l, base, "*.xml", "<document", "<chunk");
 }
 
 static double value_of(const struct xml_node *node, const char *name, double fallback) {

@@ -36,23 +36,9 @@ static struct lens make_lens(double focal, double centre_x, double centre_y, con
 
 /* --- the table -------------------------------------------------------------------------------- */
 
-/* Whether the file is such a table, by its header. */
-static bool is_table(const struct listing *l, const char *path) {
-    struct mapping file;
-    if (listing_open(l, path, "a table", &file, NULL) != STATUS_OK)
-        return false;
-    size_t size = file.size < 1024 ? file.size : 1024;
-    bool found = memmem(file.data, size, "#name", 5) && memmem(file.data, size, "heading", 7);
-    mapping_close(&file);
-    return found;
-}
-
+/* By its header: its name is the user's. */
 static char *recognise_table(const struct listing *l, const char *base) {
-    const struct listed_file *file;
-    for (size_t at = 0; (file = listing_match(l, base, "*.csv", &at)) != NULL;)
-        if (is_table(l, file->path))
-            return mem_strdup(file->path);
-    return NULL;
+    return listing_first_with(l, base, "*.csv", "#name", "heading");
 }
 
 /* Splits a line at commas, in place; a name in quotes loses them. */
