@@ -39,7 +39,9 @@ static bool strike(const char *room, long n) {
     order(room);
     faults_arm(faults, FAULTS_WORKER, n, EIO, false);
     int code = run(library, "\"type\":\"end\"", &said);
-    bool struck = atomic_load(&faults->failed) > 0;
+    /* Who runs out of memory ends at once, and does not tell of the fault. The attempt after it would not succeed if it
+     * had not been one. */
+    bool struck = atomic_load(&faults->failed) > 0 || code == PROGRESS_EXIT_MEMORY;
     strikes += struck;
     CHECK_THAT(code == 0 || (struck && (code == PROGRESS_EXIT_FAILED || code == PROGRESS_EXIT_NO_SPACE ||
                                         code == PROGRESS_EXIT_MEMORY)),
