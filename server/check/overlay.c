@@ -219,8 +219,9 @@ static void draw_photograph(struct drawing *drawing, const struct photograph *ph
 void overlay_draw(struct drawing *drawing, const struct photograph *photo, const struct camera *camera,
                   const struct accel *accel) {
     float side = (float)(camera->width > camera->height ? camera->width : camera->height);
-    uint32_t width = (uint32_t)fmaxf(1.0f, roundf(OVERLAY_SIZE * (float)camera->width / side));
-    uint32_t height = (uint32_t)fmaxf(1.0f, roundf(OVERLAY_SIZE * (float)camera->height / side));
+    float size = fminf(OVERLAY_SIZE, OVERLAY_ENLARGED * side);
+    uint32_t width = (uint32_t)fmaxf(1.0f, roundf(size * (float)camera->width / side));
+    uint32_t height = (uint32_t)fmaxf(1.0f, roundf(size * (float)camera->height / side));
     struct depth_map map = {.width = (int)(width + 1) / RAYS_EVERY, .height = (int)(height + 1) / RAYS_EVERY};
     size_t count = (size_t)map.width * (size_t)map.height;
     map.inverse = mem_array(count, sizeof *map.inverse);

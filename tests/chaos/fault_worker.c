@@ -253,7 +253,7 @@ int main(int argc, char **argv) {
     file_remove_tree(dir, NULL);
     long strikes = campaign("workers", strike, step, all, from);
     /* They do less, and sooner. */
-    strikes += campaign("checks of scenes", strike_check, is_memory ? 1 : (step + 6) / 7, all, 1);
+    strikes += campaign("checks of scenes", strike_check, (step + 6) / 7, all, 1);
     if (is_memory) {
         figure("no memory, workers: allocations made to fail", (double)strikes, 5000, "higher");
         figure("no memory, workers: of them elsewhere than planned", (double)astray, 0.05 * (double)strikes, "lower");
