@@ -308,12 +308,15 @@ static void check_event_source(struct rig *rig) {
     buf_release(&reply);
 }
 
-/* Streams that the clients have closed count until the daemon has seen that. */
-static void await_no_streams(const struct rig *rig) {
-    for (bool is_none = false; !is_none; usleep(5000)) {
+/* Streams that the clients have closed count until the daemon has seen that, and new ones from the moment after their
+ * first text. */
+static void await_streams(const struct rig *rig, int count) {
+    char wanted[64];
+    snprintf(wanted, sizeof wanted, "\nunbaked_event_streams %d\n", count);
+    for (bool is_so = false; !is_so; usleep(5000)) {
         struct buf reply;
         CHECK(rig_get(rig, "/metrics", "", &reply) == 200);
-        is_none = strstr(buf_text(&reply), "\nunbaked_event_streams 0\n") != NULL;
+        is_so = strstr(buf_text(&reply), wanted) != NULL;
         buf_release(&reply);
     }
 }
@@ -333,12 +336,13 @@ static void check_many(struct rig *rig) {
     int fds[COUNT];
     struct buf replies[COUNT], refusal;
     struct error err;
-    await_no_streams(rig);
+    await_streams(rig, 0);
     for (int i = 0; i < COUNT; i++) {
         buf_init(&replies[i], 1 << 20);
         fds[i] = open_stream(rig, i == 0 ? doomed : job, "", "");
         rig_receive(fds[i], &replies[i], "\"snapshot\":true");
     }
+    await_streams(rig, COUNT);
     char path[64];
     snprintf(path, sizeof path, "/v1/jobs/%lld/events", (long long)job);
     CHECK(rig_get(rig, path, "", &refusal) == 503);
