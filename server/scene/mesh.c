@@ -190,6 +190,13 @@ static void sorted_corners(const struct mesh *mesh, const uint32_t *weld, size_t
     }
 }
 
+void mesh_move_triangle(struct mesh *mesh, size_t from, size_t to) {
+    memmove(mesh->index[to], mesh->index[from], sizeof *mesh->index);
+    mesh->face[to] = mesh->face[from];
+    if (mesh->object_id)
+        mesh->object_id[to] = mesh->object_id[from];
+}
+
 static void drop_unfit(struct mesh *mesh, struct mesh_report *report) {
     uint32_t *weld = mesh_weld(mesh);
     size_t size = table_size(mesh->triangle_count);
@@ -215,10 +222,7 @@ static void drop_unfit(struct mesh *mesh, struct mesh_report *report) {
             continue;
         }
         table[slot] = (uint32_t)kept;
-        memmove(mesh->index[kept], mesh->index[t], sizeof *mesh->index);
-        mesh->face[kept] = mesh->face[t];
-        if (mesh->object_id)
-            mesh->object_id[kept] = mesh->object_id[t];
+        mesh_move_triangle(mesh, t, kept);
         kept++;
     }
     mesh->triangle_count = kept;

@@ -42,6 +42,9 @@ void mesh_release(struct mesh *mesh);
  * adjacent faces'. Fails when no triangle is left. `name` is for messages; report may be NULL. */
 enum status mesh_check(struct mesh *mesh, const char *name, struct mesh_report *report, struct error *err);
 
+/* Copies triangle `from` with its face and object over triangle `to`: to leave some out in place. */
+void mesh_move_triangle(struct mesh *mesh, size_t from, size_t to);
+
 /* Maps each vertex to the lowest-numbered one at the same position (files repeat vertices where
  * normals differ). The result, [vertex_count], is the caller's (mem_free). */
 uint32_t *mesh_weld(const struct mesh *mesh);

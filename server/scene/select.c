@@ -75,10 +75,7 @@ enum status scene_crop(struct scene *scene, const double lower[3], const double 
     for (size_t t = 0; t < mesh->triangle_count; t++) {
         if (!is_inside(mesh, t, lower, upper))
             continue;
-        memmove(mesh->index[kept], mesh->index[t], sizeof *mesh->index);
-        mesh->face[kept] = mesh->face[t];
-        if (mesh->object_id)
-            mesh->object_id[kept] = mesh->object_id[t];
+        mesh_move_triangle(mesh, t, kept);
         kept++;
     }
     mesh->triangle_count = kept;

@@ -1,4 +1,4 @@
-/* gltf_extensions.c -- see gltf_extensions.h. Names are those of Khronos' registry of extensions. */
+/* gltf_extensions.c -- see gltf_extensions.h. Names are as Khronos lists them (glTF, extensions/README.md). */
 #include "server/ingest/mesh/gltf_extensions.h"
 
 #include <stdbool.h>
