@@ -1,6 +1,7 @@
 /* clock.c -- see clock.h. */
 #include "common/clock.h"
 
+#include <stdio.h>
 #include <time.h>
 
 double clock_sec(void) {
@@ -13,4 +14,12 @@ int64_t clock_unix_ms(void) {
     struct timespec now;
     clock_gettime(CLOCK_REALTIME, &now);
     return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
+}
+
+void clock_text(int64_t unix_ms, char text[CLOCK_TEXT_SIZE]) {
+    time_t seconds = (time_t)(unix_ms / 1000);
+    struct tm utc;
+    gmtime_r(&seconds, &utc);
+    size_t used = strftime(text, CLOCK_TEXT_SIZE, "%Y-%m-%dT%H:%M:%S", &utc);
+    snprintf(text + used, CLOCK_TEXT_SIZE - used, ".%03dZ", (int)(unix_ms % 1000));
 }

@@ -6,9 +6,9 @@
 #include <stdatomic.h>
 #include <stdio.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
+#include "common/clock.h"
 #include "common/utf8.h"
 
 /* Message and values are truncated before quoting, so that a line is always complete. */
@@ -103,13 +103,8 @@ static void write_line(enum log_level level, const struct log_field *fields, siz
         return;
     enum log_format style = (enum log_format)atomic_load(&current_format);
     struct line line = {.length = 0};
-    char message[MESSAGE_BYTES], value[VALUE_BYTES], at[40];
-    struct timespec now;
-    struct tm utc;
-    clock_gettime(CLOCK_REALTIME, &now);
-    gmtime_r(&now.tv_sec, &utc);
-    size_t used = strftime(at, sizeof at, "%Y-%m-%dT%H:%M:%S", &utc);
-    snprintf(at + used, sizeof at - used, ".%03ldZ", now.tv_nsec / 1000000);
+    char message[MESSAGE_BYTES], value[VALUE_BYTES], at[CLOCK_TEXT_SIZE];
+    clock_text(clock_unix_ms(), at);
     vsnprintf(message, sizeof message, format, args);
     put_text(&line, style == LOG_TEXT ? "" : style == LOG_JSON ? "{\"time\":\"" : "time=");
     put_text(&line, at);

@@ -8,7 +8,7 @@
 #include "common/buf.h"
 #include "common/image.h"
 #include "common/mem.h"
-#include "server/http/listener.h"
+#include "server/transport/listener.h"
 #include "server/ingest/mesh/gltf_meshopt.h"
 #include "server/render/accel.h"
 #include "server/store/store.h"

@@ -24,14 +24,14 @@
 #include "server/commands.h"
 #include "server/data/collector.h"
 #include "server/data/folder.h"
-#include "server/http/hub.h"
-#include "server/http/listener.h"
+#include "server/events/hub.h"
 #include "server/http/service.h"
 #include "server/job/scheduler.h"
 #include "server/libraries.h"
 #include "server/net/address.h"
 #include "server/notify.h"
 #include "server/store/store.h"
+#include "server/transport/listener.h"
 
 static void print_version(void) {
     struct library list[LIBRARY_COUNT];
@@ -200,7 +200,7 @@ static enum status build(struct daemon *d, struct error *err) {
     if (status == STATUS_OK)
         status = service_new(&d->api, &limits, d->store, d->scheduler, err);
     if (status == STATUS_OK)
-        status = listener_start(&d->listener, &network, d->api, err);
+        status = service_listen(&d->listener, &network, d->api, err);
     if (status == STATUS_OK)
         status = admin_start(&d->admin, c->data_dir, d->store, on_revoked, d, err);
     if (status == STATUS_OK)

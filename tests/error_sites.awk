@@ -4,7 +4,7 @@
 #
 #   - calls one of common/error.h (error_set, ...), or returns a STATUS_ of failure;
 #   - compares with STATUS_OK;
-#   - answers with a problem (server/http/problem.h), or logs a warning or an error.
+#   - answers with a problem (server/transport/problem.h), or logs a warning or an error.
 #
 # It has happened when the line has run and each of its branches was taken: where a status is looked at, it was
 # good once and bad once.

@@ -27,6 +27,7 @@ own() {
 # The engine, lowest first: each folder includes only those before it (and common).
 engine_order='scene render capture gather state material light refine reconstruct'
 engine="server/($(echo "$engine_order" | tr ' ' '|')|ingest|export)/"
+daemon='http|events|transport|net|uploads|data|store|job|admin'
 above=" $engine_order "
 for folder in $engine_order; do
     above=${above#* "$folder" }
@@ -38,35 +39,41 @@ forbid "server/ingest server/export" "server/($(echo "$engine_order" | cut -d' '
     'ingest and export see only scene'
 forbid server/ingest 'server/export/' 'ingest does not see export'
 forbid server/export 'server/ingest/' 'export does not see ingest'
-forbid server/check "server/($(echo "$engine_order" | cut -d' ' -f4- | tr ' ' '|' | sed 's/state|//')|export|http|net|uploads|data|store|job|worker|admin)/" \
+forbid server/check "server/($(echo "$engine_order" | cut -d' ' -f4- | tr ' ' '|' | sed 's/state|//')|export|$daemon|worker)/" \
     'check sees scene, render, capture, state and ingest'
-forbid "$(for folder in $engine_order ingest export http net uploads data store job admin; do echo "server/$folder"; done)" \
+forbid "$(for folder in $engine_order ingest export ${daemon//|/ }; do echo "server/$folder"; done)" \
     'server/check/' 'only the worker sees check'
 forbid "$(for folder in $engine_order ingest export; do echo "server/$folder"; done)" \
-    'server/(http|net|uploads|data|store|job|worker)/' 'the engine never sees http, SQL or jobs'
+    "server/($daemon|worker)/" 'the engine never sees http, SQL or jobs'
 
 forbid common 'server/|client/' 'common depends on nothing of ours'
 forbid client 'server/' 'the client knows only common'
 # The daemon: http -> uploads -> data -> store; store knows of data only the paths. Below http, net: connections and the
-# syntax of what comes over them, which knows of nothing else.
+# syntax of what comes over them, which knows of nothing else; transport: requests and replies, whatever they mean;
+# events: streams of what changes in the store.
 forbid server/net 'server/[^n]' 'net sees only common'
+forbid server/transport "$engine|server/(http|events|uploads|data|job|worker|admin)/|server/store/[^u]" \
+    'transport sees net, and of store only users.h'
+forbid server/events "$engine|server/(http|net|uploads|data|worker|admin)/" 'events see transport and store'
 forbid server/http "$engine|server/worker/" 'http never sees the engine or the worker'
-forbid server/uploads "$engine|server/(http|net|job|worker|admin)/" 'uploads see only data and store'
-forbid server/data "$engine|server/(http|net|uploads|job|worker|admin)/" 'data sees only store'
-forbid server/admin "$engine|server/(uploads|job|http)/|server/net/[^t]" 'admin sees data and store, and of net only tls.h'
-forbid server/store "$engine|server/(http|net|uploads|worker|admin)/|server/data/[^l]" 'store sees only job.h and data/layout.h'
-forbid server/job "$engine|server/(http|net|uploads|admin)/" 'job never sees the engine, http or uploads'
+forbid server/uploads "$engine|server/(http|events|transport|net|job|worker|admin)/" 'uploads see only data and store'
+forbid server/data "$engine|server/(http|events|transport|net|uploads|job|worker|admin)/" 'data sees only store'
+forbid server/admin "$engine|server/(uploads|job|http|events|transport)/|server/net/[^t]" \
+    'admin sees data and store, and of net only tls.h'
+forbid server/store "$engine|server/(http|events|transport|net|uploads|worker|admin)/|server/data/[^l]" \
+    'store sees only job.h and data/layout.h'
+forbid server/job "$engine|server/(http|events|transport|net|uploads|admin)/" 'job never sees the engine, http or uploads'
 forbid server/job 'server/worker/[^p]' 'job sees only worker/progress.h'
-forbid server/worker 'server/(http|net|uploads|job)/|server/data/[^l]|server/store/(store|internal)' \
+forbid server/worker 'server/(http|events|transport|net|uploads|job)/|server/data/[^l]|server/store/(store|internal)' \
     "the worker never sees the daemon's memory"
 
-forbid "server/demo server/evaluate" 'server/(http|net|uploads|data|store|job|worker)/' 'tools know only the engine'
+forbid "server/demo server/evaluate" "server/($daemon|worker)/" 'tools know only the engine'
 forbid server/demo 'server/(ingest|capture|gather|state|material|light|refine|reconstruct|export|evaluate)/' 'demo sees only render and scene'
 forbid "$(ls -d server/*/ | grep -vE 'demo|evaluate' | tr '\n' ' ')" 'server/(demo|evaluate)/' \
     'only main.c sees the tools'
 
 own 'embree[34]/' server/render/accel.c
-own 'microhttpd\.h' server/http/exchange.h
+own 'microhttpd\.h' server/transport/exchange.h
 own 'gnutls/' server/net/tls.c server/worker/deliver.c
 own 'sqlite3\.h' server/store/store.c server/store/sql.h server/worker/checkpoint.c server/main.c
 own 'curl/' client/request.c
@@ -83,7 +90,7 @@ own 'seccomp\.h' server/worker/confine_calls.c
 
 # Paths in the data folder are made in one place. (Of the engine's files only worker knows the names.)
 paths=$(grep -nE 'file_join\([^"]*, "|"(%s/)?(scenes|jobs|uploads|trash)/[%a-zX]|%s/(out|files|archive|previews)/|"(checkpoint\.db|worker\.log|state\.db|admin\.sock)' \
-    server/*.c server/{http,net,uploads,data,store,job,worker,admin}/*.[ch] | grep -vE '^server/data/layout\.|/manual\.c')
+    server/*.c server/{http,events,transport,net,uploads,data,store,job,worker,admin}/*.[ch] | grep -vE '^server/data/layout\.|/manual\.c')
 [ -z "$paths" ] || { printf 'only server/data/layout.c makes paths in the data folder:\n%s\n' "$paths"; bad=1; }
 
 # Each unit and one that it includes, a pair a line.

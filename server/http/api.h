@@ -6,9 +6,9 @@
 
 #include "server/data/collector.h"
 #include "server/data/folder.h"
-#include "server/http/message.h"
 #include "server/job/scheduler.h"
 #include "server/store/store.h"
+#include "server/transport/message.h"
 
 #define API_NAME_MAX_BYTES 200 /* of the name that a user gives a scene, an upload or a job */
 
@@ -48,10 +48,10 @@ struct api_config {
     size_t library_count;
 };
 
-struct hub;            /* hub.h */
+struct hub;            /* events/hub.h */
 struct digests;        /* uploads/digests.h */
 struct resumables;     /* uploads/resumable.h */
-struct listener;       /* listener.h */
+struct listener;       /* transport/listener.h */
 struct request_counts; /* request_counts.h */
 struct auth_throttle;  /* auth_throttle.h */
 struct readiness;      /* readiness.h */

@@ -10,10 +10,10 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "server/http/auth_throttle.h"
-#include "server/http/problem.h"
 #include "server/http/route.h"
 #include "server/net/address.h"
 #include "server/net/field.h"
+#include "server/transport/problem.h"
 
 bool auth_is_open(const struct api *api) {
     return api->config.access == API_ACCESS_OPEN ||

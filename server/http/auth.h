@@ -6,7 +6,7 @@
 #define UNBAKE_HTTP_AUTH_H
 
 #include "server/http/api.h"
-#include "server/http/message.h"
+#include "server/transport/message.h"
 
 #define AUTH_COOKIE "unbake_token"
 

@@ -10,7 +10,7 @@
 #ifndef UNBAKE_HTTP_AUTH_THROTTLE_H
 #define UNBAKE_HTTP_AUTH_THROTTLE_H
 
-#include "server/http/message.h"
+#include "server/transport/message.h"
 
 #define AUTH_THROTTLE_BURST 20.0
 #define AUTH_THROTTLE_PER_SEC 0.5 /* a page left open with an old token retries every 3 s */

@@ -1,9 +1,9 @@
 /* collect.c -- /v1/collect: removes what has expired, or (dry run) lists it. */
+#include "common/clock.h"
 #include "server/data/collector.h"
 #include "server/http/handlers.h"
 #include "server/http/retention.h"
-#include "server/http/problem.h"
-#include "server/http/views.h"
+#include "server/transport/problem.h"
 
 struct found {
     cJSON *items;
@@ -12,9 +12,9 @@ struct found {
 
 static void add_item(void *user, const struct expired *e, uint64_t files, uint64_t bytes) {
     struct found *found = user;
-    char time[VIEW_TIME_SIZE];
+    char time[CLOCK_TEXT_SIZE];
     cJSON *item = cJSON_CreateObject();
-    view_time(e->expires_ms, time);
+    clock_text(e->expires_ms, time);
     json_add_string(item, "kind", collector_kind_name(e));
     json_add_string(item, "id", e->id);
     json_add_string(item, "name", e->name);

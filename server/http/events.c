@@ -2,13 +2,13 @@
 #include <stdio.h>
 
 #include "common/protocol.h"
+#include "server/events/subscriber.h"
 #include "server/http/auth.h"
 #include "server/http/handlers.h"
 #include "server/http/limits.h"
-#include "server/http/problem.h"
-#include "server/http/subscriber.h"
 #include "server/http/views.h"
 #include "server/net/field.h"
+#include "server/transport/problem.h"
 
 #define WAIT_MAX_SEC 300
 
@@ -53,7 +53,7 @@ static struct response *stream_reply(struct api *api, const struct request *r, c
     response_field(reply, "Cache-Control", "no-store");
     response_field(reply, "X-Accel-Buffering", "no"); /* nginx: do not buffer */
     if (!r->is_head)
-        reply->stream = subscriber_new(api, &r->caller, what);
+        reply->stream = subscriber_new(api->hub, api->store, &r->caller, what);
     else
         cJSON_Delete(what->snapshot);
     return reply;
@@ -102,7 +102,7 @@ struct response *events_all(struct api *api, struct request *r) {
 
 struct response *events_wait(struct api *api, struct request *r, const struct job *job) {
     const char *known = request_field(r, "If-None-Match");
-    struct subscription what = {.job_id = job->id, .revision = -1};
+    struct subscription what = {.job_id = job->id, .revision = -1, .view_job = view_job};
     char etag[48];
     int64_t wait_sec;
     snprintf(etag, sizeof etag, "\"rev-%lld\"", (long long)job->revision);

@@ -7,7 +7,7 @@
 #include "common/json.h"
 #include "common/mem.h"
 #include "common/settings.h"
-#include "server/http/problem.h"
+#include "server/transport/problem.h"
 
 /* The job's settings: *given as they were submitted (the caller's), *full with defaults filled in. */
 static enum status read_settings(const struct job *job, cJSON **given, struct settings *full, struct error *err) {

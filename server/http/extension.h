@@ -2,8 +2,8 @@
 #ifndef UNBAKE_HTTP_EXTENSION_H
 #define UNBAKE_HTTP_EXTENSION_H
 
-#include "server/http/message.h"
 #include "server/job/job.h"
+#include "server/transport/message.h"
 
 /* The job's settings, as JSON text, with the limit that the body names raised by the body's number; the caller's
  * (mem_free). NULL, and *refusal, where the body does not fit the job's settings. */

@@ -5,8 +5,8 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "server/http/problem.h"
 #include "server/net/field.h"
+#include "server/transport/problem.h"
 
 #define ETAG_SIZE 80
 

@@ -3,7 +3,7 @@
 #ifndef UNBAKE_HTTP_FILE_REPLY_H
 #define UNBAKE_HTTP_FILE_REPLY_H
 
-#include "server/http/message.h"
+#include "server/transport/message.h"
 #include "server/uploads/digests.h"
 
 /* Sends the open file `fd` (taken), of which `file` tells what it is; 304 or 416 where that is the answer. */

@@ -3,7 +3,7 @@
 #define UNBAKE_HTTP_HANDLERS_H
 
 #include "server/http/api.h"
-#include "server/http/message.h"
+#include "server/transport/message.h"
 
 /* system.c */
 struct response *system_root(struct api *api, struct request *r);

@@ -7,7 +7,7 @@
 #include "server/http/extension.h"
 #include "server/http/handlers.h"
 #include "server/http/job_reply.h"
-#include "server/http/problem.h"
+#include "server/transport/problem.h"
 
 static struct response *act(struct api *api, const struct request *r,
                             enum status (*action)(struct api *api, int64_t id, struct error *err)) {

@@ -3,8 +3,8 @@
 
 #include <stdio.h>
 
-#include "server/http/problem.h"
 #include "server/http/views.h"
+#include "server/transport/problem.h"
 
 struct response *job_reply(const struct request *r, struct job *job, int status) {
     char etag[48];

@@ -3,7 +3,7 @@
 #define UNBAKE_HTTP_JOB_REPLY_H
 
 #include "server/http/api.h"
-#include "server/http/message.h"
+#include "server/transport/message.h"
 
 /* Releases the job. A GET with the ETag in If-None-Match gets 304. */
 struct response *job_reply(const struct request *r, struct job *job, int status);

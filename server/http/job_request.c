@@ -11,10 +11,10 @@
 #include "common/url.h"
 #include "common/utf8.h"
 #include "server/http/api.h"
-#include "server/http/body.h"
 #include "server/http/retention.h"
-#include "server/http/problem.h"
 #include "server/job/fit.h"
+#include "server/transport/body.h"
+#include "server/transport/problem.h"
 
 #define PRIORITY_MAX 100
 #define LABELS_MAX 32

@@ -7,8 +7,8 @@
 
 #include "common/json.h"
 #include "common/settings.h"
-#include "server/http/message.h"
 #include "server/store/store.h"
+#include "server/transport/message.h"
 
 /* Pointers point into `body`. */
 struct job_request {

@@ -12,11 +12,11 @@
 #include "server/http/handlers.h"
 #include "server/http/job_reply.h"
 #include "server/http/job_request.h"
-#include "server/http/problem.h"
 #include "server/http/retention.h"
 #include "server/http/space.h"
 #include "server/http/views.h"
 #include "server/net/field.h"
+#include "server/transport/problem.h"
 
 struct response *jobs_get(struct api *api, struct request *r) {
     struct response *refusal = NULL;

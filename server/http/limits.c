@@ -6,8 +6,8 @@
 #include "common/clock.h"
 #include "common/file.h"
 #include "common/mem.h"
-#include "server/http/hub.h"
-#include "server/http/problem.h"
+#include "server/events/hub.h"
+#include "server/transport/problem.h"
 
 #define ADMIN_STREAMS 10 /* one stream in ten is kept for admins */
 

@@ -4,7 +4,7 @@
 #define UNBAKE_HTTP_LIMITS_H
 
 #include "server/http/api.h"
-#include "server/http/message.h"
+#include "server/transport/message.h"
 
 /* Whether these limits apply to the caller: not to admins, nor while the daemon is open. */
 bool limits_bind(const struct request *r);

@@ -6,12 +6,12 @@
 
 #include "common/file.h"
 #include "common/protocol.h"
-#include "server/uploads/digests.h"
+#include "server/events/hub.h"
 #include "server/http/handlers.h"
-#include "server/http/hub.h"
-#include "server/http/listener.h"
-#include "server/http/problem.h"
 #include "server/http/request_counts.h"
+#include "server/transport/listener.h"
+#include "server/transport/problem.h"
+#include "server/uploads/digests.h"
 
 static void metric(struct buf *b, const char *name, const char *type, const char *help, double value) {
     buf_printf(b, "# HELP unbaked_%s %s\n# TYPE unbaked_%s %s\nunbaked_%s %.17g\n", name, help, name, type, name,

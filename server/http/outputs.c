@@ -16,9 +16,9 @@
 #include "server/http/auth.h"
 #include "server/http/file_reply.h"
 #include "server/http/handlers.h"
-#include "server/http/problem.h"
 #include "server/http/views.h"
 #include "server/net/field.h"
+#include "server/transport/problem.h"
 #include "server/uploads/digests.h"
 
 #define LOG_BYTES_DEFAULT 65536

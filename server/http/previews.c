@@ -10,7 +10,7 @@
 #include "server/http/auth.h"
 #include "server/http/file_reply.h"
 #include "server/http/handlers.h"
-#include "server/http/problem.h"
+#include "server/transport/problem.h"
 
 static bool is_picture_name(const char *name) {
     static const char letters[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.",

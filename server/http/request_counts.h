@@ -3,7 +3,7 @@
 #define UNBAKE_HTTP_REQUEST_COUNTS_H
 
 #include "common/buf.h"
-#include "server/http/message.h"
+#include "server/transport/message.h"
 
 struct request_counts; /* opaque */
 

@@ -6,7 +6,7 @@
 
 #include "common/file.h"
 #include "common/mem.h"
-#include "server/http/problem.h"
+#include "server/transport/problem.h"
 
 /* Parses 2026-11-21T15:00:00Z, with or without a fraction, to Unix milliseconds; 0 if it is malformed. */
 static int64_t read_time(const char *text) {

@@ -3,7 +3,7 @@
 #define UNBAKE_HTTP_RETENTION_H
 
 #include "server/http/api.h"
-#include "server/http/message.h"
+#include "server/transport/message.h"
 
 /* Reads a member of a PATCH's body; false if it is not about retention. Faults go to params. */
 bool retention_read(struct retention *k, const cJSON *member, cJSON *params);

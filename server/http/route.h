@@ -2,7 +2,7 @@
 #ifndef UNBAKE_HTTP_ROUTE_H
 #define UNBAKE_HTTP_ROUTE_H
 
-#include "server/http/message.h"
+#include "server/transport/message.h"
 
 struct api;
 
@@ -16,20 +16,13 @@ enum route_body {
 /* The lowest role that is allowed. */
 enum route_access { ROUTE_PUBLIC, ROUTE_VIEWER, ROUTE_USER, ROUTE_ADMIN };
 
-/* Which threads run the handler; see listener.h. */
-enum route_pace {
-    ROUTE_AT_ONCE, /* uses neither store, disk nor caller */
-    ROUTE_QUICK,   /* uses the store, opens a file */
-    ROUTE_SLOW     /* syncs, hashes, or reads files whose size users choose */
-};
-
 struct route {
     enum method method;
     const char *pattern; /* "/v1/jobs/{job}": {x} is one segment, {x...} one or more at the end */
     enum route_access access;
     struct response *(*handle)(struct api *api, struct request *r);
     enum route_body body;
-    enum route_pace pace;
+    enum pace pace;    /* of the handler */
     const char *query; /* names of the query's parameters, separated by spaces */
 };
 

@@ -7,55 +7,55 @@
 #include "common/protocol.h"
 #include "server/http/auth.h"
 #include "server/http/handlers.h"
-#include "server/http/problem.h"
 #include "server/http/scene_body.h"
 #include "server/http/uploads.h"
 #include "server/net/field.h"
+#include "server/transport/problem.h"
 #include "server/uploads/upload.h"
 
 static const struct route table[] = {
-    {METHOD_GET, "/", ROUTE_PUBLIC, system_root, 0, ROUTE_AT_ONCE, ""},
-    {METHOD_GET, "/page.css", ROUTE_PUBLIC, system_page_css, 0, ROUTE_AT_ONCE, ""},
-    {METHOD_GET, "/page.js", ROUTE_PUBLIC, system_page_js, 0, ROUTE_AT_ONCE, ""},
-    {METHOD_GET, "/healthz", ROUTE_PUBLIC, system_healthz, 0, ROUTE_AT_ONCE, ""},
-    {METHOD_GET, "/readyz", ROUTE_PUBLIC, system_readyz, 0, ROUTE_SLOW, ""},
-    {METHOD_GET, "/metrics", ROUTE_VIEWER, system_metrics, 0, ROUTE_QUICK, ""},
-    {METHOD_GET, "/openapi.json", ROUTE_PUBLIC, system_openapi, 0, ROUTE_AT_ONCE, ""},
-    {METHOD_GET, "/v1/version", ROUTE_VIEWER, system_version, 0, ROUTE_QUICK, ""},
-    {METHOD_GET, "/v1/session", ROUTE_VIEWER, session_get, 0, ROUTE_QUICK, ""},
-    {METHOD_POST, "/v1/session", ROUTE_PUBLIC, session_add, ROUTE_BODY_JSON, ROUTE_QUICK, ""},
-    {METHOD_DELETE, "/v1/session", ROUTE_PUBLIC, session_delete, 0, ROUTE_AT_ONCE, ""},
-    {METHOD_GET, "/v1/settings", ROUTE_VIEWER, system_settings, 0, ROUTE_QUICK, ""},
-    {METHOD_GET, "/v1/scenes", ROUTE_VIEWER, scenes_list, 0, ROUTE_QUICK, "limit cursor"},
-    {METHOD_POST, "/v1/scenes", ROUTE_USER, scenes_add, ROUTE_BODY_UPLOAD, ROUTE_SLOW, "name reading"},
-    {METHOD_GET, "/v1/scenes/{scene}", ROUTE_VIEWER, scenes_get, 0, ROUTE_QUICK, ""},
-    {METHOD_PATCH, "/v1/scenes/{scene}", ROUTE_USER, scenes_patch, ROUTE_BODY_JSON, ROUTE_QUICK, ""},
-    {METHOD_DELETE, "/v1/scenes/{scene}", ROUTE_USER, scenes_delete, 0, ROUTE_SLOW, "dry_run"},
-    {METHOD_GET, "/v1/scenes/{scene}/preview/{name}", ROUTE_VIEWER, previews_get, 0, ROUTE_QUICK, ""},
-    {METHOD_OPTIONS, "/v1/uploads", ROUTE_PUBLIC, uploads_options, 0, ROUTE_AT_ONCE, ""},
-    {METHOD_GET, "/v1/uploads", ROUTE_VIEWER, uploads_list, 0, ROUTE_QUICK, "sha256 limit cursor"},
-    {METHOD_POST, "/v1/uploads", ROUTE_USER, uploads_add, 0, ROUTE_SLOW, ""},
-    {METHOD_OPTIONS, "/v1/uploads/{upload}", ROUTE_PUBLIC, uploads_options, 0, ROUTE_AT_ONCE, ""},
-    {METHOD_GET, "/v1/uploads/{upload}", ROUTE_VIEWER, uploads_get, 0, ROUTE_SLOW, ""},
-    {METHOD_PATCH, "/v1/uploads/{upload}", ROUTE_USER, uploads_patch, ROUTE_BODY_PATCH, ROUTE_SLOW, ""},
-    {METHOD_DELETE, "/v1/uploads/{upload}", ROUTE_USER, uploads_delete, 0, ROUTE_SLOW, "dry_run"},
-    {METHOD_POST, "/v1/collect", ROUTE_ADMIN, collect_now, 0, ROUTE_SLOW, "dry_run"},
-    {METHOD_GET, "/v1/jobs", ROUTE_VIEWER, jobs_list, 0, ROUTE_QUICK, "state limit cursor"},
-    {METHOD_POST, "/v1/jobs", ROUTE_USER, jobs_add, ROUTE_BODY_JSON, ROUTE_QUICK, "dry_run"},
-    {METHOD_GET, "/v1/jobs/{job}", ROUTE_VIEWER, jobs_get, 0, ROUTE_QUICK, "wait"},
-    {METHOD_PATCH, "/v1/jobs/{job}", ROUTE_USER, jobs_patch, ROUTE_BODY_JSON, ROUTE_QUICK, ""},
-    {METHOD_DELETE, "/v1/jobs/{job}", ROUTE_USER, jobs_delete, 0, ROUTE_SLOW, "dry_run"},
-    {METHOD_POST, "/v1/jobs/{job}/cancel", ROUTE_USER, job_action_cancel, 0, ROUTE_QUICK, ""},
-    {METHOD_POST, "/v1/jobs/{job}/pause", ROUTE_USER, job_action_pause, 0, ROUTE_QUICK, ""},
-    {METHOD_POST, "/v1/jobs/{job}/resume", ROUTE_USER, job_action_resume, 0, ROUTE_QUICK, ""},
-    {METHOD_POST, "/v1/jobs/{job}/retry", ROUTE_USER, job_action_retry, 0, ROUTE_QUICK, "from"},
-    {METHOD_POST, "/v1/jobs/{job}/extend", ROUTE_USER, job_action_extend, ROUTE_BODY_JSON, ROUTE_QUICK, ""},
-    {METHOD_POST, "/v1/jobs/{job}/webhook/redeliver", ROUTE_USER, job_action_redeliver, 0, ROUTE_QUICK, ""},
-    {METHOD_GET, "/v1/events", ROUTE_VIEWER, events_all, 0, ROUTE_QUICK, "after follow wait"},
-    {METHOD_GET, "/v1/jobs/{job}/events", ROUTE_VIEWER, events_get, 0, ROUTE_QUICK, "after follow wait"},
-    {METHOD_GET, "/v1/jobs/{job}/log", ROUTE_VIEWER, jobs_log, 0, ROUTE_QUICK, "bytes"},
-    {METHOD_GET, "/v1/jobs/{job}/outputs", ROUTE_VIEWER, outputs_list, 0, ROUTE_QUICK, ""},
-    {METHOD_GET, "/v1/jobs/{job}/outputs/{name...}", ROUTE_VIEWER, outputs_get, 0, ROUTE_QUICK, ""},
+    {METHOD_GET, "/", ROUTE_PUBLIC, system_root, 0, PACE_AT_ONCE, ""},
+    {METHOD_GET, "/page.css", ROUTE_PUBLIC, system_page_css, 0, PACE_AT_ONCE, ""},
+    {METHOD_GET, "/page.js", ROUTE_PUBLIC, system_page_js, 0, PACE_AT_ONCE, ""},
+    {METHOD_GET, "/healthz", ROUTE_PUBLIC, system_healthz, 0, PACE_AT_ONCE, ""},
+    {METHOD_GET, "/readyz", ROUTE_PUBLIC, system_readyz, 0, PACE_SLOW, ""},
+    {METHOD_GET, "/metrics", ROUTE_VIEWER, system_metrics, 0, PACE_QUICK, ""},
+    {METHOD_GET, "/openapi.json", ROUTE_PUBLIC, system_openapi, 0, PACE_AT_ONCE, ""},
+    {METHOD_GET, "/v1/version", ROUTE_VIEWER, system_version, 0, PACE_QUICK, ""},
+    {METHOD_GET, "/v1/session", ROUTE_VIEWER, session_get, 0, PACE_QUICK, ""},
+    {METHOD_POST, "/v1/session", ROUTE_PUBLIC, session_add, ROUTE_BODY_JSON, PACE_QUICK, ""},
+    {METHOD_DELETE, "/v1/session", ROUTE_PUBLIC, session_delete, 0, PACE_AT_ONCE, ""},
+    {METHOD_GET, "/v1/settings", ROUTE_VIEWER, system_settings, 0, PACE_QUICK, ""},
+    {METHOD_GET, "/v1/scenes", ROUTE_VIEWER, scenes_list, 0, PACE_QUICK, "limit cursor"},
+    {METHOD_POST, "/v1/scenes", ROUTE_USER, scenes_add, ROUTE_BODY_UPLOAD, PACE_SLOW, "name reading"},
+    {METHOD_GET, "/v1/scenes/{scene}", ROUTE_VIEWER, scenes_get, 0, PACE_QUICK, ""},
+    {METHOD_PATCH, "/v1/scenes/{scene}", ROUTE_USER, scenes_patch, ROUTE_BODY_JSON, PACE_QUICK, ""},
+    {METHOD_DELETE, "/v1/scenes/{scene}", ROUTE_USER, scenes_delete, 0, PACE_SLOW, "dry_run"},
+    {METHOD_GET, "/v1/scenes/{scene}/preview/{name}", ROUTE_VIEWER, previews_get, 0, PACE_QUICK, ""},
+    {METHOD_OPTIONS, "/v1/uploads", ROUTE_PUBLIC, uploads_options, 0, PACE_AT_ONCE, ""},
+    {METHOD_GET, "/v1/uploads", ROUTE_VIEWER, uploads_list, 0, PACE_QUICK, "sha256 limit cursor"},
+    {METHOD_POST, "/v1/uploads", ROUTE_USER, uploads_add, 0, PACE_SLOW, ""},
+    {METHOD_OPTIONS, "/v1/uploads/{upload}", ROUTE_PUBLIC, uploads_options, 0, PACE_AT_ONCE, ""},
+    {METHOD_GET, "/v1/uploads/{upload}", ROUTE_VIEWER, uploads_get, 0, PACE_SLOW, ""},
+    {METHOD_PATCH, "/v1/uploads/{upload}", ROUTE_USER, uploads_patch, ROUTE_BODY_PATCH, PACE_SLOW, ""},
+    {METHOD_DELETE, "/v1/uploads/{upload}", ROUTE_USER, uploads_delete, 0, PACE_SLOW, "dry_run"},
+    {METHOD_POST, "/v1/collect", ROUTE_ADMIN, collect_now, 0, PACE_SLOW, "dry_run"},
+    {METHOD_GET, "/v1/jobs", ROUTE_VIEWER, jobs_list, 0, PACE_QUICK, "state limit cursor"},
+    {METHOD_POST, "/v1/jobs", ROUTE_USER, jobs_add, ROUTE_BODY_JSON, PACE_QUICK, "dry_run"},
+    {METHOD_GET, "/v1/jobs/{job}", ROUTE_VIEWER, jobs_get, 0, PACE_QUICK, "wait"},
+    {METHOD_PATCH, "/v1/jobs/{job}", ROUTE_USER, jobs_patch, ROUTE_BODY_JSON, PACE_QUICK, ""},
+    {METHOD_DELETE, "/v1/jobs/{job}", ROUTE_USER, jobs_delete, 0, PACE_SLOW, "dry_run"},
+    {METHOD_POST, "/v1/jobs/{job}/cancel", ROUTE_USER, job_action_cancel, 0, PACE_QUICK, ""},
+    {METHOD_POST, "/v1/jobs/{job}/pause", ROUTE_USER, job_action_pause, 0, PACE_QUICK, ""},
+    {METHOD_POST, "/v1/jobs/{job}/resume", ROUTE_USER, job_action_resume, 0, PACE_QUICK, ""},
+    {METHOD_POST, "/v1/jobs/{job}/retry", ROUTE_USER, job_action_retry, 0, PACE_QUICK, "from"},
+    {METHOD_POST, "/v1/jobs/{job}/extend", ROUTE_USER, job_action_extend, ROUTE_BODY_JSON, PACE_QUICK, ""},
+    {METHOD_POST, "/v1/jobs/{job}/webhook/redeliver", ROUTE_USER, job_action_redeliver, 0, PACE_QUICK, ""},
+    {METHOD_GET, "/v1/events", ROUTE_VIEWER, events_all, 0, PACE_QUICK, "after follow wait"},
+    {METHOD_GET, "/v1/jobs/{job}/events", ROUTE_VIEWER, events_get, 0, PACE_QUICK, "after follow wait"},
+    {METHOD_GET, "/v1/jobs/{job}/log", ROUTE_VIEWER, jobs_log, 0, PACE_QUICK, "bytes"},
+    {METHOD_GET, "/v1/jobs/{job}/outputs", ROUTE_VIEWER, outputs_list, 0, PACE_QUICK, ""},
+    {METHOD_GET, "/v1/jobs/{job}/outputs/{name...}", ROUTE_VIEWER, outputs_get, 0, PACE_QUICK, ""},
 };
 
 const struct route *routes_table(size_t *count) {
@@ -189,12 +189,12 @@ struct response *routes_find(struct request *r) {
     for (size_t i = 0; i < sizeof table / sizeof *table && !r->route; i++)
         if ((int)table[i].method == r->method && matches(table[i].pattern, &r->target))
             r->route = &table[i];
-    return r->route ? NULL : answer(r, no_route(r));
-}
-
-bool routes_body_is_stored(const struct request *r) {
+    if (!r->route)
+        return answer(r, no_route(r));
     enum route_body body = body_of(r);
-    return body == ROUTE_BODY_UPLOAD || body == ROUTE_BODY_PATCH;
+    r->pace = r->route->pace;
+    r->is_body_stored = body == ROUTE_BODY_UPLOAD || body == ROUTE_BODY_PATCH;
+    return NULL;
 }
 
 static struct response *begin(struct api *api, struct request *r) {

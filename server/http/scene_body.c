@@ -7,10 +7,10 @@
 #include "common/mem.h"
 #include "common/utf8.h"
 #include "server/http/limits.h"
-#include "server/http/problem.h"
 #include "server/http/scene_reading.h"
 #include "server/http/space.h"
 #include "server/net/field.h"
+#include "server/transport/problem.h"
 #include "server/uploads/upload.h"
 
 static struct response *check_request(const struct request *r) {

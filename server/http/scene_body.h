@@ -4,7 +4,7 @@
 
 #include "common/sha256.h"
 #include "server/http/api.h"
-#include "server/http/message.h"
+#include "server/transport/message.h"
 
 /* Start of the body of r: sets r->upload, or refuses with a reply. */
 struct response *scene_body_begin(struct api *api, struct request *r);

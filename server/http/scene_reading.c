@@ -5,7 +5,7 @@
 
 #include "common/mem.h"
 #include "common/reading.h"
-#include "server/http/problem.h"
+#include "server/transport/problem.h"
 
 /* Each member by itself, so that each fault is told. */
 static void find_faults(const cJSON *value, cJSON *params) {

@@ -3,7 +3,7 @@
 #ifndef UNBAKE_HTTP_SCENE_READING_H
 #define UNBAKE_HTTP_SCENE_READING_H
 
-#include "server/http/message.h"
+#include "server/transport/message.h"
 
 /* The text of the object, checked and as short as can be, with defaults left out, as the store keeps it; the caller's.
  * NULL, with its faults in params, as "reading.axes". JSON null stands for the default. */

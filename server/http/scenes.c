@@ -8,9 +8,7 @@
 #include "server/data/layout.h"
 #include "server/data/trash.h"
 #include "server/http/auth.h"
-#include "server/http/body.h"
 #include "server/http/handlers.h"
-#include "server/http/problem.h"
 #include "server/http/limits.h"
 #include "server/http/retention.h"
 #include "server/http/scene_body.h"
@@ -18,6 +16,8 @@
 #include "server/http/space.h"
 #include "server/http/views.h"
 #include "server/net/field.h"
+#include "server/transport/body.h"
+#include "server/transport/problem.h"
 #include "server/uploads/upload.h"
 
 /* A scene has no revision: what is shown of it is its tag. */

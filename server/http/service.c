@@ -2,10 +2,12 @@
 #include "server/http/service.h"
 
 #include "common/mem.h"
+#include "server/events/hub.h"
+#include "server/http/auth.h"
 #include "server/http/auth_throttle.h"
-#include "server/http/hub.h"
 #include "server/http/readiness.h"
 #include "server/http/request_counts.h"
+#include "server/http/routes.h"
 #include "server/uploads/digests.h"
 #include "server/uploads/resumable.h"
 
@@ -63,6 +65,58 @@ enum status service_new(struct api **out, const struct api_config *config, struc
     }
     service_free(api);
     *out = NULL;
+    return status;
+}
+
+/* --- what the transport calls (application.h) ---------------------------------------------------- */
+
+/* Where a token is required, no page can use the daemon without one: any name will do. */
+static const char *server_names(void *user) {
+    const struct api *api = user;
+    return auth_is_open(api) ? api->config.server_names : NULL;
+}
+
+static struct response *find(void *user, struct request *r) {
+    (void)user;
+    return routes_find(r);
+}
+
+static struct response *begin(void *user, struct request *r) { return routes_begin(user, r); }
+
+static struct response *data(void *user, struct request *r, const void *bytes, size_t length) {
+    return routes_data(user, r, bytes, length);
+}
+
+static struct response *finish(void *user, struct request *r) { return routes_finish(user, r); }
+
+static void count(void *user, const struct request *r, int status) {
+    struct api *api = user;
+    request_counts_add(api->request_counts, r, status);
+}
+
+static void tick(void *user, double now_sec) {
+    struct api *api = user;
+    hub_tick(api->hub, now_sec);
+}
+
+enum status service_listen(struct listener **l, const struct listener_config *config, struct api *api,
+                           struct error *err) {
+    const struct application application = {
+        .user = api,
+        .server_names = server_names,
+        .find = find,
+        .begin = begin,
+        .data = data,
+        .finish = finish,
+        .drop = routes_drop_body,
+        .count = count,
+        .tick = tick,
+    };
+    struct listener_config own = *config;
+    own.proxies = api->config.proxies;
+    enum status status = listener_start(l, &own, &application, err);
+    if (status == STATUS_OK)
+        api->listener = *l;
     return status;
 }
 

@@ -3,7 +3,7 @@
 
 #include "server/http/auth.h"
 #include "server/http/handlers.h"
-#include "server/http/problem.h"
+#include "server/transport/problem.h"
 
 #define COOKIE_AGE_SEC (30 * 24 * 3600)
 

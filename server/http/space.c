@@ -2,7 +2,7 @@
 #include "server/http/space.h"
 
 #include "server/http/limits.h"
-#include "server/http/problem.h"
+#include "server/transport/problem.h"
 
 static struct response *refuse(const struct request *r, const struct error *err, enum status if_full) {
     return err->status == if_full ? problem_full(r, 507, err->message, err->hint, NULL) : problem_from(r, err);

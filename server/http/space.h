@@ -6,7 +6,7 @@
 #include <stdint.h>
 
 #include "server/http/api.h"
-#include "server/http/message.h"
+#include "server/transport/message.h"
 
 /* Refuses with a reply unless min_free_bytes + `bytes` are free. */
 struct response *space_check_room(struct api *api, const struct request *r, uint64_t bytes);

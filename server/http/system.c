@@ -7,14 +7,14 @@
 #include "common/mem.h"
 #include "common/protocol.h"
 #include "common/settings.h"
+#include "server/events/hub.h"
 #include "server/http/embedded.h"
 #include "server/http/handlers.h"
-#include "server/http/hub.h"
 #include "server/http/limits.h"
-#include "server/http/listener.h"
-#include "server/http/problem.h"
 #include "server/http/readiness.h"
 #include "server/net/field.h"
+#include "server/transport/listener.h"
+#include "server/transport/problem.h"
 
 /* --- the web page -------------------------------------------------------------------------- */
 

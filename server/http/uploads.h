@@ -3,7 +3,7 @@
 #define UNBAKE_HTTP_UPLOADS_H
 
 #include "server/http/api.h"
-#include "server/http/message.h"
+#include "server/transport/message.h"
 
 struct upload_patch; /* opaque */
 

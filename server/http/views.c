@@ -3,26 +3,18 @@
 
 #include <stdio.h>
 #include <string.h>
-#include <time.h>
 
+#include "common/clock.h"
 #include "common/mem.h"
-#include "server/http/problem.h"
 #include "server/net/field.h"
+#include "server/transport/problem.h"
 
 #define LIMIT_DEFAULT 50
 #define LIMIT_MAX 200
 
-void view_time(int64_t unix_ms, char text[VIEW_TIME_SIZE]) {
-    time_t seconds = (time_t)(unix_ms / 1000);
-    struct tm utc;
-    gmtime_r(&seconds, &utc);
-    size_t used = strftime(text, VIEW_TIME_SIZE, "%Y-%m-%dT%H:%M:%S", &utc);
-    snprintf(text + used, VIEW_TIME_SIZE - used, ".%03dZ", (int)(unix_ms % 1000));
-}
-
 static void add_time(cJSON *object, const char *key, int64_t unix_ms) {
-    char text[VIEW_TIME_SIZE];
-    view_time(unix_ms, text);
+    char text[CLOCK_TEXT_SIZE];
+    clock_text(unix_ms, text);
     json_add_string(object, key, unix_ms > 0 ? text : NULL);
 }
 

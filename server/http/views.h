@@ -3,18 +3,14 @@
 #define UNBAKE_HTTP_VIEWS_H
 
 #include "common/json.h"
-#include "server/http/message.h"
 #include "server/store/store.h"
+#include "server/transport/message.h"
 
 /* As `who` sees it: the URL of its webhook is shown to its owner only. */
 cJSON *view_job(const struct job *job, const struct caller *who);
 cJSON *view_scene(const struct scene_row *row);
 cJSON *view_upload(const struct upload_row *row);
 cJSON *view_output(int64_t job_id, const struct output_row *row);
-
-#define VIEW_TIME_SIZE 32
-/* Unix milliseconds as 2026-11-21T12:00:00.123Z. */
-void view_time(int64_t unix_ms, char text[VIEW_TIME_SIZE]);
 
 /* Reads `limit` of a list's query; or *refusal. */
 size_t view_limit(const struct request *r, struct response **refusal);

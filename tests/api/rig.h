@@ -14,9 +14,9 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "common/protocol.h"
-#include "server/http/listener.h"
 #include "server/http/service.h"
 #include "server/net/address.h"
+#include "server/transport/listener.h"
 #include "tests/check.h"
 
 struct rig {
@@ -60,7 +60,7 @@ static inline void rig_open(struct rig *rig, const struct guard_limits *limits, 
                                 .server_names = "lab.example.org"};
     rig_must(service_new(&rig->api, &config, rig->store, rig->scheduler, &err), &err, "service_new");
     struct listener_config network = {.address = "127.0.0.1", .connection_max = connection_max, .limits = *limits};
-    rig_must(listener_start(&rig->listener, &network, rig->api, &err), &err, "listener_start");
+    rig_must(service_listen(&rig->listener, &network, rig->api, &err), &err, "service_listen");
 }
 
 /* Room for so many connections, and event streams. */

@@ -1,6 +1,6 @@
 /* Who may do what: every route of the table for every role, on things of one's own, on shared ones
  * and on others'; wrong tokens; revoked ones, also in open streams; the cookie of the web page. */
-#include "server/http/hub.h"
+#include "server/events/hub.h"
 #include "server/http/routes.h"
 #include "tests/api/rig.h"
 

@@ -1,7 +1,7 @@
 /* test_http_disk.c -- a disk that fails, or lies, while the daemon serves: what it says, what it holds on to, and that it
  * goes on once the disk is well. */
-#include "server/data/trash.h"
 #include "server/data/collector.h"
+#include "server/data/trash.h"
 #include "server/http/space.h"
 #include "tests/api/rig.h"
 #include "tests/system_faults.h"

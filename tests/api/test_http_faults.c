@@ -1,6 +1,6 @@
 /* test_http_faults.c -- each call of SQLite, and each of the system, that a request leads to fails once: the reply has
  * the status of that fault and a sentence, nothing leaks, and the same request succeeds when it is made again. */
-#include "server/http/problem.h"
+#include "server/transport/problem.h"
 #include "tests/api/rig.h"
 #include "tests/system_faults.h"
 
@@ -300,7 +300,7 @@ static bool start_once(bool is_sql, long n) {
         system_faults_arm(n);
     enum status status = service_new(&api, &config, rig.store, rig.scheduler, &err);
     if (status == STATUS_OK)
-        status = listener_start(&listener, &network, api, &err);
+        status = service_listen(&listener, &network, api, &err);
     bool struck = is_sql ? sql_faults_lift() : system_faults_lift(), has_begun = status == STATUS_OK;
     faults_are_off = true;
     CHECK_THAT(has_begun ? true : struck && err.status == status && *err.message, "a start, call %ld: %s", n,

@@ -2,8 +2,8 @@
 #include <pthread.h>
 #include <sys/resource.h>
 
-#include "server/uploads/upload_session.h"
 #include "server/uploads/resumable.h"
+#include "server/uploads/upload_session.h"
 #include "tests/api/rig.h"
 
 #define BYTES 1000
@@ -17,7 +17,7 @@ static void check_start(void) {
     for (size_t i = 0; i < sizeof addresses / sizeof *addresses; i++) {
         struct listener_config network = {.address = addresses[i], .connection_max = 9, .limits = rig_patient};
         struct listener *listener;
-        enum status status = listener_start(&listener, &network, rig.api, &err);
+        enum status status = service_listen(&listener, &network, rig.api, &err);
         CHECK_THAT(status == STATUS_INPUT && strstr(err.message, "cannot listen on"), "\"%s\": %s, %s", addresses[i],
                    status_name(status), err.message);
     }
@@ -32,7 +32,7 @@ static const char request[] = "GET /readyz HTTP/1.1\r\nHost: localhost\r\n\r\n";
 static struct listener *start_small(void) {
     struct listener_config network = {.address = "127.0.0.1", .connection_max = CONNECTION_MAX, .limits = rig_patient};
     struct listener *listener;
-    rig_must(listener_start(&listener, &network, rig.api, &err), &err, "listener_start");
+    rig_must(service_listen(&listener, &network, rig.api, &err), &err, "service_listen");
     return listener;
 }
 

@@ -4,9 +4,9 @@
 
 #include "common/clock.h"
 #include "server/data/collector.h"
-#include "server/http/hub.h"
-#include "server/uploads/upload_session.h"
+#include "server/events/hub.h"
 #include "server/uploads/resumable.h"
+#include "server/uploads/upload_session.h"
 #include "tests/api/rig.h"
 
 static struct rig rig;

@@ -2,8 +2,8 @@
  * too, or what is being written is removed. What was counted stays, what was not is sent again, and in the end the scene
  * is what was sent. */
 #include "common/sha256.h"
-#include "server/uploads/upload_writer.h"
 #include "server/uploads/upload_session.h"
+#include "server/uploads/upload_writer.h"
 #include "tests/api/rig.h"
 #include "tests/system_faults.h"
 

@@ -3,10 +3,10 @@
  * And while the disk hangs, /healthz is answered, and /readyz says so in time. */
 #include <pthread.h>
 
-#include "server/data/trash.h"
 #include "server/data/collector.h"
-#include "server/uploads/digests.h"
+#include "server/data/trash.h"
 #include "server/http/readiness.h"
+#include "server/uploads/digests.h"
 #include "tests/api/outputs.h"
 #include "tests/system_faults.h"
 

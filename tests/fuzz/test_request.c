@@ -19,9 +19,9 @@
 #include "common/protocol.h"
 #include "common/sha256.h"
 #include "server/http/auth.h"
-#include "server/http/head.h"
-#include "server/http/listener.h"
 #include "server/http/service.h"
+#include "server/transport/head.h"
+#include "server/transport/listener.h"
 #include "tests/fuzz/fuzz.h"
 
 #define SCENE "00112233445566778899aabbccddeeff00112233445566778899aabbccddeeff"
@@ -132,7 +132,7 @@ static void stop_daemon(void) {
 
 /* --- the request ----------------------------------------------------------------------------- */
 
-/* As listener.c's take_method does it. */
+/* As callbacks.c's take_method does it. */
 static void take_method(struct request *r, const char *word) {
     static const char *const names[METHOD_COUNT] = {"GET", "POST", "PATCH", "DELETE", "OPTIONS"};
     r->is_head = strcmp(word, "HEAD") == 0;

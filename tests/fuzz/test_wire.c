@@ -1,4 +1,4 @@
-/* test_wire.c -- bytes on a connection, through libmicrohttpd and listener.c to the reply: what
+/* test_wire.c -- bytes on a connection, through libmicrohttpd and server/transport to the reply: what
  * test_request.c leaves out. The daemon's HTTP side runs on threads of its own; after every few
  * inputs it must still answer a good request. */
 #include "tests/api/rig.h"

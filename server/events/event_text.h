@@ -1,6 +1,6 @@
 /* event_text.h -- events as text: Server-Sent Events (HTML, section 9.2), or JSON lines. */
-#ifndef UNBAKE_HTTP_EVENT_TEXT_H
-#define UNBAKE_HTTP_EVENT_TEXT_H
+#ifndef UNBAKE_EVENTS_EVENT_TEXT_H
+#define UNBAKE_EVENTS_EVENT_TEXT_H
 
 #include <stdbool.h>
 

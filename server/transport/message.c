@@ -1,5 +1,5 @@
 /* message.c -- see message.h. */
-#include "server/http/message.h"
+#include "server/transport/message.h"
 
 #include <assert.h>
 #include <stdio.h>

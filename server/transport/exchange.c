@@ -1,8 +1,7 @@
 /* exchange.c -- see exchange.h. */
-#include "server/http/exchange.h"
+#include "server/transport/exchange.h"
 
 #include "common/mem.h"
-#include "server/http/routes.h"
 
 bool exchange_give(struct exchange *x, struct pool *pool, void (*run)(struct task *task)) {
     struct listener *l = x->listener;
@@ -39,22 +38,23 @@ static void done(struct exchange *x) {
 
 void exchange_finish_task(struct task *task) {
     struct exchange *x = (struct exchange *)task;
-    struct api *api = x->listener->api;
+    const struct application *a = &x->listener->application;
     if (x->piece_bytes > 0)
-        x->reply = routes_data(api, &x->request, x->piece, x->piece_bytes);
+        x->reply = a->data(a->user, &x->request, x->piece, x->piece_bytes);
     x->piece_bytes = 0;
     if (!x->reply)
-        x->reply = routes_finish(api, &x->request);
+        x->reply = a->finish(a->user, &x->request);
     done(x);
 }
 
 struct pool *exchange_pool(const struct exchange *x) {
-    return x->request.route->pace == ROUTE_SLOW ? x->listener->slow : x->listener->quick;
+    return x->request.pace == PACE_SLOW ? x->listener->slow : x->listener->quick;
 }
 
 void exchange_begin_task(struct task *task) {
     struct exchange *x = (struct exchange *)task;
-    x->reply = routes_begin(x->listener->api, &x->request);
+    const struct application *a = &x->listener->application;
+    x->reply = a->begin(a->user, &x->request);
     if (x->reply || x->request.has_body) {
         done(x);
     } else if (exchange_pool(x) == x->listener->slow) {
@@ -67,7 +67,8 @@ void exchange_begin_task(struct task *task) {
 
 void exchange_piece_task(struct task *task) {
     struct exchange *x = (struct exchange *)task;
-    x->reply = routes_data(x->listener->api, &x->request, x->piece, x->piece_bytes);
+    const struct application *a = &x->listener->application;
+    x->reply = a->data(a->user, &x->request, x->piece, x->piece_bytes);
     x->piece_bytes = 0;
     guard_hold(x->listener->guard, x->guarded, false);
     done(x);
@@ -78,9 +79,9 @@ void exchange_end_task(struct task *task) {
     struct listener *l = x->listener;
     bool was_stream = x->reply && x->reply->stream && !x->reply->stream->is_sized;
     if (x->request.patch && x->piece_bytes > 0)
-        response_free(routes_data(l->api, &x->request, x->piece, x->piece_bytes));
+        response_free(l->application.data(l->application.user, &x->request, x->piece, x->piece_bytes));
     response_free(x->reply); /* closes the stream: after this nobody wakes x */
-    routes_drop_body(&x->request);
+    l->application.drop(&x->request);
     request_release(&x->request);
     mem_free(x->piece);
     mem_free(x);

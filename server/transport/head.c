@@ -1,13 +1,13 @@
 /* head.c -- see head.h. */
-#include "server/http/head.h"
+#include "server/transport/head.h"
 
 #include <stdio.h>
 #include <string.h>
 #include <strings.h>
 #include <sys/random.h>
 
-#include "server/http/problem.h"
 #include "server/net/field.h"
+#include "server/transport/problem.h"
 
 static size_t field_occurrences(const struct request *r, const char *name) {
     size_t count = 0;

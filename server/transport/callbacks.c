@@ -1,5 +1,5 @@
 /* callbacks.c -- see callbacks.h. */
-#include "server/http/callbacks.h"
+#include "server/transport/callbacks.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,13 +9,10 @@
 #include "common/clock.h"
 #include "common/log.h"
 #include "common/mem.h"
-#include "server/http/auth.h"
-#include "server/http/head.h"
-#include "server/http/problem.h"
-#include "server/http/reply.h"
-#include "server/http/request_counts.h"
-#include "server/http/routes.h"
 #include "server/net/address.h"
+#include "server/transport/head.h"
+#include "server/transport/problem.h"
+#include "server/transport/reply.h"
 
 #define PIECE_BYTES ((size_t)256 << 10) /* of a stored body: at most this much is written to disk at once */
 #define DRAIN_BYTES ((size_t)64 << 20)  /* of a body that are read and dropped after an early refusal */
@@ -57,34 +54,34 @@ static enum MHD_Result accept_body(struct exchange *x) {
     if (r->has_body && x->reply)
         return refuse(x);
     if (r->has_body)
-        guard_enter(x->listener->guard, x->guarded, routes_body_is_stored(r) ? GUARD_BODY : GUARD_SHORT_BODY);
+        guard_enter(x->listener->guard, x->guarded, r->is_body_stored ? GUARD_BODY : GUARD_SHORT_BODY);
     return MHD_YES;
 }
 
 /* The head has arrived. */
 static enum MHD_Result begin(struct exchange *x, const char *method, const char *version) {
     struct listener *l = x->listener;
+    const struct application *a = &l->application;
     struct request *r = &x->request;
     take_method(r, method);
     MHD_get_connection_values_n(x->connection, MHD_HEADER_KIND, take_field, r);
     struct address peer =
         address_of_socket(MHD_get_connection_info(x->connection, MHD_CONNECTION_INFO_CLIENT_ADDRESS)->client_addr);
-    r->address =
-        l->api->config.proxies ? address_of_request(r->fields, r->field_count, &peer, l->api->config.proxies) : peer;
+    r->address = l->proxies ? address_of_request(r->fields, r->field_count, &peer, l->proxies) : peer;
     head_request_id(r);
     const char *length = request_field(r, "Content-Length");
     r->has_body = request_field(r, "Transfer-Encoding") || (length && strcmp(length, "0") != 0);
     r->content_length = length ? strtoll(length, NULL, 10) : r->has_body ? -1 : 0;
-    struct response *refusal = head_check(r, version, auth_is_open(l->api) ? l->api->config.server_names : NULL);
+    struct response *refusal = head_check(r, version, a->server_names(a->user));
     if (!refusal && x->target_error.status != STATUS_OK)
         refusal = problem(r, 400, "%s", x->target_error.message);
     if (!refusal)
-        refusal = routes_find(r);
-    if (!refusal && r->route->pace == ROUTE_AT_ONCE) {
-        refusal = routes_begin(l->api, r);
+        refusal = a->find(a->user, r);
+    if (!refusal && r->pace == PACE_AT_ONCE) {
+        refusal = a->begin(a->user, r);
     } else if (!refusal) {
         x->is_beginning = true;
-        if (exchange_give(x, routes_body_is_stored(r) ? l->slow : l->quick, exchange_begin_task))
+        if (exchange_give(x, r->is_body_stored ? l->slow : l->quick, exchange_begin_task))
             return MHD_YES; /* the pool owns x now */
         x->is_beginning = false;
         refusal = problem(r, 503, "the daemon is stopping");
@@ -134,11 +131,11 @@ static enum MHD_Result collect(struct exchange *x, const char *data, size_t *len
 /* A part of the body has arrived. */
 static enum MHD_Result take_body(struct exchange *x, const char *data, size_t *length) {
     struct listener *l = x->listener;
-    if (!x->reply && routes_body_is_stored(&x->request))
+    if (!x->reply && x->request.is_body_stored)
         return collect(x, data, length);
     guard_body(l->guard, x->guarded, *length);
     if (!x->reply)
-        x->reply = routes_data(l->api, &x->request, data, *length);
+        x->reply = l->application.data(l->application.user, &x->request, data, *length);
     else if (x->has_replied_early)
         x->drained += *length;
     if (x->reply && !x->has_replied_early)
@@ -149,9 +146,10 @@ static enum MHD_Result take_body(struct exchange *x, const char *data, size_t *l
 
 /* The body has arrived. */
 static enum MHD_Result finish(struct exchange *x) {
+    const struct application *a = &x->listener->application;
     guard_enter(x->listener->guard, x->guarded, GUARD_REPLY);
-    if (x->request.route->pace == ROUTE_AT_ONCE)
-        x->reply = routes_finish(x->listener->api, &x->request);
+    if (x->request.pace == PACE_AT_ONCE)
+        x->reply = a->finish(a->user, &x->request);
     else if (exchange_give(x, exchange_pool(x), exchange_finish_task))
         return MHD_YES;
     else
@@ -223,7 +221,7 @@ void callbacks_on_completed(void *user, struct MHD_Connection *connection, void 
     pthread_cond_broadcast(&l->changed);
     pthread_mutex_unlock(&l->mutex);
     int status = x->reply ? x->reply->status : 0;
-    request_counts_add(l->api->request_counts, &x->request, status);
+    l->application.count(l->application.user, &x->request, status);
     log_request(x, status, code == MHD_REQUEST_TERMINATED_COMPLETED_OK);
     if (code == MHD_REQUEST_TERMINATED_TIMEOUT_REACHED)
         guard_discard_unsent(x->guarded);

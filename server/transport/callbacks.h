@@ -1,8 +1,8 @@
 /* callbacks.h -- what libmicrohttpd calls in the course of a request; `listener` is the struct listener. */
-#ifndef UNBAKE_HTTP_CALLBACKS_H
-#define UNBAKE_HTTP_CALLBACKS_H
+#ifndef UNBAKE_TRANSPORT_CALLBACKS_H
+#define UNBAKE_TRANSPORT_CALLBACKS_H
 
-#include "server/http/exchange.h"
+#include "server/transport/exchange.h"
 
 /* The request line has arrived. Makes the exchange. */
 void *callbacks_on_target(void *listener, const char *target, struct MHD_Connection *connection);

@@ -1,28 +1,28 @@
 /* exchange.h -- one request and its reply, handed between libmicrohttpd's threads, which must not block, and the pools,
- * whose threads may. For listener.c, callbacks.c and reply.c.
+ * whose threads may. For listener.c, callbacks.c and reply.c. find, begin, data and finish are the application's.
  *
- *              library: on_request                    pools: quick, slow
- *   head   ──> head_check, routes_find ──suspend──>   routes_begin ─────┐ no body
- *   body   ──> routes_data (in memory)                                  │
- *          ──> a piece is full         ──suspend──>   routes_data       │
- *   end    ──>                         ──suspend──>   routes_finish  <──┘
- *   reply  <── queued                  <──resume───
- *   stream <── stream->read            ──suspend──>   stream->fill, now or when woken
- *   over   ──> on_completed            ────────────>  files are closed and removed
+ *              library: on_request              pools: quick, slow
+ *   head   ──> head_check, find ──suspend──>    begin ─────────┐ no body
+ *   body   ──> data (in memory)                                │
+ *          ──> a piece is full  ──suspend──>    data           │
+ *   end    ──>                  ──suspend──>    finish      <──┘
+ *   reply  <── queued           <──resume───
+ *   stream <── stream->read     ──suspend──>    stream->fill, now or when woken
+ *   over   ──> on_completed     ────────────>   files are closed and removed
  *
  * 1. Only the owner of an exchange (enum exchange_place) touches it, except for what the mutex guards.
  * 2. Its connection is suspended unless the library owns it. */
-#ifndef UNBAKE_HTTP_EXCHANGE_H
-#define UNBAKE_HTTP_EXCHANGE_H
+#ifndef UNBAKE_TRANSPORT_EXCHANGE_H
+#define UNBAKE_TRANSPORT_EXCHANGE_H
 
 #include <microhttpd.h>
 #include <pthread.h>
 
-#include "server/http/api.h"
-#include "server/http/message.h"
 #include "server/net/acceptor.h"
 #include "server/net/guard.h"
 #include "server/net/pool.h"
+#include "server/transport/application.h"
+#include "server/transport/message.h"
 
 enum exchange_place {
     EXCHANGE_WITH_LIBRARY,
@@ -53,14 +53,15 @@ struct exchange {
 };
 
 struct listener {
-    struct api *api;
+    struct application application;
+    const struct proxies *proxies; /* borrowed; NULL: none */
     struct MHD_Daemon *daemon;
     struct guard *guard;
     struct tls *tls;           /* NULL: plain HTTP */
     struct acceptor *acceptor; /* owns the listening socket */
     struct connection_counts *connection_counts;
     uint16_t port;
-    struct pool *quick, *slow; /* see route.h */
+    struct pool *quick, *slow; /* see listener.h */
     pthread_mutex_t mutex;     /* guards what follows; nothing blocks while it is held */
     pthread_cond_t changed;
     bool is_closing;
@@ -78,7 +79,7 @@ void exchange_give_back(struct exchange *x);
 /* The pool that works on the request's route. */
 struct pool *exchange_pool(const struct exchange *x);
 
-/* What a pool runs: the head's part of the handler, a piece of the body, the end of the body. */
+/* What a pool runs: the application's begin, data, finish. */
 void exchange_begin_task(struct task *task);
 void exchange_piece_task(struct task *task);
 void exchange_finish_task(struct task *task);

@@ -1,11 +1,11 @@
 /* reply.c -- see reply.h. */
-#include "server/http/reply.h"
+#include "server/transport/reply.h"
 
 #include <sys/socket.h>
 
 #include "common/buf.h"
-#include "server/http/file_stream.h"
 #include "server/net/tls.h"
+#include "server/transport/file_stream.h"
 
 #define EVENT_BLOCK_BYTES ((size_t)32 << 10) /* that the library asks an event stream for at once */
 #define FILE_BLOCK_BYTES ((size_t)64 << 10)  /* and a file */

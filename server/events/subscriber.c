@@ -1,14 +1,13 @@
 /* subscriber.c -- see subscriber.h. */
-#include "server/http/subscriber.h"
+#include "server/events/subscriber.h"
 
 #include <string.h>
 
 #include "common/buf.h"
 #include "common/clock.h"
 #include "common/mem.h"
-#include "server/http/event_text.h"
-#include "server/http/hub.h"
-#include "server/http/views.h"
+#include "server/events/event_text.h"
+#include "server/events/hub.h"
 
 #define BATCH_EVENTS 64
 #define BATCH_BYTES ((size_t)64 << 10) /* of events' data; a single event may have more */
@@ -16,7 +15,8 @@
 
 struct subscriber {
     struct stream base;
-    struct api *api;
+    struct hub *hub;
+    struct store *store;
     struct hub_member member;
     struct subscription what; /* its `after`: events up to here are in `text` or sent */
     struct caller caller;
@@ -47,12 +47,12 @@ static void add_row(void *user, const struct event_row *row) {
 
 /* Reads the next batch, or takes the one that another stream has just read. */
 static enum status fetch_page(struct subscriber *s, struct event_page *page) {
-    struct hub *hub = s->api->hub;
+    struct hub *hub = s->hub;
     struct hub_batch batch = {s->what.job_id, s->what.after, s->what.is_ndjson};
     if (hub_find_batch(hub, &batch, &s->caller, page, &s->text))
         return STATUS_OK;
     uint64_t version = hub_version(hub); /* before the events are read: a change meanwhile makes the batch stale */
-    enum status status = store_event_page(s->api->store, &s->caller, s->what.job_id, s->what.after, BATCH_EVENTS,
+    enum status status = store_event_page(s->store, &s->caller, s->what.job_id, s->what.after, BATCH_EVENTS,
                                           BATCH_BYTES, add_row, s, page, NULL);
     if (status == STATUS_OK && s->what.job_id)
         hub_share_batch(hub, &batch, version, page, &s->text);
@@ -73,12 +73,12 @@ static void fetch_events(struct subscriber *s) {
         event_text_add_resync(&s->text, what->is_ndjson, page.pruned_id,
                               "events up to this one are no longer kept: GET the current state");
         what->after = page.pruned_id;
-        hub_mark_dirty(s->api->hub, &s->member);
+        hub_mark_dirty(s->hub, &s->member);
         return;
     }
     what->after = page.last_id;
     if (page.is_full && what->wait_sec <= 0.0)
-        hub_mark_dirty(s->api->hub, &s->member);
+        hub_mark_dirty(s->hub, &s->member);
     else if (what->is_past || (what->job_id && job_is_terminal(page.state)) || (what->wait_sec > 0.0 && page.count > 0))
         s->has_ended = true;
 }
@@ -86,14 +86,14 @@ static void fetch_events(struct subscriber *s) {
 /* The job itself, once it has changed as the client wants it to, or the wait is over. */
 static void fetch_job(struct subscriber *s, bool is_over) {
     struct job job;
-    if (store_job_get(s->api->store, s->what.job_id, &job, NULL) != STATUS_OK) {
+    if (store_job_get(s->store, s->what.job_id, &job, NULL) != STATUS_OK) {
         s->has_ended = true;
         return;
     }
     bool may_read = caller_access_job(&s->caller, &job) >= ACCESS_READ;
     bool has_changed = s->what.revision > 0 ? job.revision != s->what.revision : job_is_terminal(job.state);
     if (may_read && (has_changed || is_over)) {
-        cJSON *view = view_job(&job, &s->caller);
+        cJSON *view = s->what.view_job(&job, &s->caller);
         char *text = json_text(view);
         buf_puts(&s->text, text);
         mem_free(text);
@@ -105,7 +105,7 @@ static void fetch_job(struct subscriber *s, bool is_over) {
 
 /* Puts into `text` what there is to send now, if anything. */
 static void refill(struct subscriber *s) {
-    struct hub *hub = s->api->hub;
+    struct hub *hub = s->hub;
     /* Most streams are idle most of the time: between batches they keep no memory for text. */
     buf_release(&s->text);
     buf_init(&s->text, TEXT_BYTES);
@@ -125,14 +125,14 @@ static void refill(struct subscriber *s) {
 }
 
 static bool token_was_revoked(struct subscriber *s) {
-    return hub_take_suspect(s->api->hub, &s->member) && s->caller.token_id &&
-           !store_token_is_valid(s->api->store, s->caller.token_id);
+    return hub_take_suspect(s->hub, &s->member) && s->caller.token_id &&
+           !store_token_is_valid(s->store, s->caller.token_id);
 }
 
 static bool subscriber_fill(struct stream *base) {
     struct subscriber *s = (struct subscriber *)base;
     if (!s->has_joined)
-        hub_join(s->api->hub, &s->member);
+        hub_join(s->hub, &s->member);
     s->has_joined = true;
     if (token_was_revoked(s))
         s->has_ended = true;
@@ -151,26 +151,28 @@ static ssize_t subscriber_read(struct stream *base, char *to, size_t size) {
     count = count < size ? count : size;
     memcpy(to, s->text.data + s->text_read, count);
     s->text_read += count;
-    hub_sent(s->api->hub, &s->member);
+    hub_sent(s->hub, &s->member);
     return (ssize_t)count;
 }
 
 static void subscriber_close(struct stream *base) {
     struct subscriber *s = (struct subscriber *)base;
     if (s->has_joined)
-        hub_leave(s->api->hub, &s->member);
+        hub_leave(s->hub, &s->member);
     buf_release(&s->text);
     cJSON_Delete(s->what.snapshot);
     mem_free(s);
 }
 
-struct stream *subscriber_new(struct api *api, const struct caller *caller, const struct subscription *what) {
+struct stream *subscriber_new(struct hub *hub, struct store *store, const struct caller *caller,
+                              const struct subscription *what) {
     struct subscriber *s = mem_calloc(1, sizeof *s);
     s->base.read = subscriber_read;
     s->base.fill = subscriber_fill;
     s->base.close = subscriber_close;
     s->base.must_say = what->revision != 0;
-    s->api = api;
+    s->hub = hub;
+    s->store = store;
     s->caller = *caller;
     s->what = *what;
     s->member = (struct hub_member){

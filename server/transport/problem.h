@@ -1,10 +1,10 @@
 /* problem.h -- error replies: application/problem+json (RFC 9457). */
-#ifndef UNBAKE_HTTP_PROBLEM_H
-#define UNBAKE_HTTP_PROBLEM_H
+#ifndef UNBAKE_TRANSPORT_PROBLEM_H
+#define UNBAKE_TRANSPORT_PROBLEM_H
 
 #include "common/error.h"
 #include "common/json.h"
-#include "server/http/message.h"
+#include "server/transport/message.h"
 
 /* A reply with that HTTP status, which decides its type and title. */
 struct response *problem(const struct request *r, int status, const char *detail_format, ...)

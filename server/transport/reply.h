@@ -1,8 +1,8 @@
 /* reply.h -- an exchange's reply on its way to the client: a text, a file, or a stream that waits for events. */
-#ifndef UNBAKE_HTTP_REPLY_H
-#define UNBAKE_HTTP_REPLY_H
+#ifndef UNBAKE_TRANSPORT_REPLY_H
+#define UNBAKE_TRANSPORT_REPLY_H
 
-#include "server/http/exchange.h"
+#include "server/transport/exchange.h"
 
 /* Hands x->reply to the library. MHD_NO: the connection must be closed. */
 enum MHD_Result reply_queue(struct exchange *x);

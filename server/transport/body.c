@@ -1,7 +1,7 @@
 /* body.c -- see body.h. */
-#include "server/http/body.h"
+#include "server/transport/body.h"
 
-#include "server/http/problem.h"
+#include "server/transport/problem.h"
 
 cJSON *body_object(const struct request *r, struct response **refusal) {
     struct error err;

@@ -5,16 +5,16 @@
  * 2. Lock order: hub, then listener, then libmicrohttpd. No store call is made while any of them is held.
  *
  * Thread-safe. */
-#ifndef UNBAKE_HTTP_HUB_H
-#define UNBAKE_HTTP_HUB_H
+#ifndef UNBAKE_EVENTS_HUB_H
+#define UNBAKE_EVENTS_HUB_H
 
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
 #include "common/buf.h"
-#include "server/http/message.h"
 #include "server/store/store.h"
+#include "server/transport/message.h"
 
 struct hub;
 

@@ -1,5 +1,5 @@
 /* hub.c -- see hub.h. */
-#include "server/http/hub.h"
+#include "server/events/hub.h"
 
 #include <pthread.h>
 

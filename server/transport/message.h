@@ -1,10 +1,10 @@
 /* message.h -- a request as the handlers see it and the response that they give: plain data, no
  * library's types. A handler is a function from the one to the other.
  *
- * 1. A request reaches a handler only when its head passed listener.c's and routes.c's checks.
- * 2. A response belongs to whoever holds it until the listener takes it. */
-#ifndef UNBAKE_HTTP_MESSAGE_H
-#define UNBAKE_HTTP_MESSAGE_H
+ * 1. A request reaches a handler only when its head passed head.c's and the application's checks.
+ * 2. A response belongs to whoever holds it until the transport takes it. */
+#ifndef UNBAKE_TRANSPORT_MESSAGE_H
+#define UNBAKE_TRANSPORT_MESSAGE_H
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -20,6 +20,13 @@
 #include "server/store/users.h"
 
 enum method { METHOD_GET, METHOD_POST, METHOD_PATCH, METHOD_DELETE, METHOD_OPTIONS, METHOD_COUNT };
+
+/* Which threads work on a request; see listener.h. */
+enum pace {
+    PACE_AT_ONCE, /* uses neither store, disk nor caller */
+    PACE_QUICK,   /* uses the store, opens a file */
+    PACE_SLOW     /* syncs, hashes, or reads files whose size users choose */
+};
 
 #define REQUEST_ID_SIZE 65
 #define RESPONSE_FIELDS_MAX 12
@@ -39,14 +46,16 @@ struct request {
     char id[REQUEST_ID_SIZE];   /* for X-Request-Id and logs */
     struct address address;     /* the client's address (address.h) */
     bool is_throttled;          /* refused after too many invalid tokens */
-    const struct route *route;  /* set by routes_begin; static storage */
-    struct caller caller;       /* set by routes_begin */
+    const struct route *route;  /* what follows is set by the application's `find`; static storage */
+    enum pace pace;             /* which threads run begin and finish */
+    bool is_body_stored;        /* its body is written to disk as it arrives */
+    struct caller caller;       /* set by the application's `begin` */
     struct buf body;            /* the part collected in memory, for routes that take JSON */
     struct upload *upload;      /* an uploaded bundle; owned */
     struct upload_patch *patch; /* a part of a resumable upload; owned */
 };
 
-/* Call routes_drop_body first, which frees upload and patch. */
+/* The application has freed upload and patch. */
 void request_release(struct request *r);
 /* The value of the first field with that name (case-insensitive), NULL where absent; borrowed. */
 const char *request_field(const struct request *r, const char *name);

@@ -1,11 +1,9 @@
 /* event_text.c -- see event_text.h. */
-#include "server/http/event_text.h"
+#include "server/events/event_text.h"
 
-#include <time.h>
-
+#include "common/clock.h"
 #include "common/mem.h"
 #include "common/protocol.h"
-#include "server/http/views.h"
 
 static void set(cJSON *data, const char *name, cJSON *value) {
     cJSON_DeleteItemFromObjectCaseSensitive(data, name);
@@ -13,8 +11,8 @@ static void set(cJSON *data, const char *name, cJSON *value) {
 }
 
 void event_text_add(struct buf *text, bool is_ndjson, const struct event_row *row, cJSON *data) {
-    char at[VIEW_TIME_SIZE];
-    view_time(row->at_ms, at);
+    char at[CLOCK_TEXT_SIZE];
+    clock_text(row->at_ms, at);
     set(data, "at", json_new_string(at));
     if (row->job_id) {
         set(data, "job", cJSON_CreateNumber((double)row->job_id));
@@ -34,16 +32,10 @@ void event_text_add_row(struct buf *text, bool is_ndjson, const struct event_row
     event_text_add(text, is_ndjson, row, object ? object : cJSON_CreateObject());
 }
 
-static int64_t now_ms(void) {
-    struct timespec now;
-    clock_gettime(CLOCK_REALTIME, &now);
-    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
-}
-
 void event_text_add_snapshot(struct buf *text, bool is_ndjson, int64_t job_id, int64_t id, cJSON *view) {
     const cJSON *attempt = cJSON_GetObjectItemCaseSensitive(view, "attempt");
     struct event_row row = {
-        .id = id, .job_id = job_id, .at_ms = now_ms(), .type = EVENT_STATE, .attempt = attempt->valueint};
+        .id = id, .job_id = job_id, .at_ms = clock_unix_ms(), .type = EVENT_STATE, .attempt = attempt->valueint};
     json_add_bool(view, "snapshot", true);
     event_text_add(text, is_ndjson, &row, view);
 }
@@ -51,7 +43,7 @@ void event_text_add_snapshot(struct buf *text, bool is_ndjson, int64_t job_id, i
 void event_text_add_resync(struct buf *text, bool is_ndjson, int64_t id, const char *reason) {
     cJSON *data = cJSON_CreateObject();
     json_add_string(data, "reason", reason);
-    struct event_row row = {.id = id, .at_ms = now_ms(), .type = EVENT_RESYNC};
+    struct event_row row = {.id = id, .at_ms = clock_unix_ms(), .type = EVENT_RESYNC};
     event_text_add(text, is_ndjson, &row, data);
 }
 

@@ -1,5 +1,5 @@
 /* file_stream.c -- see file_stream.h. */
-#include "server/http/file_stream.h"
+#include "server/transport/file_stream.h"
 
 #include <errno.h>
 #include <string.h>

@@ -1,5 +1,5 @@
 /* problem.c -- see problem.h. */
-#include "server/http/problem.h"
+#include "server/transport/problem.h"
 
 #include <stdarg.h>
 #include <stdio.h>

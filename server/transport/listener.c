@@ -1,5 +1,5 @@
 /* listener.c -- see listener.h. */
-#include "server/http/listener.h"
+#include "server/transport/listener.h"
 
 #include <errno.h>
 #include <netinet/in.h>
@@ -12,13 +12,12 @@
 #include "common/clock.h"
 #include "common/log.h"
 #include "common/mem.h"
-#include "server/http/callbacks.h"
-#include "server/http/hub.h"
-#include "server/http/reply.h"
 #include "server/net/acceptor.h"
 #include "server/net/address.h"
 #include "server/net/connection_counts.h"
 #include "server/net/tls.h"
+#include "server/transport/callbacks.h"
+#include "server/transport/reply.h"
 
 #define LIBRARY_THREADS 4
 #define QUICK_THREADS 4
@@ -88,7 +87,7 @@ static bool on_accepted(void *user, int fd, const struct sockaddr *address, sock
 
 static void on_tick(void *user) {
     struct listener *l = user;
-    hub_tick(l->api->hub, clock_sec());
+    l->application.tick(l->application.user, clock_sec());
 }
 
 __attribute__((format(printf, 2, 0))) static void log_library(void *user, const char *format, va_list args) {
@@ -122,15 +121,16 @@ static enum status start_library(struct listener *l, const struct listener_confi
     return l->daemon ? STATUS_OK : error_set_errno(err, errno, "libmicrohttpd does not start");
 }
 
-enum status listener_start(struct listener **out, const struct listener_config *config, struct api *api,
-                           struct error *err) {
+enum status listener_start(struct listener **out, const struct listener_config *config,
+                           const struct application *application, struct error *err) {
     struct listener *l = mem_calloc(1, sizeof *l);
-    l->api = api;
+    l->application = *application;
+    l->proxies = config->proxies;
     pthread_mutex_init(&l->mutex, NULL);
     pthread_cond_init(&l->changed, NULL);
     l->port = config->port;
     l->connection_counts =
-        connection_counts_new(config->connection_max, config->address_connection_max, api->config.proxies);
+        connection_counts_new(config->connection_max, config->address_connection_max, config->proxies);
     enum status status =
         acceptor_new(&l->acceptor, config->address, &l->port, config->connection_max, on_accepted, l, err);
     if (status == STATUS_OK && config->certificate_file)
@@ -149,7 +149,6 @@ enum status listener_start(struct listener **out, const struct listener_config *
         listener_stop(l);
         return status;
     }
-    api->listener = l;
     *out = l;
     return STATUS_OK;
 }
@@ -199,7 +198,6 @@ void listener_stop(struct listener *l) {
     if (l->guard)
         guard_free(l->guard);
     tls_free(l->tls);
-    l->api->listener = NULL;
     pthread_cond_destroy(&l->changed);
     pthread_mutex_destroy(&l->mutex);
     mem_free(l);

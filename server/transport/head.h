@@ -3,10 +3,10 @@
  * libmicrohttpd 0.9.75 lets requests pass that two servers may read differently (request
  * smuggling); and a daemon without tokens on loopback must not obey web pages that a user's
  * browser happens to show (DNS rebinding, cross-site requests). */
-#ifndef UNBAKE_HTTP_HEAD_H
-#define UNBAKE_HTTP_HEAD_H
+#ifndef UNBAKE_TRANSPORT_HEAD_H
+#define UNBAKE_TRANSPORT_HEAD_H
 
-#include "server/http/message.h"
+#include "server/transport/message.h"
 
 /* NULL when the head is acceptable, else the refusal, with must_close set where it is unclear where the next request
  * begins. `version` is as sent: "HTTP/1.1". `server_names` are the hosts besides loopback that this daemon answers
