@@ -24,11 +24,6 @@ struct emission_pattern_input {
     const bool *is_emitter; /* [segment_count] */
     struct parallel *pool;
 };
-static inline struct emission_pattern_input emission_pattern_input(const struct reconstruction *r,
-                                                                   const struct views *views) {
-    return (struct emission_pattern_input){
-        reconstruction_surface(r), views, &r->noise, &r->fused, r->is_emitter, r->pool};
-}
 
 /* Finds the patterns of all emitters in their outgoing radiance, emitted and reflected: writes the emission patterns of
  * *materials and, where there is one, sets evidence[segment_count].radiance to the mean over the surface. Depends only on

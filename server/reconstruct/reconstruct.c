@@ -14,6 +14,7 @@
 #include "server/capture/seen_share.h"
 #include "server/capture/texel_density.h"
 #include "server/capture/views.h"
+#include "server/light/emitters.h"
 #include "server/light/lamp_find.h"
 #include "server/light/lamps.h"
 #include "server/light/saturated_light.h"
@@ -22,6 +23,7 @@
 #include "server/light/unseen_light.h"
 #include "server/material/emission_pattern.h"
 #include "server/reconstruct/calibrate.h"
+#include "server/reconstruct/inputs.h"
 #include "server/reconstruct/report.h"
 #include "server/reconstruct/solve.h"
 #include "server/refine/listing1.h"
@@ -46,6 +48,7 @@
 struct stage_run {
     struct reconstruction *r;
     const struct reconstruct_hooks *hooks;
+    struct pace pace;
     struct views views;
     struct optimiser *optimiser; /* of listing1 or refine; owned */
     size_t flipped;              /* flipped triangles */
@@ -60,7 +63,7 @@ static enum status run_stage(struct stage_run *run, const char *name,
                              enum status (*stage)(struct stage_run *, struct error *), struct error *err) {
     double begin = clock_sec();
     run->hooks->stage(run->hooks->user, name);
-    pace_begin_stage(run->r, run->hooks, name);
+    pace_begin_stage(&run->pace, name);
     enum status status = stage(run, err);
     cJSON *entry = cJSON_CreateObject();
     json_add_string(entry, "name", name);
@@ -234,7 +237,7 @@ static enum status show_radiance(struct stage_run *run, struct error *err) {
 
 /* Reports a part of prepare as done. */
 static void prepare_advance(struct stage_run *run, double share) {
-    pace_advance(run->r, run->hooks, "prepare", PLAN_PREPARE, share);
+    pace_advance(&run->pace, "prepare", PLAN_PREPARE, share);
 }
 
 /* The segments that settings name must be there. */
@@ -303,7 +306,7 @@ static enum status prepare(struct stage_run *run, struct error *err) {
     prepare_advance(run, CALIBRATE_SHARE);
     status = remap_surface(run, split_bright_parts(run), err);
     add_prepare_figures(run);
-    pace_measure_room(r);
+    pace_measure_room(&run->pace, r->scene, &r->inverse);
     prepare_advance(run, 1.0 - MAP_SHARE - VIEWS_SHARE - CALIBRATE_SHARE);
     return status == STATUS_OK ? check_segment_settings(r, err) : status;
 }
@@ -335,12 +338,12 @@ static enum status fuse_photographs(struct stage_run *run, struct error *err) {
         json_add(run->r->report, "environment", environment_figures(&run->r->environment));
     mem_free(run->r->radiance_preview);
     run->r->radiance_preview = NULL;
-    pace_advance(run->r, run->hooks, "fuse", PLAN_FUSE, 1.0);
+    pace_advance(&run->pace, "fuse", PLAN_FUSE, 1.0);
     return preview_if_due(run, err);
 }
 
 static enum status solve(struct stage_run *run, struct error *err) {
-    enum status status = solve_run(run->r, &run->views, run->hooks, err);
+    enum status status = solve_run(run->r, &run->views, &run->pace, err);
     return status == STATUS_OK ? refine_start(run->optimiser, err) : status;
 }
 
@@ -348,15 +351,23 @@ static enum status optimise(struct stage_run *run, struct error *err) { return o
 
 /* Checkpoints do not contain emission patterns. */
 static void restore_patterns(struct stage_run *run) {
-    const struct emission_pattern_input input = emission_pattern_input(run->r, &run->views);
+    const struct emission_pattern_input input = inputs_of_pattern(run->r, &run->views);
     emission_pattern_restore(&input, &run->r->materials, run->r->evidence);
+}
+
+static struct optimiser *optimiser_of_method(struct stage_run *run) {
+    struct reconstruction *r = run->r;
+    const struct optimiser_input input = inputs_of_optimiser(r, &run->views, &run->pace);
+    if (settings_is(r->settings, "method", "solve"))
+        return refine_new(&input, &r->fused, &r->noise);
+    emitters_observe(r, &run->views, r->evidence);
+    return listing1_new(&input);
 }
 
 /* The stages that checkpoints cover; those that are done are skipped. */
 static enum status run_resumable(struct stage_run *run, struct error *err) {
     bool found = false, solves = settings_is(run->r->settings, "method", "solve");
-    run->optimiser =
-        solves ? refine_new(run->r, &run->views, run->hooks) : listing1_new(run->r, &run->views, run->hooks);
+    run->optimiser = optimiser_of_method(run);
     enum status status = optimiser_load(run->optimiser, &found, err);
     if (status == STATUS_OK && solves && !found)
         status = run_stage(run, "solve", solve, err);
@@ -380,10 +391,10 @@ static enum status run_resumable(struct stage_run *run, struct error *err) {
 static enum status report(struct stage_run *run, struct error *err) {
     world_update_lights(&run->r->world);
     report_emitters(run->r);
-    enum status status = report_held_out(run->r, &run->views, run->hooks, err);
+    enum status status = report_held_out(run->r, &run->views, &run->pace, err);
     plan_close(&run->r->plan, PLAN_REPORT);
     if (status == STATUS_OK)
-        pace_report(run->r, run->hooks);
+        pace_report(&run->pace, run->r->report, run->r->left_out, sizeof run->r->left_out);
     return status;
 }
 
@@ -394,9 +405,9 @@ enum status reconstruct_run(struct scene *scene, const struct settings *settings
     json_add_string(r->report, "unbake_version", UNBAKE_VERSION);
     json_add_string(r->report, "ray_library", accel_library_version());
     json_add(r->report, "settings", settings_to_json(settings));
-    struct stage_run run = {.r = r, .hooks = hooks};
+    struct stage_run run = {.r = r, .hooks = hooks, .pace = {&r->plan, settings, hooks, parallel_thread_count(pool)}};
     run.stages = cJSON_AddArrayToObject(r->report, "stages");
-    pace_start(r, hooks);
+    pace_start(&run.pace, scene);
     enum status status = run_stage(&run, "prepare", prepare, err);
     if (status == STATUS_OK)
         status = run_stage(&run, "fuse", fuse_photographs, err);

@@ -180,8 +180,9 @@ static double pixels_of(const struct photograph *photo) {
     return (double)photo->camera.width * (double)photo->camera.height;
 }
 
-enum status report_held_out(struct reconstruction *r, const struct views *views, const struct reconstruct_hooks *hooks,
+enum status report_held_out(struct reconstruction *r, const struct views *views, const struct pace *pace,
                             struct error *err) {
+    const struct reconstruct_hooks *hooks = pace->hooks;
     struct scene *scene = r->scene;
     size_t total = scene->photograph_count - views->train_count;
     cJSON *list = cJSON_AddArrayToObject(r->report, "views");
@@ -216,7 +217,7 @@ enum status report_held_out(struct reconstruction *r, const struct views *views,
         json_add_number(entry, "psnr_db", view->psnr_db);
         json_add_number(entry, "ssim", view->ssim);
         cJSON_AddItemToArray(list, entry);
-        pace_advance(r, hooks, "report", PLAN_REPORT, pixels * (double)samples);
+        pace_advance(pace, "report", PLAN_REPORT, pixels * (double)samples);
         if (hooks->stop_requested(hooks->user))
             return error_set(err, STATUS_CANCELLED, "stopped while rendering the held-out views");
     }

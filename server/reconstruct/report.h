@@ -3,12 +3,13 @@
 #define UNBAKE_RECONSTRUCT_REPORT_H
 
 #include "server/capture/views.h"
+#include "server/state/pace.h"
 #include "server/state/reconstruction.h"
 
 /* Renders every held-out view into r->held_out and adds "views" and "metrics" to r->report. A photograph of unknown
  * exposure is compared at the exposure that fits it best; so it is in all, and in white balance, where these drift.
  * STATUS_CANCELLED when stopped. */
-enum status report_held_out(struct reconstruction *r, const struct views *views, const struct reconstruct_hooks *hooks,
+enum status report_held_out(struct reconstruction *r, const struct views *views, const struct pace *pace,
                             struct error *err);
 
 /* Releases r->held_out, which is empty then. */

@@ -16,6 +16,7 @@
 #include "server/material/divide.h"
 #include "server/material/emission_pattern.h"
 #include "server/material/specular_fit.h"
+#include "server/reconstruct/inputs.h"
 #include "server/scene/by_segment.h"
 #include "server/state/evidence.h"
 #include "server/state/pace.h"
@@ -49,6 +50,7 @@ enum { PASS_LIGHT, PASS_SPECULAR, PASS_ALL, PASSES };
 struct solve {
     struct reconstruction *r;
     const struct views *views;
+    const struct pace *pace;
     const struct reconstruct_hooks *hooks;
     struct divide_outgoing outgoing; /* by the last pass; at first fused radiance; owned */
     struct light_field field;        /* of probes: rays continue from polished surfaces by their lobes */
@@ -74,7 +76,7 @@ static enum status preview_if_due(struct solve *s, struct error *err) {
 
 /* Reports work as done; STATUS_CANCELLED when the run is to stop. */
 static enum status advance(struct solve *s, enum plan_part part, double work, struct error *err) {
-    pace_advance(s->r, s->hooks, "solve", part, work);
+    pace_advance(s->pace, "solve", part, work);
     if (s->hooks->stop_requested(s->hooks->user))
         return error_set(err, STATUS_CANCELLED, "stopped while solving");
     return preview_if_due(s, err);
@@ -120,7 +122,7 @@ static void plan_work(struct solve *s) {
         directions += (double)s->probes.count * wanted_samples(s, pass);
         early += pass == PASS_ALL ? 0.0 : valid / (coarse * coarse);
     }
-    pace_plan_solve(s->r, valid, directions, early, valid / (last * last),
+    pace_plan_solve(s->pace, valid, directions, early, valid / (last * last),
                     finds_detail(s) ? settings_number(s->r->settings, "detail_steps") * valid : 0.0);
 }
 
@@ -190,7 +192,7 @@ static void find_patterns(struct solve *s) {
     if (memcmp(s->pattern_emitters, r->is_emitter, r->segments.count * sizeof *s->pattern_emitters) == 0)
         return;
     memcpy(s->pattern_emitters, r->is_emitter, r->segments.count * sizeof *s->pattern_emitters);
-    const struct emission_pattern_input input = emission_pattern_input(r, s->views);
+    const struct emission_pattern_input input = inputs_of_pattern(r, s->views);
     emission_pattern_find(&input, &r->materials, r->evidence);
 }
 
@@ -278,7 +280,7 @@ static void set_emission(struct solve *s) {
     struct reconstruction *r = s->r;
     struct emitter_fit *emitter = mem_array(r->segments.count, sizeof *emitter);
     find_patterns(s);
-    const struct emission_pattern_input input = emission_pattern_input(r, s->views);
+    const struct emission_pattern_input input = inputs_of_pattern(r, s->views);
     emission_pattern_separate(&input, &r->materials, r->evidence, emitter);
     for (size_t i = 0; i < r->segments.count; i++)
         r->materials.emission[i] = emitter[i].radiance;
@@ -300,10 +302,9 @@ static uint32_t spacing_for(const struct atlas *atlas) {
     return spacing < MIN_SPACING ? MIN_SPACING : spacing;
 }
 
-static void solve_init(struct solve *s, struct reconstruction *r, const struct views *views,
-                       const struct reconstruct_hooks *hooks) {
+static void solve_init(struct solve *s, struct reconstruction *r, const struct views *views, const struct pace *pace) {
     size_t texels = (size_t)r->atlas.width * r->atlas.height;
-    *s = (struct solve){.r = r, .views = views, .hooks = hooks, .is_previewed = true};
+    *s = (struct solve){.r = r, .views = views, .pace = pace, .hooks = pace->hooks, .is_previewed = true};
     s->outgoing = (struct divide_outgoing){mem_calloc_large(texels, sizeof *s->outgoing.total),
                                            mem_calloc_large(texels, sizeof *s->outgoing.unmirrored),
                                            mem_calloc(r->segments.count, sizeof *s->outgoing.lobe)};
@@ -425,11 +426,10 @@ static void report(const struct solve *s) {
     json_add_number(figures, "texels_measured", (double)known / (double)s->r->inverse.valid_count);
 }
 
-enum status solve_run(struct reconstruction *r, const struct views *views, const struct reconstruct_hooks *hooks,
-                      struct error *err) {
+enum status solve_run(struct reconstruction *r, const struct views *views, const struct pace *pace, struct error *err) {
     struct solve s;
     enum status status = STATUS_OK;
-    solve_init(&s, r, views, hooks);
+    solve_init(&s, r, views, pace);
     emitters_observe(r, views, r->evidence);
     for (int pass = 0; pass < PASSES && status == STATUS_OK; pass++)
         status = is_skipped(&s, pass) ? STATUS_OK : solve_pass(&s, pass, err);

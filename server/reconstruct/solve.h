@@ -12,11 +12,11 @@
 
 #include "common/error.h"
 #include "server/capture/views.h"
+#include "server/state/pace.h"
 #include "server/state/reconstruction.h"
 
 /* Writes r->materials, r->is_emitter, r->evidence and the lights of r->world, and adds "solve" to r->report.
  * STATUS_CANCELLED when stopped: the result is unusable then. Deterministic. */
-enum status solve_run(struct reconstruction *r, const struct views *views, const struct reconstruct_hooks *hooks,
-                      struct error *err);
+enum status solve_run(struct reconstruction *r, const struct views *views, const struct pace *pace, struct error *err);
 
 #endif

@@ -2,10 +2,8 @@
 #include "server/refine/listing1.h"
 
 #include "common/mem.h"
-#include "server/light/emitters.h"
 #include "server/refine/emitter_decision.h"
 #include "server/refine/params.h"
-#include "server/state/evidence.h"
 
 /* Fractions of the run: the decision about emitters; the end of the coarse levels, which get equal time. By hand. */
 #define DECISION_AT OPTIMISER_FALL_FROM
@@ -61,35 +59,33 @@ static float neutral_share(rgb observed, float median) {
     return q * q / (q * q + NEUTRAL_BRIGHTNESS * NEUTRAL_BRIGHTNESS);
 }
 
-static void start_neutral(struct reconstruction *r, const struct views *views) {
-    start_base_color(&r->inverse, &r->materials.base_color);
-    emitters_observe(r, views, r->evidence);
-    for (size_t s = 0; s < r->segments.count; s++) {
-        rgb observed = r->evidence[s].radiance;
-        r->materials.emission[s] = rgb_scale(observed, neutral_share(observed, views->median_radiance));
+static void start_neutral(const struct optimiser_input *in) {
+    start_base_color(in->surface.inverse, &in->materials->base_color);
+    for (size_t s = 0; s < in->surface.segments->count; s++) {
+        rgb observed = in->evidence[s].radiance;
+        in->materials->emission[s] = rgb_scale(observed, neutral_share(observed, in->views->median_radiance));
     }
 }
 
 static void fix_emitters(struct listing1 *l) {
     if (!l->any_emits)
-        emission_fix(&l->o->emission, l->o->r->is_emitter);
+        emission_fix(&l->o->emission, l->o->in.is_emitter);
     params_free_segments(&l->params);
 }
 
 static void decide_emitters(struct listing1 *l) {
-    struct reconstruction *r = l->o->r;
+    const struct optimiser_input *in = &l->o->in;
     if (!l->any_emits)
-        emitter_decision_make(
-            &(struct emitter_decision_input){reconstruction_surface(r), r->settings, l->o->pass.batch, r->pool},
-            r->evidence, r->is_emitter, &r->materials);
+        emitter_decision_make(&(struct emitter_decision_input){in->surface, l->o->settings, l->o->pass.batch, in->pool},
+                              in->evidence, in->is_emitter, in->materials);
     /* Emission by the segment's median may have exceeded the radiance of its dark parts, which base colour then
      * compensated: start it anew. */
-    start_base_color(&r->inverse, &r->materials.base_color);
+    start_base_color(in->surface.inverse, &in->materials->base_color);
     params_refine(&l->params, l->progress.level);
     fix_emitters(l);
-    for (size_t s = 0; s < r->segments.count; s++)
-        emission_set(&l->o->emission, s, r->materials.emission[s]);
-    world_update_lights(&r->world);
+    for (size_t s = 0; s < in->surface.segments->count; s++)
+        emission_set(&l->o->emission, s, in->materials->emission[s]);
+    world_update_lights(in->world);
     l->progress.decided = 1;
 }
 
@@ -111,10 +107,10 @@ static void iterate(void *self, double fraction) {
         params_refine(&l->params, l->progress.level);
     }
     pass_run(&o->pass, o->counters.iteration, walk_backwards, l);
-    gradient_reduce(l->gradient, l->log, o->pass.chunk_count, o->r->pool);
+    gradient_reduce(l->gradient, l->log, o->pass.chunk_count, o->in.pool);
     pass_d_emission(&o->pass, l->gradient->d_emission); /* instead of the full derivative (struct pass_emission) */
     struct params_rates rates = rates_at(l, fraction);
-    params_step(&l->params, l->gradient, &rates, o->r->pool);
+    params_step(&l->params, l->gradient, &rates, o->in.pool);
 }
 
 static void resumed(void *self) {
@@ -136,12 +132,12 @@ static void release(void *self) {
 
 static const struct optimiser_method method = {iterate, resumed, NULL, release};
 
-struct optimiser *listing1_new(struct reconstruction *r, const struct views *views,
-                               const struct reconstruct_hooks *hooks) {
-    const struct settings *set = r->settings;
+struct optimiser *listing1_new(const struct optimiser_input *input) {
+    const struct settings *set = input->pace->settings;
+    const struct surface *surface = &input->surface;
     struct listing1 *l = mem_alloc(sizeof *l);
-    start_neutral(r, views);
-    struct optimiser *o = optimiser_new(r, views, hooks, true, &method, l);
+    start_neutral(input);
+    struct optimiser *o = optimiser_new(input, true, &method, l);
     *l = (struct listing1){.o = o};
     l->any_emits = settings_is(set, "emitters", "any");
     l->coarse_levels = (int)settings_number(set, "coarse_levels");
@@ -152,11 +148,11 @@ struct optimiser *listing1_new(struct reconstruction *r, const struct views *vie
         .specular = (float)settings_number(set, "specular_rate"),
         .emission = (float)settings_number(set, "emission_rate"),
     };
-    params_init(&l->params, &r->materials, &r->inverse, &r->segments, &o->emission, l->coarse_levels);
-    l->gradient = gradient_new(r->atlas.width, r->atlas.height, r->segments.count);
+    params_init(&l->params, input->materials, surface->inverse, surface->segments, &o->emission, l->coarse_levels);
+    l->gradient = gradient_new(surface->atlas->width, surface->atlas->height, surface->segments->count);
     l->log = mem_array(o->pass.chunk_count, sizeof *l->log);
     for (size_t c = 0; c < o->pass.chunk_count; c++)
-        l->log[c] = gradient_log_new(r->segments.count);
+        l->log[c] = gradient_log_new(surface->segments->count);
     optimiser_keep(o, "progress", &l->progress, sizeof l->progress);
     optimiser_keep(o, "base_color.adam", l->params.base_color.record, adam_bytes(&l->params.base_color));
     optimiser_keep(o, "roughness.adam", l->params.roughness.record, adam_bytes(&l->params.roughness));

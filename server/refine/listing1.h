@@ -15,8 +15,7 @@
 
 #include "server/refine/optimiser.h"
 
-/* Sets r->materials and r->evidence to the neutral start; works on them, r->world and r->is_emitter. Borrows all. */
-struct optimiser *listing1_new(struct reconstruction *r, const struct views *views,
-                               const struct reconstruct_hooks *hooks);
+/* Sets the materials to the neutral start, by the radiance that evidence has of each segment. */
+struct optimiser *listing1_new(const struct optimiser_input *input);
 
 #endif

@@ -11,7 +11,8 @@
 
 #include "server/capture/views.h"
 #include "server/render/path.h"
-#include "server/state/reconstruction.h"
+#include "server/scene/photograph.h"
+#include "server/scene/surface.h"
 
 struct observation {
     uint32_t texel, segment;

@@ -7,8 +7,6 @@
 
 #include "common/hash64.h"
 #include "common/mem.h"
-#include "server/state/evidence.h"
-#include "server/state/pace.h"
 
 /* Step sizes fall as 1 / (1 + RATE_FALL t), t in [0, 1]. By hand. */
 #define RATE_FALL 15.0
@@ -26,16 +24,16 @@ void optimiser_keep(struct optimiser *o, const char *name, void *data, size_t by
 }
 
 /* Hash of the numbering of texels and segments, which the arrays of a checkpoint depend on. */
-static uint64_t surface_of(const struct reconstruction *r) {
-    size_t texels = (size_t)r->inverse.width * r->inverse.height;
-    uint64_t of_texels = hash64(r->inverse.triangle, texels * sizeof *r->inverse.triangle, r->inverse.width);
-    return hash64(r->segments.of_triangle, r->scene->mesh.triangle_count * sizeof *r->segments.of_triangle, of_texels);
+static uint64_t hash_surface(const struct surface *s) {
+    size_t texels = (size_t)s->inverse->width * s->inverse->height, triangles = s->mesh->triangle_count;
+    uint64_t of_texels = hash64(s->inverse->triangle, texels * sizeof *s->inverse->triangle, s->inverse->width);
+    return hash64(s->segments->of_triangle, triangles * sizeof *s->segments->of_triangle, of_texels);
 }
 
 static void keep_common(struct optimiser *o) {
-    struct reconstruction *r = o->r;
-    struct materials *m = &r->materials;
-    size_t segments = r->segments.count;
+    const struct optimiser_input *in = &o->in;
+    struct materials *m = in->materials;
+    size_t segments = in->surface.segments->count;
     size_t texels = (size_t)m->base_color.width * m->base_color.height;
     optimiser_keep(o, "counters", &o->counters, sizeof o->counters);
     optimiser_keep(o, "base_color", m->base_color.texel, texels * sizeof *m->base_color.texel);
@@ -44,22 +42,21 @@ static void keep_common(struct optimiser *o) {
     optimiser_keep(o, "emission", m->emission, segments * sizeof *m->emission);
     optimiser_keep(o, "emission.log", o->emission.log_radiance, segments * sizeof *o->emission.log_radiance);
     optimiser_keep(o, "emission.adam", o->emission.adam.record, adam_bytes(&o->emission.adam));
-    optimiser_keep(o, "emission.evidence", r->evidence, segments * sizeof *r->evidence);
-    optimiser_keep(o, "environment.factor", &r->sky_factor, sizeof r->sky_factor);
-    optimiser_keep(o, "sun.irradiance", &r->sun.irradiance, sizeof r->sun.irradiance);
-    optimiser_keep(o, "emission.is_emitter", r->is_emitter, segments * sizeof *r->is_emitter);
+    optimiser_keep(o, "emission.evidence", in->evidence, segments * sizeof *in->evidence);
+    optimiser_keep(o, "environment.factor", in->sky_factor, sizeof *in->sky_factor);
+    optimiser_keep(o, "sun.irradiance", in->sun_irradiance, sizeof *in->sun_irradiance);
+    optimiser_keep(o, "emission.is_emitter", in->is_emitter, segments * sizeof *in->is_emitter);
     optimiser_keep_since(o, 2, "plan", &o->plan, sizeof o->plan);
     optimiser_keep_since(o, 2, STATE_SURFACE, &o->surface, sizeof o->surface);
 }
 
-struct optimiser *optimiser_new(struct reconstruction *r, const struct views *views,
-                                const struct reconstruct_hooks *hooks, bool derivatives,
+struct optimiser *optimiser_new(const struct optimiser_input *input, bool derivatives,
                                 const struct optimiser_method *method, void *self) {
-    const struct settings *set = r->settings;
+    const struct settings *set = input->pace->settings;
     struct optimiser *o = mem_alloc(sizeof *o);
-    *o = (struct optimiser){.r = r, .views = views, .hooks = hooks, .method = method, .self = self};
+    *o = (struct optimiser){.in = *input, .settings = set, .hooks = input->pace->hooks, .method = method, .self = self};
     o->iteration_limit = (uint64_t)settings_number(set, "iterations");
-    o->surface = surface_of(r);
+    o->surface = hash_surface(&input->surface);
     const struct path_settings path = {
         .max_depth = (int)settings_number(set, "max_depth"),
         .roulette_depth = (int)settings_number(set, "roulette_depth"),
@@ -67,9 +64,8 @@ struct optimiser *optimiser_new(struct reconstruction *r, const struct views *vi
         .seed = (uint64_t)settings_number(set, "seed"),
         .least_color = derivatives ? PATH_LEAST_COLOR : 0.0f,
     };
-    const struct surface surface = reconstruction_surface(r);
-    pass_init(&o->pass, &surface, &r->world, views, set, &path, r->pool);
-    emission_init(&o->emission, &r->materials);
+    pass_init(&o->pass, &input->surface, input->world, input->views, set, &path, input->pool);
+    emission_init(&o->emission, input->materials);
     keep_common(o);
     return o;
 }
@@ -83,22 +79,23 @@ void optimiser_free(struct optimiser *o) {
 
 /* Observations so far. */
 static double observation_count(const struct optimiser *o) {
-    return (double)o->counters.path_count / settings_number(o->r->settings, "samples_per_camera");
+    return (double)o->counters.path_count / settings_number(o->settings, "samples_per_camera");
 }
 
 /* Observations of an iteration, at most. */
 static double visits_per_iteration(const struct optimiser *o) {
-    return (double)o->pass.chooser.stratum_count * settings_number(o->r->settings, "cameras_per_texel");
+    return (double)o->pass.chooser.stratum_count * settings_number(o->settings, "cameras_per_texel");
 }
 
 /* Planned iterations, or else observations; infinite where only the time limit ends them. */
 static double wanted(const struct optimiser *o) {
-    return o->iteration_limit ? (double)o->iteration_limit : pace_observations_wanted(o->r);
+    return o->iteration_limit ? (double)o->iteration_limit
+                              : pace_observations_wanted(o->in.pace, o->in.surface.inverse);
 }
 
 /* Part of the run that is done, in [0, 1]; depends on the clock only where there is a time limit. */
 static double fraction_done(const struct optimiser *o) {
-    const struct plan_work *work = &o->r->plan.part[PLAN_REFINE];
+    const struct plan_work *work = &o->in.pace->plan->part[PLAN_REFINE];
     double iteration = (double)o->counters.iteration, fraction;
     if (o->iteration_limit)
         fraction = iteration / (double)o->iteration_limit;
@@ -106,7 +103,7 @@ static double fraction_done(const struct optimiser *o) {
         fraction = 0.0;
     else
         fraction = fmax(observation_count(o), iteration * visits_per_iteration(o) / MAX_VISITS) / wanted(o);
-    if (isinf(work->wanted) || plan_is_cut(&o->r->plan, PLAN_REFINE))
+    if (isinf(work->wanted) || plan_is_cut(o->in.pace->plan, PLAN_REFINE))
         fraction = fmax(fraction, work->now > work->done ? work->done / work->now : 1.0);
     return fraction < 1.0 ? fraction : 1.0;
 }
@@ -117,7 +114,7 @@ static void plan_iterations(struct optimiser *o) {
     double done = observation_count(o);
     double each = iteration > 0.0 && done > 0.0 ? done / iteration : visits_per_iteration(o);
     if (o->iteration_limit)
-        pace_plan_observations(o->r, each * (double)o->iteration_limit);
+        pace_plan_observations(o->in.pace, each * (double)o->iteration_limit);
 }
 
 float optimiser_rate_fall(double fraction) {
@@ -126,11 +123,11 @@ float optimiser_rate_fall(double fraction) {
 }
 
 enum status optimiser_save(struct optimiser *o, struct error *err) {
-    plan_pass_time(&o->r->plan, o->hooks->worked_sec(o->hooks->user));
-    o->counters.elapsed_sec = o->r->plan.used_sec;
+    plan_pass_time(o->in.pace->plan, o->hooks->worked_sec(o->hooks->user));
+    o->counters.elapsed_sec = o->in.pace->plan->used_sec;
     for (int i = 0; i < PLAN_PARTS; i++) {
-        o->plan.wanted[i] = o->r->plan.part[i].wanted;
-        o->plan.done[i] = o->r->plan.part[i].done;
+        o->plan.wanted[i] = o->in.pace->plan->part[i].wanted;
+        o->plan.done[i] = o->in.pace->plan->part[i].done;
     }
     return o->hooks->checkpoint_save(o->hooks->user, (long)o->counters.iteration, o->state, o->state_count, err);
 }
@@ -151,7 +148,7 @@ static void redraw_curve(struct optimiser *o, bool is_extended) {
 
 /* Restores the plan of earlier attempts. */
 static void resume_plan(struct optimiser *o) {
-    struct plan *plan = &o->r->plan;
+    struct plan *plan = o->in.pace->plan;
     for (int i = PLAN_GATHER; i <= PLAN_DETAIL; i++) {
         plan_resume(plan, (enum plan_part)i, o->plan.done[i]);
         plan->part[i].wanted = o->plan.wanted[i];
@@ -184,7 +181,7 @@ enum status optimiser_load(struct optimiser *o, bool *found, struct error *err) 
 static double iterate(struct optimiser *o, double fraction) {
     struct optimiser_counters *c = &o->counters;
     /* First, since after a resume the lights do not match the materials yet. */
-    world_update_lights(&o->r->world);
+    world_update_lights(o->in.world);
     o->method->iterate(o->self, fraction);
     double loss = pass_mean_loss(&o->pass);
     size_t bin = (size_t)(fraction * (OPTIMISER_CURVE_POINTS - 1));
@@ -207,19 +204,19 @@ static void emit_metrics(const struct optimiser *o, double loss) {
 
 /* One iteration with its progress and metrics. */
 static void advance(struct optimiser *o, double fraction) {
-    double before = o->r->plan.part[PLAN_REFINE].spent_sec;
+    double before = o->in.pace->plan->part[PLAN_REFINE].spent_sec;
     double loss = iterate(o, fraction);
     plan_iterations(o);
-    pace_advance(o->r, o->hooks, "refine", PLAN_REFINE, (double)pass_observation_count(&o->pass));
-    o->counters.iterate_sec += o->r->plan.part[PLAN_REFINE].spent_sec - before;
+    pace_advance(o->in.pace, "refine", PLAN_REFINE, (double)pass_observation_count(&o->pass));
+    o->counters.iterate_sec += o->in.pace->plan->part[PLAN_REFINE].spent_sec - before;
     emit_metrics(o, loss);
 }
 
 static enum status loop(struct optimiser *o, struct error *err) {
     const struct reconstruct_hooks *hooks = o->hooks;
     plan_iterations(o);
-    if (isfinite(o->r->plan.limit_sec))
-        plan_fit(&o->r->plan);
+    if (isfinite(o->in.pace->plan->limit_sec))
+        plan_fit(o->in.pace->plan);
     for (double fraction = fraction_done(o); fraction < 1.0; fraction = fraction_done(o)) {
         advance(o, fraction);
         bool stop = hooks->stop_requested(hooks->user);
@@ -232,15 +229,15 @@ static enum status loop(struct optimiser *o, struct error *err) {
             return error_set(err, STATUS_CANCELLED, "stopped at iteration %llu",
                              (unsigned long long)o->counters.iteration);
         if (hooks->preview_due(hooks->user)) {
-            enum status status = hooks->preview(hooks->user, o->r, err);
+            enum status status = hooks->preview(hooks->user, o->in.previewed, err);
             if (status != STATUS_OK)
                 return status;
         }
     }
     if (o->method->finish)
         o->method->finish(o->self);
-    plan_close(&o->r->plan, PLAN_REFINE);
-    o->plan.ended_at_sec = isfinite(o->r->plan.limit_sec) ? o->r->plan.limit_sec : 0.0;
+    plan_close(o->in.pace->plan, PLAN_REFINE);
+    o->plan.ended_at_sec = isfinite(o->in.pace->plan->limit_sec) ? o->in.pace->plan->limit_sec : 0.0;
     return optimiser_save(o, err);
 }
 
@@ -257,7 +254,7 @@ static cJSON *curve_points(const struct optimiser_counters *c) {
 
 static void report(const struct optimiser *o) {
     const struct optimiser_counters *c = &o->counters;
-    cJSON *figures = cJSON_AddObjectToObject(o->r->report, "refine");
+    cJSON *figures = cJSON_AddObjectToObject(o->in.report, "refine");
     uint64_t rays, dropped;
     pass_ray_counts(&o->pass, &rays, &dropped);
     json_add_int(figures, "iterations", (int64_t)c->iteration);
@@ -265,8 +262,8 @@ static void report(const struct optimiser *o) {
     json_add_int(figures, "rays_this_attempt", (int64_t)rays);
     json_add_int(figures, "non_finite_samples_dropped_this_attempt", (int64_t)dropped);
     json_add_number(figures, "paths_per_second", c->iterate_sec > 0.0 ? (double)c->path_count / c->iterate_sec : 0.0);
-    json_add_number(figures, "paths_per_texel", (double)c->path_count / (double)o->r->inverse.valid_count);
-    cJSON *series = cJSON_AddObjectToObject(o->r->report, "series");
+    json_add_number(figures, "paths_per_texel", (double)c->path_count / (double)o->in.surface.inverse->valid_count);
+    cJSON *series = cJSON_AddObjectToObject(o->in.report, "series");
     json_add(series, "loss", curve_points(c));
 }
 

@@ -13,7 +13,8 @@
 
 #include "server/refine/emission.h"
 #include "server/refine/pass.h"
-#include "server/state/reconstruction.h"
+#include "server/state/evidence.h"
+#include "server/state/pace.h"
 
 #define OPTIMISER_CURVE_POINTS 256 /* of the loss curve; part of the checkpoint format */
 #define OPTIMISER_ARRAYS 24        /* arrays of a checkpoint, at most */
@@ -32,6 +33,23 @@ struct optimiser_method {
     void (*free)(void *self);
 };
 
+/* What a run reads and writes. Borrowed, and valid until it is freed. */
+struct optimiser_input {
+    struct surface surface;
+    const struct views *views;
+    const struct pace *pace; /* its plan is written */
+    struct parallel *pool;
+    /* Written, and kept in checkpoints. */
+    struct materials *materials;
+    bool *is_emitter;                  /* [segment_count] */
+    struct emitter_evidence *evidence; /* [segment_count] */
+    rgb *sky_factor, *sun_irradiance;  /* by solve; not changed here */
+    /* Written. */
+    struct world *world;                    /* its lights follow the materials */
+    cJSON *report;                          /* object */
+    const struct reconstruction *previewed; /* given to hooks->preview, not read */
+};
+
 /* The run's counters; in checkpoints. */
 struct optimiser_counters {
     uint64_t iteration, path_count;
@@ -48,8 +66,8 @@ struct optimiser_plan {
 };
 
 struct optimiser {
-    struct reconstruction *r; /* borrowed, all three */
-    const struct views *views;
+    struct optimiser_input in;
+    const struct settings *settings; /* borrowed, all three */
     const struct reconstruct_hooks *hooks;
     const struct optimiser_method *method;
     void *self; /* the method's; owned, given to method->free */
@@ -63,10 +81,8 @@ struct optimiser {
     struct state_array state[OPTIMISER_ARRAYS]; /* arrays of a checkpoint */
 };
 
-/* Starts from r->materials. `derivatives`: paths are kept for a backward pass. Borrows all but `self`, which it
- * takes. */
-struct optimiser *optimiser_new(struct reconstruction *r, const struct views *views,
-                                const struct reconstruct_hooks *hooks, bool derivatives,
+/* Starts from the materials as they are. `derivatives`: paths are kept for a backward pass. Takes `self`. */
+struct optimiser *optimiser_new(const struct optimiser_input *input, bool derivatives,
                                 const struct optimiser_method *method, void *self);
 void optimiser_free(struct optimiser *o);
 
@@ -80,7 +96,7 @@ void optimiser_keep_since(struct optimiser *o, int format, const char *name, voi
 enum status optimiser_load(struct optimiser *o, bool *found, struct error *err);
 enum status optimiser_save(struct optimiser *o, struct error *err);
 
-/* Iterates to the end and saves a checkpoint. Adds "refine" and the loss curve to r->report. STATUS_CANCELLED when
+/* Iterates to the end and saves a checkpoint. Adds "refine" and the loss curve to the report. STATUS_CANCELLED when
  * stopped, after a checkpoint. */
 enum status optimiser_run(struct optimiser *o, struct error *err);
 

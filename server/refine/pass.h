@@ -10,10 +10,12 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "common/parallel.h"
+#include "common/settings.h"
 #include "server/capture/choose.h"
 #include "server/capture/views.h"
 #include "server/refine/observation.h"
-#include "server/state/reconstruction.h"
+#include "server/scene/surface.h"
 
 #define PASS_CHUNK_TEXELS 32 /* texels of a chunk, and of an observation batch */
 

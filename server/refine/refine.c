@@ -20,7 +20,9 @@ struct stored_comparison {
 };
 
 struct refine {
-    struct optimiser *o; /* borrowed: its owner */
+    struct optimiser *o;       /* borrowed: its owner */
+    const struct fused *fused; /* borrowed, both */
+    const struct noise *noise;
     struct correction correction;
     double next_observations;              /* number of observations of the next correction */
     struct stored_comparison *observation; /* [chunk_count][observation_capacity] of the last pass */
@@ -35,11 +37,11 @@ static void store_comparisons(void *self, size_t chunk, struct observation_batch
         const struct observation *observation = &b->observation[k];
         size_t first = k * (size_t)b->samples;
         rgb expected = correction_expected(&f->correction, observation->texel);
-        rgb noise = noise_deviation(&f->o->r->noise, f->o->views, &observation->view, expected);
+        rgb noise = noise_deviation(f->noise, f->o->in.views, &observation->view, expected);
         f->observation[chunk * b->observation_capacity + k] =
             (struct stored_comparison){observation->texel, observation->weight,
                                        comparison_make(b->reference + first, b->radiance + first, b->samples, expected,
-                                                       noise, f->o->views->median_radiance)};
+                                                       noise, f->o->in.views->median_radiance)};
     }
 }
 
@@ -48,7 +50,7 @@ static void add_comparisons(struct refine *f) {
     for (size_t c = 0; c < pass->chunk_count; c++) {
         const struct stored_comparison *observation = &f->observation[c * pass->observation_capacity];
         for (size_t k = 0; k < pass->chunk[c].observation_count; k++) {
-            uint32_t segment = f->o->r->segments.of_triangle[f->o->r->inverse.triangle[observation[k].texel]];
+            uint32_t segment = surface_segment(&f->o->in.surface, observation[k].texel);
             float weight = observation[k].weight * observation[k].comparison.weight;
             correction_add(&f->correction, observation[k].texel, &observation[k].comparison,
                            weight * emission_slowdown(&f->o->emission, segment));
@@ -57,7 +59,7 @@ static void add_comparisons(struct refine *f) {
 }
 
 static double observation_count(const struct refine *f) {
-    return (double)f->o->counters.path_count / settings_number(f->o->r->settings, "samples_per_camera");
+    return (double)f->o->counters.path_count / settings_number(f->o->settings, "samples_per_camera");
 }
 
 static void iterate(void *self, double fraction) {
@@ -67,7 +69,7 @@ static void iterate(void *self, double fraction) {
     add_comparisons(f);
     double observations = observation_count(f) + (double)pass_observation_count(pass);
     if (observations >= f->next_observations) {
-        correction_apply(&f->correction, f->o->r->pool);
+        correction_apply(&f->correction, f->o->in.pool);
         f->next_observations = OBSERVATIONS_GROWTH * observations;
     }
     pass_d_emission(pass, f->d_emission);
@@ -76,13 +78,13 @@ static void iterate(void *self, double fraction) {
 
 static void resumed(void *self) {
     struct refine *f = self;
-    emission_fix(&f->o->emission, f->o->r->is_emitter);
-    correction_set_light(&f->correction, &f->o->r->fused);
+    emission_fix(&f->o->emission, f->o->in.is_emitter);
+    correction_set_light(&f->correction, f->fused);
 }
 
 static void finish(void *self) {
     struct refine *f = self;
-    correction_apply(&f->correction, f->o->r->pool);
+    correction_apply(&f->correction, f->o->in.pool);
 }
 
 static void release(void *self) {
@@ -101,28 +103,31 @@ static uint32_t part_of(const struct texture *t, uint32_t across) {
 
 static const struct optimiser_method method = {iterate, resumed, finish, release};
 
-struct optimiser *refine_new(struct reconstruction *r, const struct views *views,
-                             const struct reconstruct_hooks *hooks) {
+struct optimiser *refine_new(const struct optimiser_input *input, const struct fused *fused,
+                             const struct noise *noise) {
+    const struct surface *surface = &input->surface;
+    struct texture *base_color = &input->materials->base_color;
     struct refine *f = mem_alloc(sizeof *f);
-    struct optimiser *o = optimiser_new(r, views, hooks, false, &method, f);
-    *f = (struct refine){.o = o};
-    correction_init(&f->correction, &r->materials.base_color, &r->inverse, r->atlas.chart_of_triangle,
-                    part_of(&r->materials.base_color, CELLS_ACROSS));
+    struct optimiser *o = optimiser_new(input, false, &method, f);
+    *f = (struct refine){.o = o, .fused = fused, .noise = noise};
+    correction_init(&f->correction, base_color, surface->inverse, surface->atlas->chart_of_triangle,
+                    part_of(base_color, CELLS_ACROSS));
     f->observation = mem_calloc(o->pass.chunk_count * o->pass.observation_capacity, sizeof *f->observation);
-    f->d_emission = mem_array(r->segments.count, sizeof *f->d_emission);
-    f->emission_rate = (float)settings_number(r->settings, "emission_rate");
+    f->d_emission = mem_array(surface->segments->count, sizeof *f->d_emission);
+    f->emission_rate = (float)settings_number(o->settings, "emission_rate");
     optimiser_keep(o, "correction.sums", f->correction.sums, f->correction.count * sizeof *f->correction.sums);
     optimiser_keep(o, "correction.solved", f->correction.solved,
-                   (size_t)r->inverse.width * r->inverse.height * sizeof *f->correction.solved);
+                   (size_t)base_color->width * base_color->height * sizeof *f->correction.solved);
     optimiser_keep(o, "correction.next_looks", &f->next_observations, sizeof f->next_observations);
     return o;
 }
 
 enum status refine_start(struct optimiser *o, struct error *err) {
-    emission_fix(&o->emission, o->r->is_emitter);
-    for (size_t s = 0; s < o->r->segments.count; s++)
-        emission_set(&o->emission, s, o->r->materials.emission[s]);
-    correction_start(&((struct refine *)o->self)->correction);
-    correction_set_light(&((struct refine *)o->self)->correction, &o->r->fused);
+    struct refine *f = o->self;
+    emission_fix(&o->emission, o->in.is_emitter);
+    for (size_t s = 0; s < o->in.surface.segments->count; s++)
+        emission_set(&o->emission, s, o->in.materials->emission[s]);
+    correction_start(&f->correction);
+    correction_set_light(&f->correction, f->fused);
     return optimiser_save(o, err);
 }

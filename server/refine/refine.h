@@ -9,13 +9,15 @@
 #ifndef UNBAKE_REFINE_REFINE_H
 #define UNBAKE_REFINE_REFINE_H
 
+#include "server/capture/fuse.h"
+#include "server/capture/noise.h"
 #include "server/refine/optimiser.h"
 
-/* Made before solve runs, which a checkpoint may make unnecessary. Borrows all. */
-struct optimiser *refine_new(struct reconstruction *r, const struct views *views,
-                             const struct reconstruct_hooks *hooks);
+/* Made before solve runs, which a checkpoint may make unnecessary. `fused`: observed radiance, `noise`: of the
+ * photographs; both borrowed. */
+struct optimiser *refine_new(const struct optimiser_input *input, const struct fused *fused, const struct noise *noise);
 
-/* To be called after solve has filled r->materials and r->is_emitter; saves a checkpoint. */
+/* To be called after solve has filled materials and is_emitter; saves a checkpoint. */
 enum status refine_start(struct optimiser *o, struct error *err);
 
 #endif

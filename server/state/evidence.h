@@ -7,8 +7,6 @@
 #include <stdbool.h>
 
 #include "common/vec.h"
-#include "server/capture/fuse.h"
-#include "server/state/reconstruction.h"
 
 /* Radiances are by channel. */
 struct emitter_evidence {
@@ -34,11 +32,10 @@ static inline void evidence_set_lambert(struct emitter_evidence *e, rgb lambert)
     e->emitted_share = radiance > 0.0f ? clampf(1.0f - rgb_mean(lambert) / radiance, 0.0f, 1.0f) : 0.0f;
 }
 
-/* Whether a texel is about as bright as its segment. */
+/* Whether a radiance is about that of the segment. */
 #define EVIDENCE_AS_BRIGHT 0.7f /* least part of the segment's radiance; by hand */
-static inline bool evidence_is_bright(const struct reconstruction *r, uint32_t texel) {
-    float radiance = rgb_mean(r->evidence[reconstruction_segment(r, texel)].radiance);
-    return rgb_mean(fused_radiance(&r->fused, texel)) > EVIDENCE_AS_BRIGHT * radiance;
+static inline bool evidence_is_as_bright(const struct emitter_evidence *e, rgb radiance) {
+    return rgb_mean(radiance) > EVIDENCE_AS_BRIGHT * rgb_mean(e->radiance);
 }
 
 #endif

@@ -35,109 +35,110 @@
 #define MODEST_REPORT 0.125
 #define MIN_MEASURE 0.25 /* one texel in 2 x 2 */
 
-static double threads(const struct reconstruction *r) { return (double)parallel_thread_count(r->pool); }
+static double side(const struct pace *p) { return settings_number(p->settings, "texture_size"); }
 
-static double side(const struct reconstruction *r) { return settings_number(r->settings, "texture_size"); }
+static bool solves(const struct pace *p) { return settings_is(p->settings, "method", "solve"); }
 
-static bool solves(const struct reconstruction *r) { return settings_is(r->settings, "method", "solve"); }
+/* The setting that says how many observations are wanted. */
+static const char *observations_setting(const struct pace *p) { return solves(p) ? "refine_looks" : "listing1_looks"; }
 
-double pace_observations_wanted(const struct reconstruction *r) {
-    const char *name = solves(r) ? "refine_looks" : "listing1_looks";
-    double observations = settings_number(r->settings, name);
+double pace_observations_wanted(const struct pace *p, const struct inverse_uv *inverse) {
+    const char *name = observations_setting(p);
+    double observations = settings_number(p->settings, name);
     if (observations == 0.0)
-        observations = isinf(r->plan.limit_sec) ? settings_of_quality(r->settings, name) : (double)INFINITY;
-    uint32_t larger = r->inverse.width > r->inverse.height ? r->inverse.width : r->inverse.height;
+        observations = isinf(p->plan->limit_sec) ? settings_of_quality(p->settings, name) : (double)INFINITY;
+    uint32_t larger = inverse->width > inverse->height ? inverse->width : inverse->height;
     double window = larger > WINDOWS_ACROSS ? (double)(larger / WINDOWS_ACROSS) : 1.0;
-    return observations * ceil((double)r->inverse.valid_count / (window * window));
+    return observations * ceil((double)inverse->valid_count / (window * window));
 }
 
-static void plan_refine(struct reconstruction *r, double wanted, double modest) {
-    double sec = settings_number(r->settings, "samples_per_camera") * REFINE_PATH_SEC / threads(r);
-    plan_set(&r->plan, PLAN_REFINE, wanted, MODEST_OBSERVATIONS * modest, 0.0, solves(r) ? sec : LISTING1_FACTOR * sec);
+static void plan_refine(const struct pace *p, double wanted, double modest) {
+    double sec = settings_number(p->settings, "samples_per_camera") * REFINE_PATH_SEC / p->thread_count;
+    plan_set(p->plan, PLAN_REFINE, wanted, MODEST_OBSERVATIONS * modest, 0.0, solves(p) ? sec : LISTING1_FACTOR * sec);
 }
 
-void pace_plan_observations(struct reconstruction *r, double observations) {
-    plan_refine(r, observations, observations);
+void pace_plan_observations(const struct pace *p, double observations) { plan_refine(p, observations, observations); }
+
+static void plan_report(const struct pace *p, double pixels) {
+    double samples = settings_number(p->settings, "report_samples");
+    plan_set(p->plan, PLAN_REPORT, pixels * samples, pixels * fmax(ceil(MODEST_REPORT * samples), 1.0), pixels,
+             REPORT_SEC / p->thread_count);
 }
 
-static void plan_report(struct reconstruction *r, double pixels) {
-    double samples = settings_number(r->settings, "report_samples");
-    plan_set(&r->plan, PLAN_REPORT, pixels * samples, pixels * fmax(ceil(MODEST_REPORT * samples), 1.0), pixels,
-             REPORT_SEC / threads(r));
-}
-
-void pace_plan_solve(struct reconstruction *r, double valid, double directions, double early_texels, double last_texels,
+void pace_plan_solve(const struct pace *p, double valid, double directions, double early_texels, double last_texels,
                      double detail_steps) {
-    double n = threads(r);
-    plan_set(&r->plan, PLAN_GATHER, directions, directions, PACE_LEAST_GATHER * directions, GATHER_SEC / n);
-    plan_set(&r->plan, PLAN_MEASURE, early_texels + last_texels, early_texels + last_texels,
+    double n = p->thread_count;
+    plan_set(p->plan, PLAN_GATHER, directions, directions, PACE_LEAST_GATHER * directions, GATHER_SEC / n);
+    plan_set(p->plan, PLAN_MEASURE, early_texels + last_texels, early_texels + last_texels,
              early_texels + MIN_MEASURE * last_texels, MEASURE_SEC / n);
-    plan_set(&r->plan, PLAN_DETAIL, detail_steps, detail_steps, 0.0, DETAIL_SEC / n);
-    plan_set_fixed(&r->plan, PLAN_FIT, 1.0,
-                   (FIT_SPECULAR_SEC * settings_number(r->settings, "gloss_passes") + FIT_TEXEL_SEC * valid) / n);
-    plan_fit(&r->plan);
+    plan_set(p->plan, PLAN_DETAIL, detail_steps, detail_steps, 0.0, DETAIL_SEC / n);
+    plan_set_fixed(p->plan, PLAN_FIT, 1.0,
+                   (FIT_SPECULAR_SEC * settings_number(p->settings, "gloss_passes") + FIT_TEXEL_SEC * valid) / n);
+    plan_fit(p->plan);
 }
 
 /* Plans everything that depends on the number of mapped texels. */
-static void plan_texels(struct reconstruction *r, double valid) {
-    double n = threads(r), stride = settings_number(r->settings, "measure_stride");
-    plan_set_fixed(&r->plan, PLAN_FUSE, 1.0, (FUSE_SEC + FUSE_TEXEL_SEC * valid) / n);
-    plan_set_fixed(&r->plan, PLAN_EXPORT, 1.0, EXPORT_TEXEL_SEC * side(r) * side(r)); /* on one core, mostly */
-    if (!solves(r))
+static void plan_texels(const struct pace *p, double valid) {
+    double n = p->thread_count, stride = settings_number(p->settings, "measure_stride");
+    plan_set_fixed(p->plan, PLAN_FUSE, 1.0, (FUSE_SEC + FUSE_TEXEL_SEC * valid) / n);
+    plan_set_fixed(p->plan, PLAN_EXPORT, 1.0, EXPORT_TEXEL_SEC * side(p) * side(p)); /* on one core, mostly */
+    if (!solves(p))
         return;
-    double spacing = fmax(side(r) * 8.0 / 2048.0, 4.0); /* as solve.c has it */
+    double spacing = fmax(side(p) * 8.0 / 2048.0, 4.0); /* as solve.c has it */
     double probes = USUAL_PROBES * valid / (spacing * spacing), texels = valid / (stride * stride);
-    pace_plan_solve(r, valid, 1.5 * probes * settings_number(r->settings, "gather_samples"), 0.5 * texels, texels,
-                    settings_number(r->settings, "detail_steps") * valid);
+    pace_plan_solve(p, valid, 1.5 * probes * settings_number(p->settings, "gather_samples"), 0.5 * texels, texels,
+                    settings_number(p->settings, "detail_steps") * valid);
 }
 
-static void plan_all(struct reconstruction *r) {
-    double pixels = 0.0, held_out = 0.0, every = settings_number(r->settings, "hold_out_every");
-    plan_init(&r->plan, settings_number(r->settings, "time_limit_sec"));
-    for (size_t i = 0; i < r->scene->photograph_count; i++) {
-        const struct camera *c = &r->scene->photograph[i].camera;
+static void plan_all(const struct pace *p, const struct scene *scene) {
+    double pixels = 0.0, held_out = 0.0, every = settings_number(p->settings, "hold_out_every");
+    plan_init(p->plan, settings_number(p->settings, "time_limit_sec"));
+    for (size_t i = 0; i < scene->photograph_count; i++) {
+        const struct camera *c = &scene->photograph[i].camera;
         pixels += (double)c->width * (double)c->height;
-        held_out += r->scene->photograph[i].is_test ? (double)c->width * (double)c->height : 0.0;
+        held_out += scene->photograph[i].is_test ? (double)c->width * (double)c->height : 0.0;
     }
     if (held_out == 0.0 && every > 0.0)
         held_out = pixels / every;
-    double valid = USUAL_COVER * side(r) * side(r);
-    plan_set_fixed(&r->plan, PLAN_PREPARE, 1.0,
-                   (PREPARE_SEC + PREPARE_PIXEL_SEC * pixels + PREPARE_TEXEL_SEC * side(r) * side(r)) / threads(r));
-    plan_texels(r, valid);
+    double valid = USUAL_COVER * side(p) * side(p);
+    plan_set_fixed(p->plan, PLAN_PREPARE, 1.0,
+                   (PREPARE_SEC + PREPARE_PIXEL_SEC * pixels + PREPARE_TEXEL_SEC * side(p) * side(p)) /
+                       p->thread_count);
+    plan_texels(p, valid);
     double windows = USUAL_COVER * WINDOWS_ACROSS * WINDOWS_ACROSS;
-    const char *name = solves(r) ? "refine_looks" : "listing1_looks";
-    plan_refine(r, windows * settings_number(r->settings, name), windows * settings_of_quality(r->settings, name));
-    plan_report(r, held_out);
+    const char *name = observations_setting(p);
+    plan_refine(p, windows * settings_number(p->settings, name), windows * settings_of_quality(p->settings, name));
+    plan_report(p, held_out);
 }
 
-void pace_start(struct reconstruction *r, const struct reconstruct_hooks *hooks) {
-    plan_all(r);
-    plan_pass_time(&r->plan, hooks->worked_sec(hooks->user)); /* reading the scene */
+void pace_start(const struct pace *p, const struct scene *scene) {
+    plan_all(p, scene);
+    plan_pass_time(p->plan, p->hooks->worked_sec(p->hooks->user)); /* reading the scene */
 }
 
 double pace_forecast_sec(const struct scene *scene, const struct settings *settings, struct parallel *pool) {
-    struct reconstruction r = {.scene = (struct scene *)scene, .settings = settings, .pool = pool}; /* is only read */
-    plan_all(&r);
-    return plan_left_sec(&r.plan);
+    struct plan plan;
+    plan_all(&(struct pace){&plan, settings, NULL, parallel_thread_count(pool)}, scene);
+    return plan_left_sec(&plan);
 }
 
-void pace_measure_room(struct reconstruction *r) {
-    double held_out = 0.0, wanted = pace_observations_wanted(r);
-    const char *name = solves(r) ? "refine_looks" : "listing1_looks";
-    for (size_t i = 0; i < r->scene->photograph_count; i++) {
-        const struct camera *c = &r->scene->photograph[i].camera;
-        held_out += r->scene->photograph[i].is_test ? (double)c->width * (double)c->height : 0.0;
+void pace_measure_room(const struct pace *p, const struct scene *scene, const struct inverse_uv *inverse) {
+    double held_out = 0.0, wanted = pace_observations_wanted(p, inverse);
+    const char *name = observations_setting(p);
+    for (size_t i = 0; i < scene->photograph_count; i++) {
+        const struct camera *c = &scene->photograph[i].camera;
+        held_out += scene->photograph[i].is_test ? (double)c->width * (double)c->height : 0.0;
     }
-    plan_texels(r, (double)r->inverse.valid_count);
-    double usual = isinf(wanted) ? settings_of_quality(r->settings, name) * WINDOWS_ACROSS * WINDOWS_ACROSS : wanted;
-    plan_refine(r, wanted, usual);
-    plan_report(r, held_out);
+    plan_texels(p, (double)inverse->valid_count);
+    double usual = isinf(wanted) ? settings_of_quality(p->settings, name) * WINDOWS_ACROSS * WINDOWS_ACROSS : wanted;
+    plan_refine(p, wanted, usual);
+    plan_report(p, held_out);
 }
 
-void pace_begin_stage(struct reconstruction *r, const struct reconstruct_hooks *hooks, const char *stage) {
-    plan_pass_time(&r->plan, hooks->worked_sec(hooks->user));
-    hooks->progress(hooks->user, stage, 0.0, 1.0, plan_left_sec(&r->plan));
+void pace_begin_stage(const struct pace *p, const char *stage) {
+    const struct reconstruct_hooks *hooks = p->hooks;
+    plan_pass_time(p->plan, hooks->worked_sec(hooks->user));
+    hooks->progress(hooks->user, stage, 0.0, 1.0, plan_left_sec(p->plan));
 }
 
 static const struct {
@@ -148,15 +149,15 @@ static const struct {
     {"refine", PLAN_REFINE, PLAN_REFINE},    {"report", PLAN_REPORT, PLAN_REPORT},
 };
 
-void pace_advance(struct reconstruction *r, const struct reconstruct_hooks *hooks, const char *stage,
-                  enum plan_part part, double work) {
-    plan_advance(&r->plan, part, work, hooks->worked_sec(hooks->user));
-    if (!isinf(r->plan.limit_sec))
-        plan_fit(&r->plan);
+void pace_advance(const struct pace *p, const char *stage, enum plan_part part, double work) {
+    const struct reconstruct_hooks *hooks = p->hooks;
+    plan_advance(p->plan, part, work, hooks->worked_sec(hooks->user));
+    if (!isinf(p->plan->limit_sec))
+        plan_fit(p->plan);
     for (size_t i = 0; i < sizeof stages / sizeof *stages; i++)
         if (strcmp(stages[i].stage, stage) == 0)
-            hooks->progress(hooks->user, stage, plan_share_done(&r->plan, stages[i].first, stages[i].last), 1.0,
-                            plan_left_sec(&r->plan));
+            hooks->progress(hooks->user, stage, plan_share_done(p->plan, stages[i].first, stages[i].last), 1.0,
+                            plan_left_sec(p->plan));
 }
 
 /* --- report ------------------------------------------------------------------------------------- */
@@ -176,10 +177,10 @@ static const struct {
 };
 #define REPORT_PARTS (sizeof report_parts / sizeof *report_parts)
 
-static void report_work(struct reconstruction *r) {
-    cJSON *work = cJSON_AddArrayToObject(r->report, "work");
+static void report_work(const struct plan *plan, cJSON *report) {
+    cJSON *work = cJSON_AddArrayToObject(report, "work");
     for (size_t i = 0; i < REPORT_PARTS; i++) {
-        const struct plan_work *w = &r->plan.part[report_parts[i].part];
+        const struct plan_work *w = &plan->part[report_parts[i].part];
         cJSON *entry = cJSON_CreateObject();
         json_add_string(entry, "part", report_parts[i].name);
         json_add_string(entry, "unit", report_parts[i].unit);
@@ -189,12 +190,12 @@ static void report_work(struct reconstruction *r) {
     }
 }
 
-static void report_left_out(struct reconstruction *r, cJSON *list) {
-    char *text = r->left_out;
-    size_t size = sizeof r->left_out, used = 0;
+/* Lists what was left out, and writes it as a sentence to text[size]. */
+static void report_left_out(const struct plan *plan, cJSON *list, char *text, size_t size) {
+    size_t used = 0;
     for (size_t i = 0; i < REPORT_PARTS; i++) {
-        const struct plan_work *w = &r->plan.part[report_parts[i].part];
-        if (!report_parts[i].of_all || !plan_is_cut(&r->plan, report_parts[i].part))
+        const struct plan_work *w = &plan->part[report_parts[i].part];
+        if (!report_parts[i].of_all || !plan_is_cut(plan, report_parts[i].part))
             continue;
         double share = 1.0 - w->now / w->wanted;
         cJSON *entry = cJSON_CreateObject();
@@ -208,21 +209,23 @@ static void report_left_out(struct reconstruction *r, cJSON *list) {
                 text + used, size - used, "%s%.0f %% %s", used ? ", " : "left out to keep time_limit_sec: ",
                 share < 1.0 ? fmin(fmax(100.0 * share, 1.0), 99.0) : 100.0, report_parts[i].of_all);
     }
-    if (!plan_is_kept(&r->plan) && used < size)
+    if (!plan_is_kept(plan) && used < size)
         snprintf(text + used, size - used, "%sthe job took %.0f s in place of time_limit_sec=%.0f", used ? "; " : "",
-                 r->plan.used_sec + plan_left_sec(&r->plan), r->plan.limit_sec);
+                 plan->used_sec + plan_left_sec(plan), plan->limit_sec);
 }
 
-void pace_report(struct reconstruction *r, const struct reconstruct_hooks *hooks) {
-    report_work(r);
-    if (isinf(r->plan.limit_sec))
+void pace_report(const struct pace *p, cJSON *report, char *left_out, size_t size) {
+    const struct plan *plan = p->plan;
+    left_out[0] = '\0';
+    report_work(plan, report);
+    if (isinf(plan->limit_sec))
         return;
-    cJSON *limit = cJSON_AddObjectToObject(r->report, "time_limit");
-    json_add_number(limit, "limit_sec", r->plan.limit_sec);
-    json_add_number(limit, "used_sec", r->plan.used_sec);
-    json_add_bool(limit, "kept", plan_is_kept(&r->plan));
-    report_left_out(r, cJSON_AddArrayToObject(limit, "left_out"));
-    json_add_string(limit, "summary", r->left_out[0] ? r->left_out : "nothing was left out");
-    if (r->left_out[0])
-        hooks->warning(hooks->user, r->left_out);
+    cJSON *limit = cJSON_AddObjectToObject(report, "time_limit");
+    json_add_number(limit, "limit_sec", plan->limit_sec);
+    json_add_number(limit, "used_sec", plan->used_sec);
+    json_add_bool(limit, "kept", plan_is_kept(plan));
+    report_left_out(plan, cJSON_AddArrayToObject(limit, "left_out"), left_out, size);
+    json_add_string(limit, "summary", left_out[0] ? left_out : "nothing was left out");
+    if (left_out[0])
+        p->hooks->warning(p->hooks->user, left_out);
 }

@@ -1,4 +1,4 @@
-/* reconstruction.h -- the state that the stages share, and the callbacks to their caller. */
+/* reconstruction.h -- the state that the stages share. */
 #ifndef UNBAKE_STATE_RECONSTRUCTION_H
 #define UNBAKE_STATE_RECONSTRUCTION_H
 
@@ -6,7 +6,6 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "common/error.h"
 #include "common/json.h"
 #include "common/parallel.h"
 #include "common/settings.h"
@@ -17,35 +16,9 @@
 #include "server/scene/inverse_uv.h"
 #include "server/scene/materials.h"
 #include "server/scene/scene.h"
+#include "server/state/evidence.h"
+#include "server/state/hooks.h"
 #include "server/state/plan.h"
-#include "server/state/state_array.h"
-
-struct reconstruction; /* the present state, for previews and outputs */
-struct emitter_evidence;
-
-/* Callbacks to the caller, made on the thread that runs reconstruct_run. */
-struct reconstruct_hooks {
-    void *user;
-    bool (*stop_requested)(void *user);
-    void (*stage)(void *user, const char *stage);
-    void (*progress)(void *user, const char *stage, double done, double total, double eta_sec);
-    void (*metric)(void *user, const char *series, long step, double value);
-    void (*log)(void *user, const char *message);
-    void (*warning)(void *user, const char *message);
-    /* Working seconds of this attempt, without time of other processes, stops and sleep of the machine. Used for
-     * forecasts and the time limit only. */
-    double (*worked_sec)(void *user);
-    /* True when a checkpoint / preview is due (the caller keeps the clock). */
-    bool (*checkpoint_due)(void *user);
-    bool (*preview_due)(void *user);
-    /* Commits all arrays as the newest checkpoint, or fails and keeps the previous one. */
-    enum status (*checkpoint_save)(void *user, long iteration, const struct state_array *array, size_t count,
-                                   struct error *err);
-    /* Fills the arrays from the newest complete checkpoint; *found is false and the arrays are untouched when there is
-     * none. STATUS_CORRUPT if a stored size differs. */
-    enum status (*checkpoint_load)(void *user, struct state_array *array, size_t count, bool *found, struct error *err);
-    enum status (*preview)(void *user, const struct reconstruction *r, struct error *err);
-};
 
 /* A held-out photograph and its re-render. */
 struct held_out {
@@ -92,6 +65,11 @@ static inline struct surface reconstruction_surface(const struct reconstruction 
 /* The segment of a valid texel. */
 static inline uint32_t reconstruction_segment(const struct reconstruction *r, uint32_t texel) {
     return r->segments.of_triangle[r->inverse.triangle[texel]];
+}
+
+/* Whether a texel is about as bright as its segment. */
+static inline bool evidence_is_bright(const struct reconstruction *r, uint32_t texel) {
+    return evidence_is_as_bright(&r->evidence[reconstruction_segment(r, texel)], fused_radiance(&r->fused, texel));
 }
 
 #endif

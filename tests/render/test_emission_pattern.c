@@ -2,6 +2,7 @@
  * reconstruction finds it from photographs (emission_pattern.h), for any number of threads and anew after a
  * checkpoint. Where the lamp is equally bright all over, none is found. */
 #include "server/material/emission_pattern.h"
+#include "server/reconstruct/inputs.h"
 #include "server/render/bsdf.h"
 #include "tests/check.h"
 #include "tests/render/shell.h"
@@ -177,7 +178,7 @@ static void test_restored(struct reconstruction *r, const struct scene *scene) {
     memcpy(before, r->materials.emission_pattern, bytes);
     r->pool = parallel_new(2);
     views_init(&views, scene, &r->segments, r->world.accel, r->pool);
-    const struct emission_pattern_input input = emission_pattern_input(r, &views);
+    const struct emission_pattern_input input = inputs_of_pattern(r, &views);
     emission_pattern_restore(&input, &r->materials, r->evidence);
     CHECK(r->materials.emission_pattern && memcmp(before, r->materials.emission_pattern, bytes) == 0);
     views_release(&views);

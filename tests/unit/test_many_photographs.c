@@ -2,6 +2,7 @@
  * in the capture; all are counted. The same for any number of threads. */
 #include "server/material/divide.h"
 #include "server/material/emission_pattern.h"
+#include "server/reconstruct/inputs.h"
 #include "tests/unit/plane_rig.h"
 
 #define FAR_OFF 8.0f /* metres: such a photograph weighs a 64th of one from 1 m */
@@ -109,7 +110,7 @@ static void test_emission_pattern(uint32_t count) {
     rig.r.is_emitter[0] = true;
     rig.r.evidence[0] =
         (struct emitter_evidence){.radiance = {0.5f, 0.5f, 0.5f}, .observed = {0.5f, 0.5f, 0.5f}, .is_seen = true};
-    const struct emission_pattern_input input = emission_pattern_input(&rig.r, &rig.views);
+    const struct emission_pattern_input input = inputs_of_pattern(&rig.r, &rig.views);
     emission_pattern_find(&input, &rig.r.materials, rig.r.evidence);
     CHECK(rig.r.materials.emission_pattern != NULL);
     if (rig.r.materials.emission_pattern) {
