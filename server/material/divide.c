@@ -12,7 +12,6 @@
 #include "server/render/bsdf.h"
 #include "server/render/sampler.h"
 #include "server/scene/rgb_half.h"
-#include "server/scene/surface.h"
 
 #define CHUNK 256 /* texels a work item */
 /* Directions of one highlight, at most and at least, and half as many samples of lights. Highlights of all texels under
@@ -49,11 +48,11 @@ size_t divide_highlight_samples(double texels_per_pixel) {
 /* Irradiance without the sun's. */
 static bool light_without_sun(const struct divide *d, uint32_t texel, struct surface_point *at,
                               struct irradiance *light) {
-    const struct reconstruction *r = d->r;
+    const struct surface *s = &d->surface;
     struct probe_mix mix;
-    if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, at))
+    if (!surface_at_texel(s->mesh, s->atlas, s->inverse, texel, at))
         return false;
-    probes_mix(d->probes, &r->atlas, &r->fused, texel, at, &mix);
+    probes_mix(d->probes, s->atlas, d->fused, texel, at, &mix);
     probes_irradiance(d->probes, &mix, light);
     return true;
 }
@@ -61,7 +60,7 @@ static bool light_without_sun(const struct divide *d, uint32_t texel, struct sur
 static bool light_at(const struct divide *d, uint32_t texel, struct surface_point *at, struct irradiance *light) {
     if (!light_without_sun(d, texel, at, light))
         return false;
-    sun_add_light(&d->r->sun, d->r->world.accel, at, light);
+    sun_add_light(d->sun, d->accel, at, light);
     return true;
 }
 
@@ -78,11 +77,15 @@ static rgb divide_channels(rgb over, rgb under, float least) {
     return rgb_make(over.r / fmaxf(under.r, least), over.g / fmaxf(under.g, least), over.b / fmaxf(under.b, least));
 }
 
+static const struct photograph *photograph_of(const struct divide *d, uint32_t train) {
+    return &d->views->scene->photograph[d->views->train[train]];
+}
+
 /* Reads a photograph with a bicubic filter where all of its support shows one surface; else leaves `shown` and returns
  * false. */
 static bool sharpen(const struct divide *d, const struct view *view, uint32_t triangle, rgb *observed) {
     return views_edge(d->views, view, triangle) < VIEWS_EDGE - 1 &&
-           photograph_sample_cubic(&d->r->scene->photograph[d->views->train[view->train]], view->x, view->y, observed);
+           photograph_sample_cubic(photograph_of(d, view->train), view->x, view->y, observed);
 }
 
 /* An observation whose highlight is not gathered yet. */
@@ -103,12 +106,12 @@ struct divide_candidates {
 /* Adds photograph `train` of the texel if it has a valid sample there and is among the best. */
 static void add_candidate(const struct divide *d, uint32_t segment, const struct surface_point *at,
                           const struct irradiance *light, uint32_t train, struct divide_candidates *of) {
-    const struct photograph *photo = &d->r->scene->photograph[d->views->train[train]];
+    const struct photograph *photo = photograph_of(d, train);
     struct divide_candidate c;
     struct photograph_sample s;
     if (!views_faces(d->views, train, at->position, at->normal, &c.view))
         return;
-    c.unit_diffuse = irradiance_diffuse(light, at->shading, d->r->materials.roughness[segment],
+    c.unit_diffuse = irradiance_diffuse(light, at->shading, d->materials->roughness[segment],
                                         views_direction(d->views, train, at->position));
     rgb typical = rgb_scale(c.unit_diffuse, TYPICAL_BASE_COLOR);
     /* An upper bound of the weight: edges and mixing only lower it. Saves the visibility ray. */
@@ -130,8 +133,8 @@ static void add_candidate(const struct divide *d, uint32_t segment, const struct
 
 static struct robust_sample observation_of(const struct divide *d, uint32_t texel, const struct surface_point *at,
                                            const struct divide_candidate *c, struct incident *scratch) {
-    const struct materials *m = &d->r->materials;
-    uint32_t segment = reconstruction_segment(d->r, texel);
+    const struct materials *m = d->materials;
+    uint32_t segment = surface_segment(&d->surface, texel);
     float median = d->views->median_radiance, weight = c->weight;
     rgb unit_diffuse = c->unit_diffuse, specular = rgb_gray(0.0f);
     if (m->specular[segment] > 0.0f) {
@@ -145,7 +148,7 @@ static struct robust_sample observation_of(const struct divide *d, uint32_t texe
         float part = rgb_mean(specular) / both * (1.0f / HIGHLIGHT_PART);
         weight /= 1.0f + part * part;
     }
-    rgb fused = fused_radiance(&d->r->fused, texel), deviation = noise_deviation(d->noise, d->views, &c->view, fused);
+    rgb fused = fused_radiance(d->fused, texel), deviation = noise_deviation(d->noise, d->views, &c->view, fused);
     rgb usual = rgb_clamp(divide_channels(fused, unit_diffuse, MIN_LAMBERT * median), 0.0f, MAX_ALBEDO);
     rgb base = rgb_clamp(divide_channels(rgb_sub(c->observed, specular), unit_diffuse, MIN_LAMBERT * median),
                          -MAX_ALBEDO, MAX_ALBEDO);
@@ -169,14 +172,14 @@ static void observe_all(const struct divide *d, uint32_t texel, struct incident 
         return;
     best_init(&candidates.best, candidates.item, MEASURED_OBSERVATIONS);
     for (uint32_t t = 0; t < d->views->train_count; t++)
-        add_candidate(d, reconstruction_segment(d->r, texel), &at, light, t, &candidates);
+        add_candidate(d, surface_segment(&d->surface, texel), &at, light, t, &candidates);
     for (; observations->count < candidates.best.count; observations->count++)
         observations->observation[observations->count] =
             observation_of(d, texel, &at, &candidates.candidate[observations->count], scratch);
 }
 
-static rgb texel_color(const struct reconstruction *r, uint32_t texel) {
-    const float *from = r->materials.base_color.texel[texel];
+static rgb texel_color(const struct divide *d, uint32_t texel) {
+    const float *from = d->materials->base_color.texel[texel];
     return rgb_make(from[0], from[1], from[2]);
 }
 
@@ -192,13 +195,11 @@ static struct measured mean_of(struct measured_observations *observations, const
 
 /* The texel whose measurement this one takes: its own, or that of its stride x stride block. */
 static uint32_t source_texel(const struct divide *d, uint32_t texel) {
-    const struct reconstruction *r = d->r;
-    uint32_t width = r->atlas.width, x = texel % width, y = texel / width;
+    const struct surface *s = &d->surface;
+    uint32_t width = s->atlas->width, x = texel % width, y = texel / width;
     uint32_t other = (y - y % d->stride) * width + x - x % d->stride;
-    uint32_t triangle = r->inverse.triangle[other];
-    bool same = triangle != INVERSE_UV_NONE &&
-                r->atlas.chart_of_triangle[triangle] == r->atlas.chart_of_triangle[r->inverse.triangle[texel]];
-    return same ? other : texel;
+    bool is_valid = s->inverse->triangle[other] != INVERSE_UV_NONE;
+    return is_valid && surface_chart(s, other) == surface_chart(s, texel) ? other : texel;
 }
 
 static void divide_texel(struct divide *d, uint32_t texel, struct incident *scratch) {
@@ -206,7 +207,7 @@ static void divide_texel(struct divide *d, uint32_t texel, struct incident *scra
     struct irradiance light;
     observe_all(d, texel, scratch, &light, &observations);
     d->measured[texel] = (struct measured){0};
-    if (observations.count > 0 && !d->r->is_emitter[reconstruction_segment(d->r, texel)])
+    if (observations.count > 0 && !d->is_emitter[surface_segment(&d->surface, texel)])
         d->measured[texel] = mean_of(&observations, &light);
 }
 
@@ -228,7 +229,7 @@ static void divide_chunk(void *user, size_t chunk, int thread) {
 
 void divide_texels(struct divide *d, const uint32_t *texel, size_t count) {
     struct divide_list list = {d, texel, count};
-    parallel_for(d->r->pool, (count + CHUNK - 1) / CHUNK, divide_chunk, &list);
+    parallel_for(d->pool, (count + CHUNK - 1) / CHUNK, divide_chunk, &list);
 }
 
 /* A function to be called for each valid texel, in any order. */
@@ -241,7 +242,7 @@ struct each {
 static void each_chunk(void *user, size_t chunk, int thread) {
     (void)thread;
     const struct each *each = user;
-    const struct inverse_uv *inverse = &each->divide->r->inverse;
+    const struct inverse_uv *inverse = each->divide->surface.inverse;
     size_t begin = chunk * CHUNK, end = begin + CHUNK < inverse->valid_count ? begin + CHUNK : inverse->valid_count;
     for (size_t i = begin; i < end; i++)
         each->of(each->job, inverse->valid[i]);
@@ -249,7 +250,7 @@ static void each_chunk(void *user, size_t chunk, int thread) {
 
 static void each_valid(const struct divide *d, void (*of)(const void *job, uint32_t texel), const void *job) {
     struct each each = {d, of, job};
-    parallel_for(d->r->pool, (d->r->inverse.valid_count + CHUNK - 1) / CHUNK, each_chunk, &each);
+    parallel_for(d->pool, (d->surface.inverse->valid_count + CHUNK - 1) / CHUNK, each_chunk, &each);
 }
 
 struct diffuse_job {
@@ -269,8 +270,9 @@ static void diffuse_texel(const void *user, uint32_t texel) {
 }
 
 void divide_diffuse(const struct divide *d, struct fused *diffuse) {
-    size_t texels = (size_t)d->r->atlas.width * d->r->atlas.height;
-    *diffuse = (struct fused){.width = d->r->atlas.width, .height = d->r->atlas.height};
+    uint32_t width = d->surface.atlas->width, height = d->surface.atlas->height;
+    size_t texels = (size_t)width * height;
+    *diffuse = (struct fused){.width = width, .height = height};
     diffuse->radiance = mem_calloc_large(texels, sizeof *diffuse->radiance);
     diffuse->count = mem_calloc_large(texels, sizeof *diffuse->count);
     diffuse->is_bound = mem_calloc_large(texels, sizeof *diffuse->is_bound);
@@ -297,16 +299,17 @@ void divide_lambert_all(const struct divide *d, uint16_t (*lambert)[3]) {
 
 /* Mean base colour over the observed texels of each segment. */
 static void find_typical(struct divide *d) {
-    const struct reconstruction *r = d->r;
-    double(*sum)[2] = mem_calloc(r->segments.count, sizeof *sum);
-    for (size_t i = 0; i < r->inverse.valid_count; i++) {
-        uint32_t texel = r->inverse.valid[i], segment = reconstruction_segment(r, texel);
-        if (!(r->fused.count[texel] > 0.0f))
+    const struct inverse_uv *inverse = d->surface.inverse;
+    size_t segments = d->surface.segments->count;
+    double(*sum)[2] = mem_calloc(segments, sizeof *sum);
+    for (size_t i = 0; i < inverse->valid_count; i++) {
+        uint32_t texel = inverse->valid[i], segment = surface_segment(&d->surface, texel);
+        if (!(d->fused->count[texel] > 0.0f))
             continue;
-        sum[segment][0] += (double)rgb_mean(texel_color(r, texel));
+        sum[segment][0] += (double)rgb_mean(texel_color(d, texel));
         sum[segment][1] += 1.0;
     }
-    for (size_t i = 0; i < r->segments.count; i++)
+    for (size_t i = 0; i < segments; i++)
         if (sum[i][1] > 0.0)
             d->typical[i] = fmaxf((float)(sum[i][0] / sum[i][1]), MIN_TYPICAL);
     mem_free(sum);
@@ -314,13 +317,12 @@ static void find_typical(struct divide *d) {
 
 /* Base colour as measured, and the prior where it was not. */
 static void keep_measured(struct divide *d, const struct color_prior *prior) {
-    struct reconstruction *r = d->r;
-    for (size_t i = 0; i < r->inverse.valid_count; i++) {
-        uint32_t texel = r->inverse.valid[i];
+    const struct inverse_uv *inverse = d->surface.inverse;
+    for (size_t i = 0; i < inverse->valid_count; i++) {
+        uint32_t texel = inverse->valid[i];
         const struct measured *m = &d->measured[texel];
-        rgb value =
-            m->weight > 0.0f ? measured_value(m) : prior[r->atlas.chart_of_triangle[r->inverse.triangle[texel]]].mean;
-        float *to = r->materials.base_color.texel[texel];
+        rgb value = m->weight > 0.0f ? measured_value(m) : prior[surface_chart(&d->surface, texel)].mean;
+        float *to = d->materials->base_color.texel[texel];
         to[0] = clampf(value.r, 0.0f, 1.0f);
         to[1] = clampf(value.g, 0.0f, 1.0f);
         to[2] = clampf(value.b, 0.0f, 1.0f);
@@ -341,20 +343,20 @@ static void find_outgoing(const void *user, uint32_t texel) {
     const struct outgoing_job *job = user;
     const struct divide *d = job->divide;
     const struct measured *m = &d->measured[texel];
-    uint32_t segment = reconstruction_segment(d->r, texel);
+    uint32_t segment = surface_segment(&d->surface, texel);
     struct surface_point at;
     struct irradiance light;
-    if (d->r->is_emitter[segment] || !light_without_sun(d, texel, &at, &light))
+    if (d->is_emitter[segment] || !light_without_sun(d, texel, &at, &light))
         return;
     bool mirrors = job->outgoing->lobe[segment].specular > 0.0f;
     rgb fluence = fluence_of(&light);
-    sun_add_light(&d->r->sun, d->r->world.accel, &at, &light);
+    sun_add_light(d->sun, d->accel, &at, &light);
     if (!mirrors)
         fluence = fluence_of(&light);
     float known = m->weight > 0.0f ? MIXING_HALF / (MIXING_HALF + image_float_from_half(m->mixing)) : 0.0f;
-    rgb measured = rgb_clamp(measured_value(m), 0.0f, MAX_ALBEDO), expected = texel_color(d->r, texel);
+    rgb measured = rgb_clamp(measured_value(m), 0.0f, MAX_ALBEDO), expected = texel_color(d, texel);
     rgb base = rgb_mad(rgb_scale(expected, 1.0f - known), known, measured);
-    rgb unit_diffuse = irradiance_diffuse_mean(&light, at.shading, d->r->materials.roughness[segment]);
+    rgb unit_diffuse = irradiance_diffuse_mean(&light, at.shading, d->materials->roughness[segment]);
     rgb diffuse = rgb_mul(base, unit_diffuse);
     rgb total = rgb_mad(diffuse, job->specular_albedo[segment] * (1.0f / BSDF_PI), fluence);
     rgb_to_half(job->outgoing->total[texel], total);
@@ -362,11 +364,12 @@ static void find_outgoing(const void *user, uint32_t texel) {
 }
 
 static void find_all_outgoing(const struct divide *d, const struct divide_outgoing *outgoing) {
-    const struct reconstruction *r = d->r;
-    float *specular_albedo = mem_array(r->segments.count, sizeof *specular_albedo);
-    for (uint32_t i = 0; i < r->segments.count; i++) {
-        float roughness = r->materials.roughness[i], specular = r->materials.specular[i];
-        bool mirrors = materials_is_polished(&r->materials, i) && !r->is_emitter[i];
+    const struct materials *m = d->materials;
+    size_t segments = d->surface.segments->count;
+    float *specular_albedo = mem_array(segments, sizeof *specular_albedo);
+    for (uint32_t i = 0; i < segments; i++) {
+        float roughness = m->roughness[i], specular = m->specular[i];
+        bool mirrors = materials_is_polished(m, i) && !d->is_emitter[i];
         specular_albedo[i] = highlight_albedo(roughness, specular);
         outgoing->lobe[i] = (struct incident_lobe){roughness, mirrors ? specular : 0.0f};
     }
@@ -375,14 +378,13 @@ static void find_all_outgoing(const struct divide *d, const struct divide_outgoi
 }
 
 void divide_finish(struct divide *d, const struct divide_outgoing *outgoing) {
-    struct reconstruction *r = d->r;
-    for (size_t i = 0; i < r->inverse.valid_count; i++)
-        d->measured[r->inverse.valid[i]] = d->measured[source_texel(d, r->inverse.valid[i])];
-    const struct surface surface = reconstruction_surface(r);
-    struct color_prior *prior = color_priors(&surface, r->is_emitter, d->measured);
+    const struct surface *s = &d->surface;
+    for (size_t i = 0; i < s->inverse->valid_count; i++)
+        d->measured[s->inverse->valid[i]] = d->measured[source_texel(d, s->inverse->valid[i])];
+    struct color_prior *prior = color_priors(s, d->is_emitter, d->measured);
     if (d->denoises)
-        denoise(&r->atlas, &r->inverse, r->scene->mesh.triangle_count, d->measured, prior, NULL,
-                &r->materials.base_color, r->pool);
+        denoise(s->atlas, s->inverse, s->mesh->triangle_count, d->measured, prior, NULL, &d->materials->base_color,
+                d->pool);
     else
         keep_measured(d, prior);
     mem_free(prior);

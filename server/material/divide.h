@@ -16,15 +16,26 @@
 #include "server/gather/incident.h"
 #include "server/gather/irradiance.h"
 #include "server/gather/probes.h"
+#include "server/gather/sun.h"
 #include "server/material/denoise.h"
-#include "server/state/reconstruction.h"
+#include "server/scene/materials.h"
+#include "server/scene/surface.h"
+#include "server/state/reconstruction.h" /* for `r` below */
 
+/* Borrowed, all pointers. */
 struct divide {
-    struct reconstruction *r; /* borrowed, as all below; r->materials.base_color is written */
+    struct surface surface;
     const struct views *views;
-    const struct probes *probes;
+    const struct fused *fused;       /* observed radiance */
+    const struct noise *noise;       /* of the photographs */
+    const struct probes *probes;     /* light that arrives, but for the sun's */
     const struct light_field *field; /* for highlights */
-    const struct noise *noise;
+    const struct sun *sun;
+    const struct accel *accel;   /* for shadows of the sun */
+    const bool *is_emitter;      /* [segment_count] */
+    struct materials *materials; /* base_color is written, roughness and specular are read */
+    struct parallel *pool;
+    struct reconstruction *r;  /* for changing_light.h and sun_refit.h; not used here */
     bool denoises;             /* else base colour is as measured */
     size_t highlight_samples;  /* directions of one highlight (divide_highlight_samples) */
     uint32_t stride;           /* one texel of each chart is measured in every stride x stride */
@@ -56,7 +67,7 @@ struct divide_outgoing {
     struct incident_lobe *lobe;             /* [segment_count] specular 0: not polished */
 };
 
-/* After all texels: writes r->materials.base_color, and to `outgoing` all texels but those of emitters. */
+/* After all texels: writes materials->base_color, and to `outgoing` all texels but those of emitters. */
 void divide_finish(struct divide *d, const struct divide_outgoing *outgoing);
 
 #endif

@@ -3,6 +3,7 @@
 #define UNBAKE_RECONSTRUCT_INPUTS_H
 
 #include "server/capture/views.h"
+#include "server/material/divide.h"
 #include "server/material/emission_pattern.h"
 #include "server/refine/optimiser.h"
 #include "server/state/pace.h"
@@ -13,6 +14,22 @@ static inline struct emission_pattern_input inputs_of_pattern(const struct recon
                                                               const struct views *views) {
     return (struct emission_pattern_input){
         reconstruction_surface(r), views, &r->noise, &r->fused, r->is_emitter, r->pool};
+}
+
+static inline struct divide inputs_of_divide(struct reconstruction *r, const struct views *views,
+                                             const struct probes *probes, const struct light_field *field) {
+    return (struct divide){.surface = reconstruction_surface(r),
+                           .views = views,
+                           .fused = &r->fused,
+                           .noise = &r->noise,
+                           .probes = probes,
+                           .field = field,
+                           .sun = &r->sun,
+                           .accel = r->world.accel,
+                           .is_emitter = r->is_emitter,
+                           .materials = &r->materials,
+                           .pool = r->pool,
+                           .r = r};
 }
 
 static inline struct optimiser_input inputs_of_optimiser(struct reconstruction *r, const struct views *views,

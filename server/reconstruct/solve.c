@@ -316,13 +316,9 @@ static void solve_init(struct solve *s, struct reconstruction *r, const struct v
     probes_init(&s->probes, spacing_for(&r->atlas), &r->scene->mesh, &r->atlas, &r->inverse, &r->fused);
     const struct surface surface = reconstruction_surface(r);
     s->texels_per_pixel = detail_texels_per_pixel(&surface, views);
-    s->divide = (struct divide){.r = r,
-                                .views = views,
-                                .probes = &s->probes,
-                                .field = &s->isotropic,
-                                .noise = &r->noise,
-                                .denoises = settings_bool(r->settings, "denoise"),
-                                .highlight_samples = divide_highlight_samples(s->texels_per_pixel)};
+    s->divide = inputs_of_divide(r, views, &s->probes, &s->isotropic);
+    s->divide.denoises = settings_bool(r->settings, "denoise");
+    s->divide.highlight_samples = divide_highlight_samples(s->texels_per_pixel);
     s->divide.scratch = mem_array((size_t)parallel_thread_count(r->pool), sizeof *s->divide.scratch);
     s->divide.measured = mem_calloc_large(texels, sizeof *s->divide.measured);
     s->divide.typical = mem_array(r->segments.count, sizeof *s->divide.typical);

@@ -9,6 +9,7 @@
 #include "common/mem.h"
 #include "server/gather/probes.h"
 #include "server/material/divide.h"
+#include "server/reconstruct/inputs.h"
 #include "server/state/evidence.h"
 #include "server/state/reconstruction.h"
 #include "tests/check.h"
@@ -124,13 +125,10 @@ static inline const struct measured *plane_rig_divide(struct plane_rig *rig, con
                                                       float *typical, struct divide *divide) {
     static const uint32_t texel = PLANE_MIDDLE;
     *typical = 0.5f;
-    *divide = (struct divide){.r = &rig->r,
-                              .views = &rig->views,
-                              .probes = probes,
-                              .noise = &rig->r.noise,
-                              .stride = 1,
-                              .typical = typical,
-                              .highlight_samples = 4};
+    *divide = inputs_of_divide(&rig->r, &rig->views, probes, NULL);
+    divide->stride = 1;
+    divide->typical = typical;
+    divide->highlight_samples = 4;
     divide->measured = mem_calloc(PLANE_TEXELS, sizeof *divide->measured);
     divide_texels(divide, &texel, 1);
     return &divide->measured[texel];
