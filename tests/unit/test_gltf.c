@@ -190,7 +190,7 @@ static const struct {
     {"{" ASSET "}", "no triangles"},
     {"{" ASSET ",\"nodes\":{}}", "\"nodes\" must be an array"},
     {"{" ASSET ",\"nodes\":[3]}", "nodes[0] must be an object"},
-    {"{" ASSET ",\"extensionsRequired\":[\"KHR_materials_unlit\",\"KHR_meshopt_compression\"]}", "KHR_meshopt"},
+    {"{" ASSET ",\"extensionsRequired\":[\"KHR_materials_unlit\",\"KHR_draco_mesh_compression\"]}", "KHR_draco"},
     {"{" ASSET ",\"nodes\":[{\"children\":[0]}]}", "no triangles"}, /* no root */
     {"{" ASSET ",\"nodes\":[{\"children\":[0]}],\"scenes\":[{\"nodes\":[0]}]}", "more than one parent"},
     {"{" ASSET ",\"nodes\":[{\"children\":[1]},{}],\"scenes\":[{\"nodes\":[0,1]}]}", "nodes[1] has more than one"},

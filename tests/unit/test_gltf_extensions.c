@@ -217,6 +217,19 @@ static void test_meshopt(void) {
     refused(json, bin, a + b + c, "bufferViews[0] is compressed by meshopt and damaged", "");
     snprintf(json, sizeof json, form, a + b + c, a, COUNT, a + b + c, b, "OCTAHEDRAL", a + b, c);
     refused(json, bin, a + b + c, "bufferViews[1].EXT_meshopt_compression does not lie within", "");
+
+    /* The ratified name. */
+    snprintf(json, sizeof json, form, a + b + c, a, COUNT, a, b, "OCTAHEDRAL", a + b, c);
+    for (char *at = json; (at = strstr(at, "EXT_meshopt")) != NULL;)
+        memcpy(at, "KHR", 3);
+    take(json, bin, a + b + c, &mesh);
+    CHECK(mesh.triangle_count == COUNT - 2 && mesh.vertex_count == COUNT && mesh.normal);
+    mesh_release(&mesh);
+    bin[a] = 0xaf; /* a version that no library reads */
+    refused(json, bin, a + b + c, "bufferViews[1] is compressed by version 15 of meshopt's vertex codec", "gltfpack");
+    bin[a] = 0xa0;
+    snprintf(json, sizeof json, form, a + b + c, a, COUNT, a, b, "COLOR", a + b, c);
+    refused(json, bin, a + b + c, "bufferViews[1] has meshopt's filter COLOR", "gltfpack");
 }
 
 static bool has_note(const char *part) {

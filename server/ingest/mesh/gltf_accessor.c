@@ -70,7 +70,7 @@ static enum status open_view(struct gltf_file *g, const cJSON *object, const cha
     enum status status = gltf_index(g, object, "bufferView", user, &g->views, &found, &v, err);
     if (status != STATUS_OK || !found)
         return status;
-    const cJSON *view = g->views.item[v], *packed = gltf_extension(view, "EXT_meshopt_compression");
+    const cJSON *view = g->views.item[v], *packed = gltf_meshopt_of(view);
     if (packed) {
         status = gltf_meshopt_unpack(g, v, packed, bytes, err);
     } else {

@@ -19,11 +19,10 @@ static const struct extension_rule {
 } rules[] = {
     {"KHR_mesh_quantization", EXTENSION_READ, NULL},
     {"EXT_meshopt_compression", EXTENSION_READ, NULL},
+    {"KHR_meshopt_compression", EXTENSION_READ, NULL},
     {"EXT_mesh_gpu_instancing", EXTENSION_READ, NULL},
     {"KHR_node_visibility", EXTENSION_READ, NULL},
     {"KHR_draco_mesh_compression", EXTENSION_REFUSED, BY_BLENDER},
-    {"KHR_meshopt_compression", EXTENSION_REFUSED,
-     "write it as EXT_meshopt_compression or without compression: gltfpack -noq -i IN.glb -o OUT.glb"},
     {"KHR_gaussian_splatting", EXTENSION_REFUSED, "a mesh is needed, not Gaussians"},
     {"EXT_primitive_voxels", EXTENSION_REFUSED, "a mesh is needed, not voxels"},
     {"CESIUM_RTC", EXTENSION_REFUSED, "write the centre as a node's translation"},

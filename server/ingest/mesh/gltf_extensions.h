@@ -1,6 +1,6 @@
 /* gltf_extensions.h -- which extensions of glTF a mesh can be read with.
  *
- *   read      KHR_mesh_quantization, EXT_meshopt_compression, EXT_mesh_gpu_instancing, KHR_node_visibility
+ *   read      KHR_mesh_quantization, EXT_ and KHR_meshopt_compression, EXT_mesh_gpu_instancing, KHR_node_visibility
  *   harmless  materials, textures, lights, animation, metadata: they do not move a surface
  *   refused   those that are known to hold or move surfaces, wherever the file uses them, and any other that it
  *             requires

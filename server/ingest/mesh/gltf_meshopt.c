@@ -15,6 +15,10 @@
 #define MAX_RATIO 64
 #define SLACK_BYTES 65536 /* of unpacked bytes, for files with few */
 
+#define VERTEX_CODEC 0xa0 /* upper half of its first byte */
+#define WITHOUT_COMPRESSION                                                                                            \
+    "write it as EXT_meshopt_compression or without compression: gltfpack -noq -i IN.glb -o OUT.glb"
+
 enum packing { PACKED_ATTRIBUTES, PACKED_TRIANGLES, PACKED_INDICES, PACKING_COUNT };
 enum filter { FILTER_NONE, FILTER_OCTAHEDRAL, FILTER_QUATERNION, FILTER_EXPONENTIAL, FILTER_COUNT };
 
@@ -46,7 +50,7 @@ static enum status read_packed(const struct gltf_file *g, size_t view, const cJS
     bool found;
     size_t b;
     uint64_t offset, length;
-    snprintf(where, sizeof where, "bufferViews[%zu].EXT_meshopt_compression", view);
+    snprintf(where, sizeof where, "bufferViews[%zu].%s", view, extension->string);
     enum status status = gltf_index(g, extension, "buffer", where, &g->buffers, &found, &b, err);
     if (status == STATUS_OK && !found)
         status = error_set(err, STATUS_INPUT, "%s: %s has no buffer", g->name, where);
@@ -101,6 +105,35 @@ static bool decode(const struct meshopt_packed *p, uint8_t *out) {
     return true;
 }
 
+/* Version of the codec, which the first byte has in its lower half; 0 for others than vertices. */
+static int codec_version(const struct meshopt_packed *p) {
+    return p->mode == PACKED_ATTRIBUTES && p->size > 0 && (p->data[0] & 0xf0) == VERTEX_CODEC ? p->data[0] & 0x0f : 0;
+}
+
+static enum status refuse(const struct gltf_file *g, size_t view, const cJSON *extension,
+                          const struct meshopt_packed *p, struct error *err) {
+    const char *filter = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(extension, "filter"));
+    int version = codec_version(p);
+    if (filter && strcmp(filter, "COLOR") == 0) {
+        error_set(err, STATUS_INPUT, "%s: bufferViews[%zu] has meshopt's filter COLOR, which is not read", g->name,
+                  view);
+        return error_hint(err, WITHOUT_COMPRESSION);
+    }
+    if (version > 0) {
+        error_set(err, STATUS_INPUT,
+                  "%s: bufferViews[%zu] is compressed by version %d of meshopt's vertex codec, which this build's "
+                  "meshoptimizer %s does not read, or damaged",
+                  g->name, view, version, gltf_meshopt_version());
+        return error_hint(err, WITHOUT_COMPRESSION);
+    }
+    return error_set(err, STATUS_INPUT, "%s: bufferViews[%zu] is compressed by meshopt and damaged", g->name, view);
+}
+
+const cJSON *gltf_meshopt_of(const cJSON *view) {
+    const cJSON *ratified = gltf_extension(view, "KHR_meshopt_compression");
+    return ratified ? ratified : gltf_extension(view, "EXT_meshopt_compression");
+}
+
 enum status gltf_meshopt_unpack(struct gltf_file *g, size_t view, const cJSON *extension, struct gltf_bytes *bytes,
                                 struct error *err) {
     struct meshopt_packed p;
@@ -115,7 +148,7 @@ enum status gltf_meshopt_unpack(struct gltf_file *g, size_t view, const cJSON *e
             mem_free(out);
     }
     if (!g->unpacked[view])
-        return error_set(err, STATUS_INPUT, "%s: bufferViews[%zu] is compressed by meshopt and damaged", g->name, view);
+        return refuse(g, view, extension, &p, err);
     *bytes = (struct gltf_bytes){g->unpacked[view], (size_t)(p.count * p.stride), p.stride};
     return STATUS_OK;
 }
