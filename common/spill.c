@@ -1,13 +1,20 @@
 /* spill.c -- see spill.h.
  *
  * Arrays in the file begin on pages of their own, one after the other; space of those given back is returned to the disk
- * but not used again.
+ * but not used again. The file is mapped once, at `file.base`, so that an address tells the chunk.
  *
- *      0 ............ used ............ reserved
- *        arrays            reserved
+ *      0 ............ used ............ reserved ............ file.bytes
+ *        arrays            reserved               addresses only
  *
- * The keeper is a thread beside those of parallel.h: readers are loops of any kind, of which the longest would not come to
- * ask for it (one item of a parallel loop may look at all photographs).
+ * A chunk is ABSENT, MAPPED or USED:
+ *
+ *      ABSENT --use--> USED --the hand passes--> MAPPED --the hand passes again--> ABSENT
+ *                       ^-----------use------------'
+ *
+ * (second chance, or CLOCK; Corbato 1968). Whoever makes one more than the budget present moves the hand, until an eighth
+ * of the budget is free. A chunk is unmapped after it is ABSENT; readers that are still in it only fault its pages in
+ * again, so no pin is needed and contents never depend on the hand. What is mapped that way, or by readers that do not
+ * call spill_use, is not counted: a thread, the keeper, looks at what the kernel counts and unmaps that too.
  */
 #include "common/spill.h"
 
@@ -16,6 +23,7 @@
 #include <fcntl.h>
 #include <pthread.h>
 #include <signal.h>
+#include <stdatomic.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -27,17 +35,25 @@
 #include "common/file.h"
 #include "common/mem.h"
 
-/* Time between two looks at what is mapped, far below the budget and near it. A disk of 2 GB/s maps 2 MB in a
- * millisecond, the kernel's cache up to 50 MB a thread. A look takes some microseconds. */
-#define TRIM_INTERVAL_MS 10
-#define TRIM_INTERVAL_NEAR_MS 1
-#define NEAR_SHARE 2 /* near is more than this part of the budget */
-/* Unmapped at once, and the part of the budget that a trim frees: unmapped pages that are still in the kernel's cache
- * are mapped again for about a microsecond per 64 KiB. By hand. */
-#define TRIM_STEP ((size_t)32 << 20)
-#define TRIM_SHARE 4
+/* A fault maps the pages around it that are in the kernel's cache: 64 KiB at most, aligned (fault_around_bytes of
+ * mm/memory.c), which is what is counted and unmapped as one. */
+#define CHUNK ((size_t)64 << 10)
+/* Readers go on with at least so many chunks, however small the budget: one per array and row that a few threads read. */
+#define LEAST_CHUNKS 64
+/* Part of the budget that the hand frees at a time, so that threads interrupt each other seldom; by hand. */
+#define FREED_SHARE 8
 /* Part of the budget that mapped pages may have in any case, however much is in memory. */
 #define LEAST_SHARE 8
+/* The keeper's: time between two looks, and the part of the budget beyond it that it leaves alone. */
+#define KEEPER_INTERVAL_MS 10
+#define KEEPER_SHARE 16
+#define KEEPER_STEP ((size_t)32 << 20) /* unmapped at once; by hand */
+/* Addresses for the file, as a multiple of the space that the disk has: space that is given back is reserved again at
+ * other addresses. At most what a program under the thread sanitizer has room for. */
+#define ADDRESSES_SHARE 8
+#define ADDRESSES_MOST ((uint64_t)1 << 40)
+
+enum { ABSENT, MAPPED, USED };
 
 #define MIB 1048576.0
 
@@ -48,6 +64,7 @@ struct array {
 };
 
 struct spill {
+    struct spill_file file; /* first: see spill_use */
     char *dir;
     struct spill_limits limits;
     size_t page;
@@ -58,9 +75,10 @@ struct spill {
     uint64_t used, reserved, freed;  /* bytes of the file */
     uint64_t memory, memory_claimed; /* bytes of arrays in memory; of those, and of what is reserved there */
     size_t count, capacity;
-    struct array *array; /* [count] */
-    size_t hand;         /* array at which the next trim goes on */
-    size_t hand_offset;  /* and the byte in it */
+    struct array *array;         /* [count] */
+    _Atomic uint8_t *state;      /* [file.bytes / CHUNK] ABSENT ...; owned */
+    _Atomic size_t chunks, most; /* that are not ABSENT, and how many may be */
+    size_t hand;                 /* chunk at which the next search begins */
     bool has_keeper, stopping;
     pthread_t keeper;
     pthread_cond_t stop;
@@ -76,6 +94,13 @@ static uint64_t file_rss(const struct spill *s) {
     return sscanf(text, "%llu %llu %llu", &all, &resident, &of_files) == 3 ? of_files * s->page : 0;
 }
 
+/* After what is in memory has changed. */
+static void set_most(struct spill *s) {
+    uint64_t budget = s->limits.memory_bytes, least = budget / LEAST_SHARE;
+    budget = budget > s->memory + least ? budget - s->memory : least;
+    s->most = budget / CHUNK > LEAST_CHUNKS ? budget / CHUNK : LEAST_CHUNKS;
+}
+
 struct spill *spill_new(const char *dir, const struct spill_limits *limits) {
     struct spill *s = mem_calloc(1, sizeof *s);
     s->dir = mem_strdup(dir);
@@ -84,6 +109,7 @@ struct spill *spill_new(const char *dir, const struct spill_limits *limits) {
     s->statm = open("/proc/self/statm", O_RDONLY | O_CLOEXEC);
     s->base_rss = file_rss(s);
     s->fd = -1;
+    set_most(s);
     pthread_condattr_t monotonic;
     pthread_condattr_init(&monotonic);
     pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
@@ -104,10 +130,13 @@ void spill_free(struct spill *s) {
     if (s->has_keeper)
         pthread_join(s->keeper, NULL);
     pthread_cond_destroy(&s->stop);
+    if (s->file.bytes > 0)
+        munmap(s->file.base, s->file.bytes);
     if (s->fd >= 0)
         close(s->fd);
     if (s->statm >= 0)
         close(s->statm);
+    mem_free((void *)s->state);
     pthread_mutex_destroy(&s->mutex);
     mem_free(s->array);
     mem_free(s->dir);
@@ -116,59 +145,76 @@ void spill_free(struct spill *s) {
 
 /* --- the budget ----------------------------------------------------------------------------------- */
 
-/* Unmaps the next step's worth of pages, and has the disk write what is changed of them. Returns the bytes passed over:
- * 0 at the end of the last array. */
-static size_t unmap_step(struct spill *s) {
-    while (s->hand < s->count && (s->array[s->hand].offset < 0 || s->hand_offset >= s->array[s->hand].bytes)) {
-        s->hand++;
-        s->hand_offset = 0;
-    }
-    if (s->hand >= s->count) {
-        s->hand = 0;
-        s->hand_offset = 0;
-        return 0;
-    }
-    const struct array *a = &s->array[s->hand];
-    size_t left = a->bytes - s->hand_offset, step = left < TRIM_STEP ? left : TRIM_STEP;
-    madvise(a->base + s->hand_offset, step, MADV_DONTNEED);
-    /* Pages that are clean by the time memory is short can be dropped without waiting for the disk. */
-    (void)sync_file_range(s->fd, a->offset + (off_t)s->hand_offset, (off_t)step, SYNC_FILE_RANGE_WRITE);
-    s->hand_offset += step;
-    return step;
+/* Unmaps chunks [first, end), which are ABSENT, and has the disk write what is changed of them: pages that are clean by
+ * the time memory is short can be dropped without waiting. */
+static void unmap(struct spill *s, size_t first, size_t end) {
+    madvise(s->file.base + first * CHUNK, (end - first) * CHUNK, MADV_DONTNEED);
+    (void)sync_file_range(s->fd, (off_t)(first * CHUNK), (off_t)((end - first) * CHUNK), SYNC_FILE_RANGE_WRITE);
 }
 
-/* Returns the time until it is to be called again, ms. */
-static long trim(struct spill *s) {
-    uint64_t budget = s->limits.memory_bytes, least = budget / LEAST_SHARE;
-    budget = budget > s->memory + least ? budget - s->memory : least;
-    uint64_t mapped = file_rss(s), goal = s->base_rss + budget;
-    if (mapped <= goal)
-        return mapped > goal - budget / NEAR_SHARE ? TRIM_INTERVAL_NEAR_MS : TRIM_INTERVAL_MS;
-    goal -= budget / TRIM_SHARE;
-    uint64_t all = s->used, passed = 0;
-    bool wrapped = false;
-    while (passed <= all && file_rss(s) > goal) {
-        size_t step = unmap_step(s);
-        passed += step;
-        if (step == 0 && wrapped)
-            break;
-        wrapped = wrapped || step == 0;
+/* Moves the hand over one chunk; whether that is ABSENT by it. */
+static bool pass(struct spill *s, size_t chunk) {
+    uint8_t used = USED, mapped = MAPPED;
+    if (atomic_load_explicit(&s->state[chunk], memory_order_relaxed) == ABSENT ||
+        atomic_compare_exchange_strong(&s->state[chunk], &used, MAPPED) ||
+        !atomic_compare_exchange_strong(&s->state[chunk], &mapped, ABSENT))
+        return false;
+    s->chunks--;
+    return true;
+}
+
+/* Until `goal` chunks are left. Two turns leave none; a third is for those used meanwhile. */
+static void free_chunks(struct spill *s, size_t goal) {
+    size_t all = (s->used + CHUNK - 1) / CHUNK;
+    for (size_t passed = 0; s->chunks > goal && passed < 3 * all;) {
+        size_t first = s->hand < all ? s->hand : 0, end = first;
+        while (end < all && s->chunks > goal && pass(s, end))
+            end++;
+        if (end > first)
+            unmap(s, first, end);
+        s->hand = end + 1; /* that one was not unmapped */
+        passed += end + 1 - first;
     }
-    return TRIM_INTERVAL_NEAR_MS;
+}
+
+void spill_use_file(struct spill *s, const void *at, size_t bytes) {
+    size_t first = (size_t)((const char *)at - s->file.base) / CHUNK;
+    size_t last = ((size_t)((const char *)at - s->file.base) + (bytes > 0 ? bytes - 1 : 0)) / CHUNK;
+    for (size_t i = first; i <= last; i++) {
+        if (atomic_load_explicit(&s->state[i], memory_order_relaxed) == USED ||
+            atomic_exchange(&s->state[i], USED) != ABSENT || ++s->chunks <= s->most)
+            continue;
+        pthread_mutex_lock(&s->mutex);
+        if (s->chunks > s->most)
+            free_chunks(s, s->most - s->most / FREED_SHARE);
+        pthread_mutex_unlock(&s->mutex);
+    }
+}
+
+/* Unmaps all, counted or not, while the kernel counts more than the budget and a part. */
+static void trim(struct spill *s) {
+    uint64_t most = s->base_rss + s->most * CHUNK;
+    if (file_rss(s) <= most + most / KEEPER_SHARE)
+        return;
+    for (size_t first = 0, step = KEEPER_STEP / CHUNK; first * CHUNK < s->used && file_rss(s) > most; first += step) {
+        size_t all = (s->used + CHUNK - 1) / CHUNK, end = first + step < all ? first + step : all;
+        for (size_t i = first; i < end; i++)
+            s->chunks -= atomic_exchange(&s->state[i], ABSENT) != ABSENT;
+        unmap(s, first, end);
+    }
 }
 
 static void *keep(void *argument) {
     struct spill *s = argument;
     struct timespec next;
-    long interval_ms = TRIM_INTERVAL_MS;
     pthread_mutex_lock(&s->mutex);
     while (!s->stopping) {
         clock_gettime(CLOCK_MONOTONIC, &next);
-        next.tv_nsec += interval_ms * 1000000L;
+        next.tv_nsec += KEEPER_INTERVAL_MS * 1000000L;
         next.tv_sec += next.tv_nsec / 1000000000L;
         next.tv_nsec %= 1000000000L;
         pthread_cond_timedwait(&s->stop, &s->mutex, &next);
-        interval_ms = trim(s);
+        trim(s);
     }
     pthread_mutex_unlock(&s->mutex);
     return NULL;
@@ -205,6 +251,26 @@ static enum status open_file(struct spill *s, struct error *err) {
     return status;
 }
 
+/* Addresses for all that the file may ever be. */
+static enum status take_addresses(struct spill *s, struct error *err) {
+    uint64_t room;
+    enum status status = s->file.bytes > 0 ? STATUS_OK : file_free_bytes(s->dir, &room, err);
+    if (status != STATUS_OK || s->file.bytes > 0)
+        return status;
+    size_t bytes = (size_t)(room < ADDRESSES_MOST / ADDRESSES_SHARE ? ADDRESSES_SHARE * room : ADDRESSES_MOST);
+    bytes = (bytes / CHUNK + 1) * CHUNK;
+    char *base = mmap(NULL, bytes + CHUNK, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+    if (base == MAP_FAILED)
+        return error_set_errno(err, errno, "cannot find %.0f GiB of addresses for pixels", (double)bytes / MIB / 1024);
+    size_t before = (CHUNK - (uintptr_t)base % CHUNK) % CHUNK;
+    if (before > 0)
+        munmap(base, before);
+    munmap(base + before + bytes, CHUNK - before);
+    s->state = mem_calloc(bytes / CHUNK, sizeof *s->state);
+    s->file = (struct spill_file){base + before, bytes};
+    return STATUS_OK;
+}
+
 /* What the file may grow by: the least that its own limit, if there is one, and the disk leave. */
 static enum status check_room(const struct spill *s, const char *what, uint64_t more, struct error *err) {
     uint64_t taken = s->reserved - s->freed, room;
@@ -228,10 +294,16 @@ static enum status check_room(const struct spill *s, const char *what, uint64_t 
     return status;
 }
 
+static size_t whole_pages(const struct spill *s, size_t bytes) { return (bytes + s->page - 1) / s->page * s->page; }
+
 static enum status grow_file(struct spill *s, const char *what, uint64_t more, struct error *err) {
     enum status status = open_file(s, err);
     if (status == STATUS_OK)
         status = check_room(s, what, more, err);
+    if (status == STATUS_OK)
+        status = take_addresses(s, err);
+    if (status == STATUS_OK && more > s->file.bytes - s->reserved)
+        status = error_set(err, STATUS_NO_SPACE, "%s: the addresses for pixels on the disk are used up", what);
     if (status == STATUS_OK)
         status = start_keeper(s, err);
     if (status != STATUS_OK)
@@ -250,6 +322,9 @@ static enum status grow_file(struct spill *s, const char *what, uint64_t more, s
             err->status = STATUS_NO_SPACE;
         return err->status;
     }
+    if (mmap(s->file.base + s->reserved, more, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_FIXED, s->fd,
+             (off_t)s->reserved) == MAP_FAILED)
+        mem_exhausted("the mapping of pixels");
     s->reserved += more;
     return STATUS_OK;
 }
@@ -265,7 +340,7 @@ enum status spill_reserve(struct spill *s, const char *what, size_t count, uint6
     if (bytes + later <= s->limits.memory_bytes && claimed <= s->limits.memory_bytes - bytes - later)
         s->memory_claimed = claimed + bytes;
     else
-        status = grow_file(s, what, bytes + count * s->page, err ? err : &own);
+        status = grow_file(s, what, whole_pages(s, bytes) + count * s->page, err ? err : &own);
     pthread_mutex_unlock(&s->mutex);
     return status;
 }
@@ -282,13 +357,10 @@ static void note(struct spill *s, const struct array *a) {
 
 /* An array of what is reserved in the file; NULL where that is not enough. */
 static void *take_of_file(struct spill *s, size_t bytes) {
-    size_t whole = (bytes + s->page - 1) / s->page * s->page;
+    size_t whole = whole_pages(s, bytes);
     if (whole > s->reserved - s->used)
         return NULL;
-    struct array a = {.bytes = whole, .offset = (off_t)s->used};
-    a.base = mmap(NULL, whole, PROT_READ | PROT_WRITE, MAP_SHARED, s->fd, a.offset);
-    if (a.base == MAP_FAILED)
-        mem_exhausted("the mapping of pixels");
+    struct array a = {.base = s->file.base + s->used, .bytes = whole, .offset = (off_t)s->used};
     s->used += whole;
     note(s, &a);
     return a.base;
@@ -306,6 +378,7 @@ void *spill_take(struct spill *s, size_t count, size_t size) {
     if (!taken) {
         struct array a = {.base = mem_alloc(bytes), .bytes = bytes, .offset = -1};
         s->memory += bytes;
+        set_most(s);
         note(s, &a);
         taken = a.base;
     }
@@ -318,9 +391,13 @@ static void release(struct spill *s, const struct array *a) {
         mem_free(a->base);
         s->memory -= a->bytes;
         s->memory_claimed -= s->memory_claimed > a->bytes ? a->bytes : s->memory_claimed;
+        set_most(s);
         return;
     }
-    munmap(a->base, a->bytes);
+    /* The addresses stay ours: the hand passes over them. */
+    if (mmap(a->base, a->bytes, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE | MAP_FIXED, -1, 0) ==
+        MAP_FAILED)
+        mem_exhausted("the mapping of pixels");
     /* Where the file system cannot do that, the space comes back when the file is closed. */
     if (fallocate(s->fd, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, a->offset, (off_t)a->bytes) == 0)
         s->freed += a->bytes;
@@ -338,8 +415,6 @@ void spill_give(struct spill *s, void *array) {
     if (i > 0) {
         struct array a = s->array[i - 1];
         s->array[i - 1] = s->array[--s->count];
-        s->hand = 0;
-        s->hand_offset = 0;
         release(s, &a);
     } else {
         mem_free(array);

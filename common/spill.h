@@ -5,13 +5,16 @@
  *
  * The file has no name (it is removed as soon as it is open), so nothing is left of it when the process ends, however
  * it ends. Its blocks are allocated when space is reserved: a full disk is an error there, never a signal at a later
- * store. Pages of it count as this process's memory while they are mapped; a thread unmaps what is beyond the budget, whoever
- * reads. The kernel keeps such pages as its cache while memory is free and drops them when it is not.
+ * store. Pages of it count as this process's memory while they are mapped. Readers tell what they are about to look at
+ * (spill_use); what is beyond the budget is then unmapped, least recently used first. Contents never depend on that: who
+ * does not tell reads the same. The kernel keeps unmapped pages as its cache while memory is free and drops them when it
+ * is not.
  *
  * A disk that fails at reading ends the process (SIGBUS), as failing memory does. */
 #ifndef UNBAKE_COMMON_SPILL_H
 #define UNBAKE_COMMON_SPILL_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -39,6 +42,27 @@ enum status spill_reserve(struct spill *s, const char *what, size_t count, uint6
 void *spill_take(struct spill *s, size_t count, size_t size);
 /* Of an array from spill_take of the same s, or from mem.h; NULL is fine. */
 void spill_give(struct spill *s, void *array);
+
+/* The addresses of the file, the first member of struct spill; NULL and 0 while there is none. */
+struct spill_file {
+    char *base;
+    size_t bytes;
+};
+
+void spill_use_file(struct spill *s, const void *at, size_t bytes);
+
+/* Whether any array may be in the file. */
+static inline bool spill_has_file(const struct spill *s) {
+    return s && ((const struct spill_file *)(const void *)s)->bytes > 0;
+}
+
+/* Tells that `bytes` bytes at `at`, of one array, are looked at or written next. Costs a comparison where the array is in
+ * memory; s may be NULL. */
+static inline void spill_use(struct spill *s, const void *at, size_t bytes) {
+    const struct spill_file *file = (const struct spill_file *)(const void *)s;
+    if (s && (uintptr_t)at - (uintptr_t)file->base < file->bytes)
+        spill_use_file(s, at, bytes);
+}
 
 uint64_t spill_memory_bytes(const struct spill *s); /* the budget */
 uint64_t spill_file_bytes(struct spill *s);         /* space of the disk that the file takes; of NULL 0 */

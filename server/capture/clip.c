@@ -64,6 +64,11 @@ static void mark_row(void *user, size_t row, int thread) {
     (void)thread;
     const struct clip_job *job = user;
     uint32_t width = job->photo->camera.width;
+    for (size_t y = row > WINDOW_RADIUS ? row - WINDOW_RADIUS : 0;
+         y <= row + WINDOW_RADIUS && y < job->photo->camera.height; y++) {
+        photograph_use(job->photo, y * width, width);
+        views_use(job->views, job->train, y * width, width);
+    }
     for (uint32_t x = 0; x < width; x++) {
         job->photo->saturated[row * width + x] = 0;
         for (int c = 0; c < 3; c++)

@@ -59,6 +59,7 @@ static void find_window(void *user, size_t train, int thread) {
     vec3 direction;
     for (int pass = 0; pass < 2; pass++) {
         for (uint32_t y = 0; y < camera->height; y++) {
+            views_use(v, (uint32_t)train, (size_t)y * camera->width, camera->width);
             for (uint32_t x = 0; x < camera->width; x++) {
                 if (v->shows[train][(size_t)y * camera->width + x] != VIEWS_OPEN ||
                     !camera_direction(camera, (float)x + 0.5f, (float)y + 0.5f, &direction))

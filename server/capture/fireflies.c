@@ -49,6 +49,8 @@ static void mark_row(void *user, size_t row, int thread) {
     (void)thread;
     const struct fireflies_job *job = user;
     uint32_t width = job->photo->camera.width;
+    for (size_t y = row > 0 ? row - 1 : 0; y <= row + 1 && y < job->photo->camera.height; y++)
+        photograph_use(job->photo, y * width, width);
     for (uint32_t x = 0; x < width; x++)
         job->photo->firefly[row * width + x] = is_firefly(job, (long)x, (long)row);
 }

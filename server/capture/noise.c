@@ -88,7 +88,14 @@ static int differences(const struct photograph *photo, const uint8_t *edge, uint
     return count;
 }
 
+static void use_row(const struct photograph *photo, const uint8_t *edge, uint32_t y) {
+    size_t width = photo->camera.width;
+    photograph_use(photo, y * width, width);
+    spill_use(photo->spill, edge + y * width, width);
+}
+
 static void add_row(struct octave *octaves, const struct photograph *photo, const uint8_t *edge, uint32_t y) {
+    use_row(photo, edge, y);
     for (uint32_t x = 0; x < photo->camera.width; x++) {
         float mean[3], difference[3];
         int count = differences(photo, edge, x, y, 1, mean, difference);
@@ -157,6 +164,8 @@ static float *measure_blocks(const struct noise *noise, const struct photograph 
     uint32_t columns = blocks(photo->camera.width), rows = blocks(photo->camera.height);
     float *scale = mem_array((size_t)columns * rows, sizeof *scale);
     for (uint32_t row = 0; row < rows; row++) {
+        for (uint32_t y = row * NOISE_BLOCK; y < (row + 1) * NOISE_BLOCK && y < photo->camera.height; y++)
+            use_row(photo, edge, y);
         for (uint32_t column = 0; column < columns; column++) {
             uint32_t x = column * NOISE_BLOCK, y = row * NOISE_BLOCK;
             float near = block_variance(noise, photo, edge, x, y, 1);

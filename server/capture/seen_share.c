@@ -30,6 +30,7 @@ static double open_share(const struct views *views) {
     for (size_t i = 0; i < views->train_count; i++) {
         const struct camera *camera = &views->scene->photograph[views->train[i]].camera;
         size_t count = (size_t)camera->width * camera->height;
+        views_use(views, (uint32_t)i, 0, count);
         for (size_t k = 0; k < count; k++)
             open += views->shows[i][k] == VIEWS_OPEN;
         all += (double)count;

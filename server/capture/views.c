@@ -87,12 +87,31 @@ static bool are_adjacent(const struct corner *a, const struct corner *b, float f
 /* 8-bit hash of a segment. */
 static uint8_t owner_mark(uint32_t segment) { return (uint8_t)(rng_mix32(segment) >> 24); }
 
+void views_use(const struct views *v, uint32_t train, size_t at, size_t count) {
+    struct spill *spill = v->scene->spill;
+    if (!spill_has_file(spill))
+        return;
+    spill_use(spill, v->shows[train] + at, count);
+    spill_use(spill, v->edge[train] + at, count);
+    spill_use(spill, v->owner[train] + at, count);
+}
+
+/* Those of the part of `rows` rows that lies in the picture. */
+static void use_part(const struct views *v, uint32_t train, long column, long row, long columns, long rows) {
+    const struct camera *camera = &v->scene->photograph[v->train[train]].camera;
+    long left = column > 0 ? column : 0, right = column + columns;
+    right = right < (long)camera->width ? right : (long)camera->width;
+    for (long y = row > 0 ? row : 0; left < right && y < row + rows && y < (long)camera->height; y++)
+        views_use(v, train, (size_t)(y * (long)camera->width + left), (size_t)(right - left));
+}
+
 /* One row of pixels, given the corners above them, [width + 1], in whose place it leaves those below. */
 static void mark_row(const struct edge_job *job, uint32_t y, struct corner *corners) {
     const struct photograph *photo = &job->views->scene->photograph[job->views->train[job->train]];
     const struct camera *camera = &photo->camera;
     uint8_t *out = job->views->shows[job->train] + (size_t)y * camera->width;
     uint8_t *owner = job->views->owner[job->train] + (size_t)y * camera->width;
+    views_use(job->views, job->train, (size_t)y * camera->width, camera->width);
     struct corner left_top = corners[0], left_low = trace_corner(job, camera, 0, y + 1);
     corners[0] = left_low;
     for (uint32_t x = 0; x < camera->width; x++) {
@@ -176,6 +195,7 @@ void views_update_edges(struct views *v, uint32_t train, struct parallel *pool) 
     const struct camera *camera = &v->scene->photograph[v->train[train]].camera;
     struct edge_job job = {.views = v, .train = train};
     parallel_for(pool, (camera->height + BAND - 1) / BAND, mark_band, &job);
+    views_use(v, train, 0, (size_t)camera->width * camera->height);
     make_edges(v->edge[train], v->shows[train], camera->width, camera->height);
 }
 
@@ -256,6 +276,8 @@ int views_edge(const struct views *v, const struct view *view, uint32_t triangle
     uint8_t own = owner_mark(v->segments->of_triangle[triangle]);
     long x0 = (long)floorf(view->x - 0.5f), y0 = (long)floorf(view->y - 0.5f);
     int nearest = 0;
+    if (spill_has_file(v->scene->spill))
+        use_part(v, view->train, x0, y0, 2, 2);
     for (long y = y0; y < y0 + 2; y++) {
         for (long x = x0; x < x0 + 2; x++) {
             if (x < 0 || y < 0 || x >= (long)camera->width || y >= (long)camera->height)
@@ -290,6 +312,8 @@ static bool all_show(const struct views *v, uint32_t train, float x, float y, in
     const struct camera *camera = &v->scene->photograph[v->train[train]].camera;
     const uint8_t *shows = v->shows[train];
     long x0 = (long)floorf(x - 0.5f), y0 = (long)floorf(y - 0.5f);
+    if (spill_has_file(v->scene->spill))
+        use_part(v, train, x0 - margin, y0 - margin, 2 + 2 * margin, 2 + 2 * margin);
     for (long row = y0 - margin; row <= y0 + 1 + margin; row++) {
         for (long column = x0 - margin; column <= x0 + 1 + margin; column++) {
             if (column >= 0 && row >= 0 && column < (long)camera->width && row < (long)camera->height &&

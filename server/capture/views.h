@@ -45,6 +45,9 @@ struct view {
     float weight;   /* solid angle per area of surface (cosine over squared distance) x photograph_weight */
 };
 
+/* Tells the scene's spill that the classes of `count` pixels of a row, from number `at` on, are looked at or written next. */
+void views_use(const struct views *v, uint32_t train, size_t at, size_t count);
+
 void views_init(struct views *v, const struct scene *scene, const struct segments *segments, const struct accel *accel,
                 struct parallel *pool);
 void views_release(struct views *v);

@@ -166,6 +166,8 @@ static rgb photograph_pixel(const struct photograph *photo, float u, float v) {
     float y = clampf(v * (float)c->height - 0.5f, 0.0f, (float)(c->height - 1));
     uint32_t x0 = (uint32_t)x, y0 = (uint32_t)y, x1 = x0 + (x0 + 1 < c->width), y1 = y0 + (y0 + 1 < c->height);
     float fx = x - (float)x0, fy = y - (float)y0;
+    photograph_use(photo, (size_t)y0 * c->width + x0, x1 - x0 + 1);
+    photograph_use(photo, (size_t)y1 * c->width + x0, x1 - x0 + 1);
     rgb top = rgb_scale(rgb_from_half(photo->pixel[(size_t)y0 * c->width + x0]), 1.0f - fx);
     rgb bottom = rgb_scale(rgb_from_half(photo->pixel[(size_t)y1 * c->width + x0]), 1.0f - fx);
     top = rgb_mad(top, fx, rgb_from_half(photo->pixel[(size_t)y0 * c->width + x1]));

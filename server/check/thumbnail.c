@@ -19,7 +19,8 @@
 static float block_mean(const struct photograph *photo, const uint32_t from[2], const uint32_t to[2]) {
     uint32_t step_x = (to[0] - from[0] + TAPS - 1) / TAPS, step_y = (to[1] - from[1] + TAPS - 1) / TAPS;
     float sum = 0.0f, count = 0.0f;
-    for (uint32_t y = from[1]; y < to[1]; y += step_y)
+    for (uint32_t y = from[1]; y < to[1]; y += step_y) {
+        photograph_use(photo, (size_t)y * photo->camera.width + from[0], to[0] - from[0]);
         for (uint32_t x = from[0]; x < to[0]; x += step_x) {
             size_t at = (size_t)y * photo->camera.width + x;
             float value = rgb_luminance(rgb_from_half(photo->pixel[at]));
@@ -28,6 +29,7 @@ static float block_mean(const struct photograph *photo, const uint32_t from[2], 
             sum += value;
             count += 1.0f;
         }
+    }
     return count > 0.0f ? sum / count : NAN;
 }
 

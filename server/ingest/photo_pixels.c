@@ -21,6 +21,7 @@ uint16_t *photo_pixels_table(void) {
 
 void photo_pixels_from_srgb(const uint16_t *half_of_srgb, const struct image *image, struct photograph *photo) {
     size_t count = (size_t)image->width * image->height, stride = image->channel_count;
+    photograph_use(photo, 0, count);
     for (size_t i = 0; i < count; i++)
         for (size_t c = 0; c < 3; c++) {
             float code = clampf(image->pixel[i * stride + c], 0.0f, 1.0f);
@@ -30,6 +31,7 @@ void photo_pixels_from_srgb(const uint16_t *half_of_srgb, const struct image *im
 
 void photo_pixels_from_linear(const struct image *image, struct photograph *photo, struct photo_counts *counts) {
     size_t count = (size_t)image->width * image->height, stride = image->channel_count;
+    photograph_use(photo, 0, count);
     for (size_t i = 0; i < count; i++) {
         const float *in = image->pixel + i * stride;
         bool finite = isfinite(in[0]) && isfinite(in[1]) && isfinite(in[2]);
@@ -50,6 +52,7 @@ void photo_pixels_mask_by_alpha(const struct image *image, struct photograph *ph
     if (alpha < 0)
         return;
     photo->mask = spill_take(photo->spill, count, sizeof *photo->mask);
+    photograph_use(photo, 0, count);
     for (size_t i = 0; i < count; i++)
         photo->mask[i] = image->pixel[i * image->channel_count + (size_t)alpha] < 0.5f ? 0 : 255;
 }
@@ -75,6 +78,7 @@ static void exclude(const struct image *mask, struct photograph *photo) {
     size_t width = photo->camera.width, height = photo->camera.height;
     if (!photo->mask) {
         photo->mask = spill_take(photo->spill, width * height, sizeof *photo->mask);
+        photograph_use(photo, 0, width * height);
         memset(photo->mask, 255, width * height);
     }
     for (size_t y = 0; y < height; y++) {

@@ -66,6 +66,14 @@ static void for_rows(struct detail *d, uint32_t train, void (*body)(void *user, 
 /* Of the arrays with an element a pixel. */
 static struct spill *spill_of(const struct detail *d) { return d->in.views->scene->spill; }
 
+/* Tells that a row's residuals are looked at or written next. */
+static void use_row(const struct detail *d, uint32_t train, size_t row) {
+    size_t width = photograph_of(d, train)->camera.width, at = row * width;
+    spill_use(spill_of(d), d->triangle[train] + at, width * sizeof **d->triangle);
+    spill_use(spill_of(d), d->weight[train] + at, width * sizeof **d->weight);
+    spill_use(spill_of(d), d->residual[train] + at, width * sizeof **d->residual);
+}
+
 static size_t chunks_of(const struct detail *d) { return (d->in.surface.inverse->valid_count + CHUNK - 1) / CHUNK; }
 
 /* The texels in the footprint of a pixel that shows a triangle; false where too few of them are known. */
@@ -118,6 +126,8 @@ static void residual_row(void *user, size_t row, int thread) {
     struct detail *d = job->detail;
     const struct photograph *photo = photograph_of(d, job->train);
     struct footprint_texels t;
+    use_row(d, job->train, row);
+    views_use(d->in.views, job->train, row * photo->camera.width, photo->camera.width);
     for (uint32_t x = 0; x < photo->camera.width; x++) {
         size_t at = row * photo->camera.width + x;
         rgb observed = rgb_gray(0.0f), predicted = observed, lambert = observed;
@@ -144,6 +154,10 @@ static void filter_row(void *user, size_t row, int thread) {
     const uint8_t *owner = job->detail->in.views->owner[job->train];
     const uint32_t *triangle = job->detail->triangle[job->train];
     long width = (long)camera->width, height = (long)camera->height, y0 = (long)row;
+    for (long y = y0 > WINDOW ? y0 - WINDOW : 0; y <= y0 + WINDOW && y < height; y++) {
+        use_row(job->detail, job->train, (size_t)y);
+        views_use(job->detail->in.views, job->train, (size_t)(y * width), (size_t)width);
+    }
     for (long x0 = 0; x0 < width; x0++) {
         size_t at = (size_t)(y0 * width + x0);
         rgb sum = rgb_gray(0.0f), residual = rgb_gray(NAN);
@@ -178,6 +192,7 @@ static void weigh_row(void *user, size_t row, int thread) {
     struct detail *d = job->detail;
     uint32_t width = photograph_of(d, job->train)->camera.width, train = job->train;
     struct footprint_texels t;
+    use_row(d, train, row);
     for (uint32_t x = 0; x < width; x++) {
         size_t at = row * width + x;
         if (!pixel_footprint(d, train, x, (uint32_t)row, d->triangle[train][at], &t))
@@ -308,6 +323,7 @@ static void step_row(void *user, size_t row, int thread) {
     struct detail *d = job->detail;
     uint32_t width = photograph_of(d, job->train)->camera.width;
     struct footprint_texels t;
+    use_row(d, job->train, row);
     for (uint32_t x = 0; x < width; x++) {
         size_t at = row * width + x;
         if (!pixel_footprint(d, job->train, x, (uint32_t)row, d->triangle[job->train][at], &t))
@@ -409,15 +425,21 @@ static void make_picture(struct detail *d, uint32_t train) {
 static void choose_pixels(struct detail *d) {
     float most = 0.0f;
     for (uint32_t t = 0; t < d->in.views->train_count; t++) {
-        for (size_t i = 0; i < pixels_of(d, t); i++) {
+        for (size_t i = 0, width = photograph_of(d, t)->camera.width; i < pixels_of(d, t); i++) {
+            if (i % width == 0)
+                use_row(d, t, i / width);
             if (isnan(image_float_from_half(d->residual[t][i][0])))
                 d->triangle[t][i] = NONE;
             most = d->triangle[t][i] == NONE ? most : fmaxf(most, d->weight[t][i]);
         }
     }
-    for (uint32_t t = 0; t < d->in.views->train_count; t++)
-        for (size_t i = 0; i < pixels_of(d, t); i++)
+    for (uint32_t t = 0; t < d->in.views->train_count; t++) {
+        for (size_t i = 0, width = photograph_of(d, t)->camera.width; i < pixels_of(d, t); i++) {
+            if (i % width == 0)
+                use_row(d, t, i / width);
             d->weight[t][i] = d->triangle[t][i] == NONE ? 0.0f : d->weight[t][i] / most;
+        }
+    }
 }
 
 /* Marks the texels that may change: measured ones with enough light. */

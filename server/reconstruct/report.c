@@ -116,6 +116,7 @@ static void photograph_noise(const struct reconstruction *r, const struct photog
 static void move_pixels(struct image *image, struct spill *spill) {
     size_t count = (size_t)image->width * image->height;
     float *moved = spill_take(spill, count, 3 * sizeof *moved);
+    spill_use(spill, moved, count * 3 * sizeof *moved);
     memcpy(moved, image->pixel, count * 3 * sizeof *moved);
     mem_free(image->pixel);
     image->pixel = moved;

@@ -19,6 +19,27 @@ void photograph_release(struct photograph *photo) {
     *photo = (struct photograph){0};
 }
 
+static void use_plane(const struct photograph *photo, const void *plane, size_t size, size_t at, size_t count) {
+    if (plane)
+        spill_use(photo->spill, (const char *)plane + at * size, count * size);
+}
+
+void photograph_use(const struct photograph *photo, size_t at, size_t count) {
+    if (!spill_has_file(photo->spill))
+        return;
+    use_plane(photo, photo->pixel, sizeof *photo->pixel, at, count);
+    use_plane(photo, photo->saturated, sizeof *photo->saturated, at, count);
+    use_plane(photo, photo->clipped, sizeof *photo->clipped, at, count);
+    use_plane(photo, photo->firefly, sizeof *photo->firefly, at, count);
+    use_plane(photo, photo->mask, sizeof *photo->mask, at, count);
+}
+
+/* The pixels of `rows` rows of `columns`. */
+static inline void use_taps(const struct photograph *photo, size_t row, size_t rows, size_t column, size_t columns) {
+    for (size_t y = row; spill_has_file(photo->spill) && y < row + rows; y++)
+        photograph_use(photo, y * photo->camera.width + column, columns);
+}
+
 /* image_float_from_half, inlined: a lookup converts twelve values, and a refinement does millions of lookups per
  * iteration. No step produces a subnormal float, so results do not depend on flush-to-zero. */
 static inline float half_to_float(uint16_t half) {
@@ -71,6 +92,7 @@ bool photograph_sample(const struct photograph *photo, float x, float y, struct 
     float wx, wy;
     taps(x, width, column, &wx);
     taps(y, height, row, &wy);
+    use_taps(photo, row[0], row[1] - row[0] + 1, column[0], column[1] - column[0] + 1);
     float value[3] = {0.0f, 0.0f, 0.0f};
     sample->saturated[0] = sample->saturated[1] = sample->saturated[2] = false;
     for (int k = 0; k < 4; k++) {
@@ -100,6 +122,7 @@ bool photograph_has_firefly(const struct photograph *photo, float x, float y) {
     float wx, wy;
     taps(x, photo->camera.width, column, &wx);
     taps(y, photo->camera.height, row, &wy);
+    use_taps(photo, row[0], row[1] - row[0] + 1, column[0], column[1] - column[0] + 1);
     for (int k = 0; k < 4 && photo->firefly; k++) {
         float weight = (k & 1 ? wx : 1.0f - wx) * (k & 2 ? wy : 1.0f - wy);
         if (weight > 0.0f && photo->firefly[row[k >> 1] * photo->camera.width + column[k & 1]])
@@ -116,6 +139,7 @@ bool photograph_sample_cubic(const struct photograph *photo, float x, float y, r
     float wx[4], wy[4], value[3] = {0.0f, 0.0f, 0.0f};
     photograph_cubic(x - 0.5f - (float)(column + 1), wx);
     photograph_cubic(y - 0.5f - (float)(row + 1), wy);
+    use_taps(photo, (size_t)row, 4, (size_t)column, 4);
     for (long k = 0; k < 16; k++) {
         size_t at = (size_t)((row + k / 4) * width + column + k % 4);
         if ((photo->mask && photo->mask[at] == 0) || (photo->firefly && photo->firefly[at]))

@@ -76,6 +76,9 @@ static inline float photograph_radius(const struct photograph *photo, float x, f
 /* Falloff at pixel coordinates (x, y). */
 float photograph_falloff(const struct photograph *photo, float x, float y);
 
+/* Tells photo->spill that `count` pixels of a row, from number `at` on, are looked at or written next. */
+void photograph_use(const struct photograph *photo, size_t at, size_t count);
+
 /* Weight of a lookup relative to one in a sharp photograph. */
 static inline float photograph_weight(const struct photograph *photo) {
     return 1.0f / (1.0f + photo->blur_px * photo->blur_px);

@@ -1,5 +1,6 @@
 /* spill.h: what fits the budget is in memory, else in a file without a name; contents survive being unmapped; no more than
- * the budget stays mapped; a full disk is an error of the reservation. */
+ * the budget is mapped, at any moment where readers tell what they look at, else soon after; a full disk is an error of
+ * the reservation. */
 #include "common/spill.h"
 
 #include <dirent.h>
@@ -12,6 +13,8 @@
 
 #include "common/file.h"
 #include "common/mem.h"
+#include "common/parallel.h"
+#include "common/rng.h"
 #include "tests/check.h"
 
 #define MIB ((size_t)1 << 20)
@@ -138,6 +141,71 @@ static void test_file(void) {
     spill_free(s);
 }
 
+/* --- random access ---------------------------------------------------------------------------------- */
+
+#define LOOKUPS 5000 /* of a body */
+#define BODIES 8
+#define EACH 64 /* look-ups between two measurements */
+
+struct lookups {
+    struct spill *s;
+    uint32_t *array[ARRAYS];
+    size_t most[BODIES];
+    bool held[BODIES];
+};
+
+/* Reads and writes single words all over the arrays, each word by one body only. */
+static void look_up(void *user, size_t body, int thread) {
+    struct lookups *l = user;
+    (void)thread;
+    l->held[body] = true;
+    for (uint32_t i = 0; i < LOOKUPS; i++) {
+        uint64_t bits = rng_key(body, i, 0);
+        uint32_t k = (uint32_t)(bits % ARRAYS);
+        size_t word = (size_t)(bits >> 16) % (ARRAY / 4 / BODIES) * BODIES + body;
+        uint32_t *at = &l->array[k][word];
+        spill_use(l->s, at, sizeof *at);
+        l->held[body] = l->held[body] && (*at == (uint32_t)word * (k + 1) || *at == (uint32_t)word * (k + 1) + 1);
+        *at = (uint32_t)word * (k + 1) + 1;
+        size_t now = i % EACH == 0 ? mapped() : 0;
+        l->most[body] = now > l->most[body] ? now : l->most[body];
+    }
+}
+
+static void test_random(void) {
+    struct lookups l = {.s = new_spill(0, 0)};
+    struct parallel *pool = parallel_new(3);
+    CHECK(!spill_has_file(l.s) && !spill_has_file(NULL));
+    CHECK(spill_reserve(l.s, "they", ARRAYS, ARRAYS * ARRAY, 0, &err) == STATUS_OK);
+    CHECK(spill_has_file(l.s));
+    size_t before = mapped(), most = 0;
+    for (uint32_t k = 0; k < ARRAYS; k++) {
+        l.array[k] = spill_take(l.s, ARRAY / 4, 4);
+        for (uint32_t i = 0; i < ARRAY / 4; i++) {
+            spill_use(l.s, &l.array[k][i], 4);
+            l.array[k][i] = i * (k + 1);
+        }
+    }
+    parallel_for(pool, BODIES, look_up, &l);
+    for (size_t i = 0; i < BODIES; i++) {
+        CHECK(l.held[i]);
+        most = l.most[i] > most ? l.most[i] : most;
+    }
+    CHECK_THAT(most <= before + BUDGET + BUDGET / 4, "%zu KiB are mapped, of a budget of %zu", (most - before) / 1024,
+               BUDGET / 1024);
+    CHECK_THAT(most >= before + BUDGET / 2, "only %zu KiB are mapped, of a budget of %zu", (most - before) / 1024,
+               BUDGET / 1024);
+    /* Of a freed one, and of one in memory. */
+    spill_give(l.s, l.array[0]);
+    l.array[0] = spill_take(NULL, 1, 4);
+    spill_use(l.s, l.array[0], 4);
+    spill_use(NULL, l.array[0], 4);
+    for (uint32_t k = 0; k < ARRAYS; k++)
+        spill_give(l.s, l.array[k]);
+    spill_free(l.s);
+    parallel_free(pool);
+}
+
 static void test_limits(void) {
     struct spill *s = new_spill(0, 8 * MIB);
     CHECK(spill_reserve(s, "they", 1, 6 * MIB, 0, &err) == STATUS_OK);
@@ -186,6 +254,7 @@ int main(void) {
     test_memory();
     test_later();
     test_file();
+    test_random();
     test_limits();
     test_full();
     CHECK(file_remove_tree(dir, &err) == STATUS_OK);
