@@ -42,18 +42,12 @@ size_t hub_count(struct hub *hub) {
     return count;
 }
 
-size_t hub_count_of(struct hub *hub, int64_t user_id) {
-    size_t count = 0;
-    pthread_mutex_lock(&hub->mutex);
-    for (const struct hub_member *m = hub->first; m; m = m->next)
-        count += m->user_id == user_id;
-    pthread_mutex_unlock(&hub->mutex);
-    return count;
-}
-
 /* --- waking ------------------------------------------------------------------------------ */
 
-static void wake(struct hub_member *m) { m->stream->wake(m->stream->waker); }
+static void wake(struct hub_member *m) {
+    if (m->is_listening)
+        m->stream->wake(m->stream->waker);
+}
 
 void hub_changed(void *user, int64_t job_id) {
     struct hub *hub = user;
@@ -91,13 +85,34 @@ void hub_recheck(struct hub *hub) {
 
 /* --- members ----------------------------------------------------------------------------- */
 
-void hub_join(struct hub *hub, struct hub_member *m) {
+static size_t count_of(const struct hub *hub, int64_t user_id) {
+    size_t count = 0;
+    for (const struct hub_member *m = hub->first; m; m = m->next)
+        count += m->user_id == user_id;
+    return count;
+}
+
+enum hub_answer hub_join(struct hub *hub, struct hub_member *m, const struct hub_limits *limits) {
+    enum hub_answer answer = HUB_JOINED;
     pthread_mutex_lock(&hub->mutex);
-    m->next = hub->first;
-    if (m->next)
-        m->next->previous = m;
-    hub->first = m;
-    hub->count++;
+    if (hub->count >= limits->of_all) {
+        answer = HUB_FULL;
+    } else if (limits->of_user > 0 && count_of(hub, m->user_id) >= limits->of_user) {
+        answer = HUB_USER_FULL;
+    } else {
+        m->next = hub->first;
+        if (m->next)
+            m->next->previous = m;
+        hub->first = m;
+        hub->count++;
+    }
+    pthread_mutex_unlock(&hub->mutex);
+    return answer;
+}
+
+void hub_listen(struct hub *hub, struct hub_member *m) {
+    pthread_mutex_lock(&hub->mutex);
+    m->is_listening = true;
     pthread_mutex_unlock(&hub->mutex);
 }
 

@@ -1,8 +1,9 @@
-/* hub.h -- the open event streams: wakes those that a change in the store concerns.
+/* hub.h -- the open event streams: admits them, counts them, wakes those that a change in the store concerns.
  *
- * 1. The database is the queue. hub_changed only marks a stream and wakes it; the stream's fill, on a thread that may
+ * 1. A stream counts from the decision to admit it until it is closed, in whatever way.
+ * 2. The database is the queue. hub_changed only marks a stream and wakes it; the stream's fill, on a thread that may
  *    block, reads the events (subscriber.h).
- * 2. Lock order: hub, then listener, then libmicrohttpd. No store call is made while any of them is held.
+ * 3. Lock order: hub, then listener, then libmicrohttpd. No store call is made while any of them is held.
  *
  * Thread-safe. */
 #ifndef UNBAKE_EVENTS_HUB_H
@@ -26,10 +27,11 @@ struct hub_member {
     double end_sec; /* when its wait ends, as clock_sec; 0: never */
 
     struct hub_member *next, *previous;
-    bool is_dirty;   /* the database may have new events for it */
-    bool is_due;     /* a keep-alive is due, or its wait has ended */
-    bool is_suspect; /* its token may have been revoked */
-    double sent_sec; /* when it last sent something, as clock_sec */
+    bool is_listening; /* may be woken */
+    bool is_dirty;     /* the database may have new events for it */
+    bool is_due;       /* a keep-alive is due, or its wait has ended */
+    bool is_suspect;   /* its token may have been revoked */
+    double sent_sec;   /* when it last sent something, as clock_sec */
 };
 
 struct hub *hub_new(double keepalive_sec);
@@ -40,10 +42,16 @@ void hub_tick(struct hub *hub, double now_sec); /* about once a second: keep-ali
 /* A token was revoked: the streams that were opened with it end. */
 void hub_recheck(struct hub *hub);
 size_t hub_count(struct hub *hub);
-size_t hub_count_of(struct hub *hub, int64_t user_id); /* the streams of one user */
 
-/* m->stream->wake must be set. */
-void hub_join(struct hub *hub, struct hub_member *m);
+/* How many streams there may be, and how many of the new one's user (0: no limit), it included. */
+struct hub_limits {
+    size_t of_all, of_user;
+};
+enum hub_answer { HUB_JOINED, HUB_FULL, HUB_USER_FULL };
+/* Admits the stream if the limits allow one more. After HUB_JOINED it counts until hub_leave, whatever becomes of it. */
+enum hub_answer hub_join(struct hub *hub, struct hub_member *m, const struct hub_limits *limits);
+/* From now on changes wake it; m->stream->wake is set. Marks made before are kept. */
+void hub_listen(struct hub *hub, struct hub_member *m);
 void hub_leave(struct hub *hub, struct hub_member *m);
 void hub_mark_dirty(struct hub *hub, struct hub_member *m);
 void hub_sent(struct hub *hub, struct hub_member *m); /* sets sent_sec */

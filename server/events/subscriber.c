@@ -23,7 +23,6 @@ struct subscriber {
     struct buf text; /* the batch */
     size_t text_read;
     bool has_ended;
-    bool has_joined; /* the hub; at the first fill, when `wake` is set */
 };
 
 /* What comes before any event of the database. */
@@ -131,9 +130,7 @@ static bool token_was_revoked(struct subscriber *s) {
 
 static bool subscriber_fill(struct stream *base) {
     struct subscriber *s = (struct subscriber *)base;
-    if (!s->has_joined)
-        hub_join(s->hub, &s->member);
-    s->has_joined = true;
+    hub_listen(s->hub, &s->member); /* `wake` is set by the first fill */
     if (token_was_revoked(s))
         s->has_ended = true;
     else
@@ -155,17 +152,22 @@ static ssize_t subscriber_read(struct stream *base, char *to, size_t size) {
     return (ssize_t)count;
 }
 
-static void subscriber_close(struct stream *base) {
-    struct subscriber *s = (struct subscriber *)base;
-    if (s->has_joined)
-        hub_leave(s->hub, &s->member);
+/* Frees a subscriber that is not, or no longer, in the hub. */
+static void subscriber_free(struct subscriber *s) {
     buf_release(&s->text);
     cJSON_Delete(s->what.snapshot);
     mem_free(s);
 }
 
+static void subscriber_close(struct stream *base) {
+    struct subscriber *s = (struct subscriber *)base;
+    hub_leave(s->hub, &s->member);
+    subscriber_free(s);
+}
+
 struct stream *subscriber_new(struct hub *hub, struct store *store, const struct caller *caller,
-                              const struct subscription *what) {
+                              const struct subscription *what, const struct hub_limits *limits,
+                              enum hub_answer *answer) {
     struct subscriber *s = mem_calloc(1, sizeof *s);
     s->base.read = subscriber_read;
     s->base.fill = subscriber_fill;
@@ -186,5 +188,9 @@ struct stream *subscriber_new(struct hub *hub, struct store *store, const struct
     };
     buf_init(&s->text, TEXT_BYTES);
     start_text(s);
-    return &s->base;
+    *answer = hub_join(hub, &s->member, limits); /* last: from here on others change the member */
+    if (*answer == HUB_JOINED)
+        return &s->base;
+    subscriber_free(s);
+    return NULL;
 }

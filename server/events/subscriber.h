@@ -26,7 +26,9 @@ struct subscription {
     cJSON *snapshot; /* data of a first `state` event; taken; NULL: none */
 };
 
+/* Joins the hub. NULL, with *answer, where the limits do not allow one more stream. */
 struct stream *subscriber_new(struct hub *hub, struct store *store, const struct caller *caller,
-                              const struct subscription *what);
+                              const struct subscription *what, const struct hub_limits *limits,
+                              enum hub_answer *answer);
 
 #endif

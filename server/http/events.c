@@ -46,16 +46,22 @@ static struct response *read_request(struct api *api, const struct request *r, s
     return NULL;
 }
 
+/* The reply that is a stream, or its refusal. Takes what->snapshot. */
 static struct response *stream_reply(struct api *api, const struct request *r, const char *type,
-                                     struct subscription *what) {
+                                     const struct subscription *what) {
+    const struct hub_limits limits = limits_of_streams(api, r);
+    enum hub_answer answer;
+    struct stream *stream = subscriber_new(api->hub, api->store, &r->caller, what, &limits, &answer);
+    if (!stream)
+        return limits_refuse_stream(api, r, answer);
     struct response *reply = response_new(200);
     response_field(reply, "Content-Type", "%s", type);
     response_field(reply, "Cache-Control", "no-store");
     response_field(reply, "X-Accel-Buffering", "no"); /* nginx: do not buffer */
-    if (!r->is_head)
-        reply->stream = subscriber_new(api->hub, api->store, &r->caller, what);
+    if (r->is_head)
+        stream->close(stream);
     else
-        cJSON_Delete(what->snapshot);
+        reply->stream = stream;
     return reply;
 }
 
@@ -81,8 +87,6 @@ struct response *events_get(struct api *api, struct request *r) {
         else if (!has_more && page.pruned_id <= what.after)
             reply = response_new(204); /* tells an EventSource to stop */
     }
-    if (!reply)
-        reply = limits_check_stream(api, r);
     if (!reply) {
         what.snapshot = view_job(&job, &r->caller);
         reply = stream_reply(api, r, what.is_ndjson ? MIME_NDJSON : MIME_SSE, &what);
@@ -95,8 +99,6 @@ struct response *events_all(struct api *api, struct request *r) {
     struct subscription what = {0};
     bool is_resumed;
     struct response *reply = read_request(api, r, &what, &is_resumed);
-    if (!reply)
-        reply = limits_check_stream(api, r);
     return reply ? reply : stream_reply(api, r, what.is_ndjson ? MIME_NDJSON : MIME_SSE, &what);
 }
 
@@ -111,9 +113,8 @@ struct response *events_wait(struct api *api, struct request *r, const struct jo
     /* The change has happened already: an ordinary reply. */
     if (known ? !field_etag_listed(known, etag, true) : job_is_terminal(job->state))
         return NULL;
-    struct response *reply = limits_check_stream(api, r);
     if (known)
         what.revision = job->revision;
     what.wait_sec = (double)wait_sec;
-    return reply ? reply : stream_reply(api, r, MIME_JSON, &what);
+    return stream_reply(api, r, MIME_JSON, &what);
 }

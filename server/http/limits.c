@@ -6,7 +6,6 @@
 #include "common/clock.h"
 #include "common/file.h"
 #include "common/mem.h"
-#include "server/events/hub.h"
 #include "server/transport/problem.h"
 
 #define ADMIN_STREAMS 10 /* one stream in ten is kept for admins */
@@ -63,15 +62,20 @@ struct response *limits_check_upload(struct api *api, const struct request *r, u
     return refusal || !limits_bind(r) ? refusal : check_pledge(api, r, bytes);
 }
 
-struct response *limits_check_stream(struct api *api, const struct request *r) {
-    size_t most = api->config.max_streams, of_one = api->config.user_max_streams, all = hub_count(api->hub);
+struct hub_limits limits_of_streams(const struct api *api, const struct request *r) {
+    size_t most = api->config.max_streams;
     bool is_bound = limits_bind(r);
-    if (all >= most || (is_bound && all >= most - most / ADMIN_STREAMS))
-        return problem_full(r, 503, "the limit of event streams is reached",
-                            "an administrator can raise the option max_streams", NULL);
-    size_t mine = is_bound && of_one > 0 ? hub_count_of(api->hub, r->caller.user_id) : 0;
-    if (mine > 0 && mine >= of_one)
+    return (struct hub_limits){
+        .of_all = is_bound ? most - most / ADMIN_STREAMS : most,
+        .of_user = is_bound ? api->config.user_max_streams : 0,
+    };
+}
+
+struct response *limits_refuse_stream(const struct api *api, const struct request *r, enum hub_answer answer) {
+    size_t of_one = api->config.user_max_streams;
+    if (answer == HUB_USER_FULL)
         return refuse(r, 429, "user_max_streams", "close some, or follow all jobs with one stream of /v1/events",
-                      mem_printf("you have %zu event streams already; the limit of one user is %zu", mine, of_one));
-    return NULL;
+                      mem_printf("you have %zu event streams already, the limit of one user", of_one));
+    return problem_full(r, 503, "the limit of event streams is reached",
+                        "an administrator can raise the option max_streams", NULL);
 }

@@ -3,6 +3,7 @@
 #ifndef UNBAKE_HTTP_LIMITS_H
 #define UNBAKE_HTTP_LIMITS_H
 
+#include "server/events/hub.h"
 #include "server/http/api.h"
 #include "server/transport/message.h"
 
@@ -14,7 +15,9 @@ bool limits_bind(const struct request *r);
 struct response *limits_check_upload(struct api *api, const struct request *r, uint64_t bytes);
 /* The same for one more check of a scene. */
 struct response *limits_check_checks(struct api *api, const struct request *r);
-/* The same for an event stream. */
-struct response *limits_check_stream(struct api *api, const struct request *r);
+/* How many event streams there may be, the caller's new one included. */
+struct hub_limits limits_of_streams(const struct api *api, const struct request *r);
+/* The refusal of one more; `answer` is not HUB_JOINED. */
+struct response *limits_refuse_stream(const struct api *api, const struct request *r, enum hub_answer answer);
 
 #endif

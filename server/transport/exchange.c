@@ -77,7 +77,7 @@ void exchange_piece_task(struct task *task) {
 void exchange_end_task(struct task *task) {
     struct exchange *x = (struct exchange *)task;
     struct listener *l = x->listener;
-    bool was_stream = x->reply && x->reply->stream && !x->reply->stream->is_sized;
+    bool was_stream = x->is_open_stream;
     if (x->request.patch && x->piece_bytes > 0)
         response_free(l->application.data(l->application.user, &x->request, x->piece, x->piece_bytes));
     response_free(x->reply); /* closes the stream: after this nobody wakes x */

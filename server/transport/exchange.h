@@ -41,7 +41,8 @@ struct exchange {
     bool has_begun;            /* the head was seen */
     bool is_beginning;         /* a pool works on the head; the library will call again */
     bool has_replied_early;
-    char *piece; /* [PIECE_BYTES] of a body that is stored; NULL before its first bytes */
+    bool is_open_stream; /* counted in listener->stream_count */
+    char *piece;         /* [PIECE_BYTES] of a body that is stored; NULL before its first bytes */
     size_t piece_bytes;
     uint64_t taken, drained; /* bytes of the body */
     double begun_sec;        /* when the request line arrived; clock_sec */

@@ -100,6 +100,7 @@ static struct MHD_Response *library_response(struct exchange *x) {
         reply->stream->waker = x;
         pthread_mutex_lock(&x->listener->mutex);
         x->listener->stream_count++;
+        x->is_open_stream = true;
         pthread_mutex_unlock(&x->listener->mutex);
     }
     if (reply->stream && reply->stream->is_sized)
