@@ -23,7 +23,7 @@ struct relight_settings relight_default_settings(void) {
 
 /* --- the camera --------------------------------------------------------------------------------- */
 
-static const struct transforms_frame *find_frame(const struct transforms *t, const char *view) {
+static const struct frame *find_frame(const struct frames *t, const char *view) {
     char *end;
     unsigned long number = strtoul(view, &end, 10);
     for (size_t i = 0; i < t->frame_count; i++)
@@ -35,9 +35,9 @@ static const struct transforms_frame *find_frame(const struct transforms *t, con
     return NULL;
 }
 
-static enum status choose_camera(const struct transforms *t, const char *path, const char *view, const double offset[3],
+static enum status choose_camera(const struct frames *t, const char *path, const char *view, const double offset[3],
                                  struct camera *camera, struct error *err) {
-    const struct transforms_frame *frame = find_frame(t, view);
+    const struct frame *frame = find_frame(t, view);
     if (!frame)
         return error_set(err, STATUS_NOT_FOUND, "%s: has no view \"%s\" among its %zu", path, view, t->frame_count);
     if (isnan(frame->lens.width) || isnan(frame->lens.height))
@@ -45,7 +45,7 @@ static enum status choose_camera(const struct transforms *t, const char *path, c
                          "%s: frames[%zu] does not say how large its picture is: "
                          "w and h are missing",
                          path, frame->number);
-    return transforms_camera(frame, (uint32_t)frame->lens.width, (uint32_t)frame->lens.height, offset, camera, err);
+    return frame_camera(frame, (uint32_t)frame->lens.width, (uint32_t)frame->lens.height, offset, camera, err);
 }
 
 /* For a mesh with that offset. */
@@ -53,7 +53,7 @@ static enum status read_camera(const char *outputs, const struct relight_setting
                                struct camera *camera, struct error *err) {
     char *path = settings->cameras ? mem_strdup(settings->cameras) : file_join(outputs, "views.json");
     struct findings findings = {.problems = cJSON_CreateArray()};
-    struct transforms t = {0};
+    struct frames t = {0};
     cJSON *tree = NULL;
     enum status status = json_read(path, TRANSFORMS_MAX_BYTES, &tree, err);
     if (status == STATUS_OK) {
@@ -65,7 +65,7 @@ static enum status read_camera(const char *outputs, const struct relight_setting
         else
             status = choose_camera(&t, path, settings->view, offset, camera, err);
     }
-    transforms_release(&t);
+    frames_release(&t);
     cJSON_Delete(findings.problems);
     findings_release(&findings);
     cJSON_Delete(tree);

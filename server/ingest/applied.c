@@ -38,7 +38,7 @@ static void undo(const double inverse[3][4], double stretch, double scale, struc
     }
 }
 
-void applied_undo(struct transforms *t, const char *name, const char *reason, struct findings *f) {
+void applied_undo(struct frames *t, const char *name, const char *reason, struct findings *f) {
     double inverse[3][4], det = invert((const double(*)[4])t->applied, inverse);
     if (!(det > 1e-9 && isfinite(det))) {
         findings_problem(f, name, "applied_transform %s, which no pose can be turned back from",
@@ -64,7 +64,7 @@ static bool is_of_capture(const char *mesh) {
 }
 
 /* The transform as a reading's mesh_axes, "y x -z"; false when it is more than that. */
-static bool as_axes(const struct transforms *t, char text[16]) {
+static bool as_axes(const struct frames *t, char text[16]) {
     size_t used = 0;
     for (int i = 0; i < 3; i++) {
         int axis = -1;
@@ -83,12 +83,12 @@ static bool as_axes(const struct transforms *t, char text[16]) {
 }
 
 /* Polycam's raw mesh beside what ns-process-data polycam wrote, which permutes axes and does not say so. */
-static bool is_polycam(const struct transforms *t, const char *mesh) {
+static bool is_polycam(const struct frames *t, const char *mesh) {
     return mesh && t->axes == AXES_OPENGL && t->frame_count > 0 && fnmatch("raw.*", path_base(mesh), 0) == 0 &&
            fnmatch("frame_[0-9][0-9][0-9][0-9][0-9].*", path_base(t->frame[0].file), 0) == 0;
 }
 
-void applied_settle(struct transforms *t, const char *name, const char *mesh, struct findings *f) {
+void applied_settle(struct frames *t, const char *name, const char *mesh, struct findings *f) {
     static const double polycam[3][4] = {{0, 0, 1, 0}, {1, 0, 0, 0}, {0, 1, 0, 0}};
     static const double identity[3][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
     char axes[16], reason[300];

@@ -5,14 +5,15 @@
 #ifndef UNBAKE_INGEST_APPLIED_H
 #define UNBAKE_INGEST_APPLIED_H
 
-#include "server/ingest/transforms.h"
+#include "server/ingest/findings.h"
+#include "server/ingest/frames.h"
 
 /* Takes the frames' poses back to the world of the capture and warns, with the reason. Poses stay as they are, with a
  * problem in `name`, when the transform mirrors space or is singular. */
-void applied_undo(struct transforms *t, const char *name, const char *reason, struct findings *f);
+void applied_undo(struct frames *t, const char *name, const char *reason, struct findings *f);
 
 /* Decides for the mesh of that path by who writes such a name; NULL: none. Undoes it for meshes that photogrammetry or a
  * scanner wrote; otherwise leaves the poses and says what would turn the mesh, where something was applied. */
-void applied_settle(struct transforms *t, const char *name, const char *mesh, struct findings *f);
+void applied_settle(struct frames *t, const char *name, const char *mesh, struct findings *f);
 
 #endif

@@ -20,7 +20,7 @@
 #include "server/ingest/reading_apply.h"
 #include "server/ingest/source/missing.h"
 #include "server/ingest/source/sources.h"
-#include "server/ingest/transforms.h"
+#include "server/ingest/frames.h"
 
 struct bundle_limits bundle_default_limits(void) {
     return (struct bundle_limits){
@@ -107,8 +107,8 @@ static enum status list_bundle(const char *dir, char **root, struct listing *l, 
 
 /* The cameras of the file that was chosen, or of whatever source the bundle is; sets *match. */
 static enum status load_cameras(const struct listing *l, const char *chosen, struct source_match *match,
-                                struct transforms *t, struct findings *f, struct error *err) {
-    *t = (struct transforms){0};
+                                struct frames *t, struct findings *f, struct error *err) {
+    *t = (struct frames){0};
     *match = sources_find(l, chosen);
     if (!match->source && chosen && listing_find(l, "", chosen)) /* of another name */
         *match = (struct source_match){&source_nerfstudio, mem_strdup(""), mem_strdup(chosen), NULL};
@@ -220,7 +220,7 @@ static enum status clean_choice(const char *given, char **chosen, struct error *
     return status;
 }
 
-static enum status load_photographs(const char *root, const char *name, const struct transforms *t,
+static enum status load_photographs(const char *root, const char *name, const struct frames *t,
                                     const struct bundle_limits *limits, struct parallel *pool, struct scene *scene,
                                     struct findings *f, struct error *err) {
     const struct photos_options options = {
@@ -235,7 +235,7 @@ static enum status load_photographs(const char *root, const char *name, const st
 enum status bundle_load(const char *dir, const struct reading *given, const struct bundle_limits *limits,
                         struct parallel *pool, struct scene *scene, cJSON *problems, struct error *err) {
     struct findings f = {.problems = problems};
-    struct transforms t = {0};
+    struct frames t = {0};
     struct listing listing = {0};
     struct source_match match = {0};
     char *root = NULL, *mesh = NULL, *chosen = NULL;
@@ -275,7 +275,7 @@ out:
         scene_release(scene);
     move_warnings(&f, scene);
     findings_release(&f);
-    transforms_release(&t);
+    frames_release(&t);
     source_match_release(&match);
     listing_release(&listing);
     mem_free(mesh);

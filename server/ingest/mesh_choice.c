@@ -273,7 +273,7 @@ static void take_wanted(const struct mesh_choice *choice, char **found, struct f
 }
 
 enum status mesh_choose(const struct mesh_choice *choice, char **found, struct findings *f, struct error *err) {
-    const struct transforms *t = choice->transforms;
+    const struct frames *t = choice->transforms;
     const char *root = choice->listing->root;
     *found = NULL;
     if (choice->wanted) {

@@ -19,7 +19,7 @@
 struct mesh_choice {
     const struct listing *listing;
     const struct source_match *match;
-    const struct transforms *transforms;
+    const struct frames *transforms;
     const char *wanted;      /* of the reading; NULL: none */
     uint64_t triangle_limit; /* meshes of more are passed over where there is another */
 };

@@ -73,7 +73,7 @@ static bool try_turn(struct photo_fit *fit, const struct lens *stated, int turn)
 struct probing {
     const char *dir;
     char *const *path;
-    const struct transforms *t;
+    const struct frames *t;
     struct photo_fit *fit;
 };
 
@@ -103,7 +103,7 @@ static void probe_body(void *user, size_t index, int thread) {
 
 /* Sizes show of landscape and portrait whether EXIF was applied, but not of pictures that are upside down or mirrored:
  * those are turned where all others are that EXIF turns by a quarter. */
-static void turn_alike(const struct transforms *t, struct photo_fit *fit, struct findings *f) {
+static void turn_alike(const struct frames *t, struct photo_fit *fit, struct findings *f) {
     size_t turned = 0, kept = 0;
     for (size_t i = 0; i < t->frame_count; i++) {
         turned += fit[i].turn > 1;
@@ -132,7 +132,7 @@ static double factor_of(const struct photo_fit *fit) {
 }
 
 /* Without any w and h, principal points at the corner of all pictures are those of pictures twice as large. */
-static void scale_by_centres(const char *name, const struct transforms *t, struct photo_fit *fit, struct findings *f) {
+static void scale_by_centres(const char *name, const struct frames *t, struct photo_fit *fit, struct findings *f) {
     double factor = 0.0;
     size_t count = 0, first = 0;
     for (size_t i = 0; i < t->frame_count; i++) {
@@ -160,7 +160,7 @@ static void scale_by_centres(const char *name, const struct transforms *t, struc
         }
 }
 
-static void tell_scaled(const char *name, const struct transforms *t, const struct photo_fit *fit, struct findings *f) {
+static void tell_scaled(const char *name, const struct frames *t, const struct photo_fit *fit, struct findings *f) {
     size_t count = 0, first = 0;
     for (size_t i = 0; i < t->frame_count; i++) {
         const struct lens *stated = &t->frame[i].lens;
@@ -179,8 +179,8 @@ static void tell_scaled(const char *name, const struct transforms *t, const stru
             t->frame[first].lens.width, t->frame[first].lens.height, fit[first].scale);
 }
 
-void photo_fit_all(const char *dir, const char *name, char *const *path, const struct transforms *t,
-                   struct parallel *pool, struct photo_fit *fit, struct findings *f) {
+void photo_fit_all(const char *dir, const char *name, char *const *path, const struct frames *t, struct parallel *pool,
+                   struct photo_fit *fit, struct findings *f) {
     struct probing p = {dir, path, t, fit};
     parallel_for(pool, t->frame_count, probe_body, &p);
     turn_alike(t, fit, f);
@@ -190,9 +190,9 @@ void photo_fit_all(const char *dir, const char *name, char *const *path, const s
 
 /* --- one frame -------------------------------------------------------------------------------- */
 
-enum status photo_fit_camera(const struct photo_fit *fit, const struct transforms_frame *frame, const double offset[3],
+enum status photo_fit_camera(const struct photo_fit *fit, const struct frame *frame, const double offset[3],
                              struct camera *camera, struct error *err) {
-    struct transforms_frame fitted = *frame; /* what it points to is borrowed */
+    struct frame fitted = *frame; /* what it points to is borrowed */
     bool swaps = image_orientation_swaps(fit->turn);
     fitted.lens = fit->lens;
     const struct lens *stated = &frame->lens;
@@ -211,8 +211,8 @@ enum status photo_fit_camera(const struct photo_fit *fit, const struct transform
         return error_hint(err,
                           "exchange w and h, if the poses belong to the pictures as they are; else turn the pictures");
     }
-    return transforms_camera(&fitted, swaps ? fit->height : fit->width, swaps ? fit->width : fit->height, offset,
-                             camera, err);
+    return frame_camera(&fitted, swaps ? fit->height : fit->width, swaps ? fit->width : fit->height, offset, camera,
+                        err);
 }
 
 void photo_fit_apply(const struct photo_fit *fit, const struct image_info *info, struct image *image) {

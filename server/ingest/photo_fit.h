@@ -9,7 +9,7 @@
 #include "common/image.h"
 #include "common/parallel.h"
 #include "server/ingest/findings.h"
-#include "server/ingest/transforms.h"
+#include "server/ingest/frames.h"
 
 /* Of one frame. */
 struct photo_fit {
@@ -25,11 +25,11 @@ struct photo_fit {
 
 /* Reads the headers of the pictures at path[] (below dir; NULL: absent) and decides; fit[frame_count]. `name` is that of
  * the file of cameras. Warns of what is turned or scaled. */
-void photo_fit_all(const char *dir, const char *name, char *const *path, const struct transforms *t,
-                   struct parallel *pool, struct photo_fit *fit, struct findings *f);
+void photo_fit_all(const char *dir, const char *name, char *const *path, const struct frames *t, struct parallel *pool,
+                   struct photo_fit *fit, struct findings *f);
 
-/* The camera of the frame's picture, once turned; as transforms_camera. */
-enum status photo_fit_camera(const struct photo_fit *fit, const struct transforms_frame *frame, const double offset[3],
+/* The camera of the frame's picture, once turned; as frame_camera. */
+enum status photo_fit_camera(const struct photo_fit *fit, const struct frame *frame, const double offset[3],
                              struct camera *camera, struct error *err);
 
 /* Turns the pixels; those that an EXR's data window leaves out become NaN, which is no observation. */

@@ -41,7 +41,7 @@ struct gate {
 
 struct loading {
     const char *dir;
-    const struct transforms *transforms;
+    const struct frames *transforms;
     const double *offset; /* [3] of the mesh */
     const struct photos_options *options;
     struct gate gate;
@@ -74,7 +74,7 @@ static void find_duplicates(const struct loading *l, const char *name, struct fi
     size_t count = l->transforms->frame_count;
     struct named *sorted = mem_array(count, sizeof *sorted);
     for (size_t i = 0; i < count; i++) {
-        const struct transforms_frame *frame = &l->transforms->frame[i];
+        const struct frame *frame = &l->transforms->frame[i];
         sorted[i] = (struct named){frame->file, frame->number};
     }
     if (count > 1)
@@ -88,7 +88,7 @@ static void find_duplicates(const struct loading *l, const char *name, struct fi
 
 /* --- one photograph ---------------------------------------------------------------------- */
 
-static void set_exposure(const struct transforms_frame *frame, const struct image_info *info, struct photograph *photo,
+static void set_exposure(const struct frame *frame, const struct image_info *info, struct photograph *photo,
                          struct outcome *outcome) {
     double exposure = frame->exposure;
     outcome->source = frame->exposure_source;
@@ -96,7 +96,7 @@ static void set_exposure(const struct transforms_frame *frame, const struct imag
         exposure = 1.0;
         outcome->source = EXPOSURE_HDR;
     } else if (exposure <= 0.0) {
-        exposure = transforms_exposure(info->exposure_time_sec, info->iso, info->f_number);
+        exposure = frame_exposure(info->exposure_time_sec, info->iso, info->f_number);
         outcome->source = exposure > 0.0 ? EXPOSURE_EXIF : EXPOSURE_UNKNOWN;
     }
     float single = (float)exposure;
@@ -153,7 +153,7 @@ static enum status keep_pixels(const struct loading *l, const struct image *imag
 }
 
 static enum status load_photograph(const struct loading *l, size_t index) {
-    const struct transforms_frame *frame = &l->transforms->frame[index];
+    const struct frame *frame = &l->transforms->frame[index];
     struct photograph *photo = &l->photograph[index];
     struct outcome *outcome = &l->outcome[index];
     char *path = file_join(l->dir, l->path[index]);
@@ -299,7 +299,7 @@ static enum status collect(struct loading *l, const char *name, struct findings 
     enum status status = STATUS_OK;
     bool leaves_out = leaves_out_broken(l);
     for (size_t i = 0; i < l->transforms->frame_count; i++) {
-        const struct transforms_frame *frame = &l->transforms->frame[i];
+        const struct frame *frame = &l->transforms->frame[i];
         struct outcome *o = &l->outcome[i];
         if (!l->path[i])
             findings_warning(f,
@@ -347,9 +347,8 @@ static void check_count(const struct scene *scene, const char *name, size_t name
         findings_problem(f, name, "every frame is held out as test: none is left to reconstruct from");
 }
 
-enum status photos_load(const char *dir, const char *name, const struct transforms *t,
-                        const struct photos_options *options, struct parallel *pool, struct scene *scene,
-                        struct findings *f, struct error *err) {
+enum status photos_load(const char *dir, const char *name, const struct frames *t, const struct photos_options *options,
+                        struct parallel *pool, struct scene *scene, struct findings *f, struct error *err) {
     struct loading l = {
         .dir = dir,
         .transforms = t,

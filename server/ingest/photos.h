@@ -13,7 +13,7 @@
 #include "common/parallel.h"
 #include "common/spill.h"
 #include "server/ingest/findings.h"
-#include "server/ingest/transforms.h"
+#include "server/ingest/frames.h"
 #include "server/scene/scene.h"
 
 #define PHOTOS_MIN_COUNT 3 /* fewer views do not constrain materials and light */
@@ -28,8 +28,7 @@ struct photos_options {
 /* Loads the picture and mask of every frame from folder `dir` into scene->photograph, in the frames' order; missing
  * pictures are left out with a warning, and so are some that are broken. Faults of the files become problems in *f; other
  * statuses than STATUS_OK are failures of the machine. `name` is that of the transforms file. */
-enum status photos_load(const char *dir, const char *name, const struct transforms *t,
-                        const struct photos_options *options, struct parallel *pool, struct scene *scene,
-                        struct findings *f, struct error *err);
+enum status photos_load(const char *dir, const char *name, const struct frames *t, const struct photos_options *options,
+                        struct parallel *pool, struct scene *scene, struct findings *f, struct error *err);
 
 #endif

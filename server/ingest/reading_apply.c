@@ -44,7 +44,7 @@ struct exact_pose reading_reinterpret(const struct exact_pose *world_from_camera
 }
 
 /* Gives photograph i the pose of frame i + shift. */
-static void shift_poses(struct transforms *t, int shift) {
+static void shift_poses(struct frames *t, int shift) {
     if (shift == 0)
         return;
     struct exact_pose *pose = mem_array(t->frame_count, sizeof *pose);
@@ -53,9 +53,9 @@ static void shift_poses(struct transforms *t, int shift) {
         pose[i] = t->frame[i].world_from_camera;
     for (size_t i = 0; i < t->frame_count; i++) {
         long other = (long)i + shift;
-        struct transforms_frame *frame = &t->frame[i];
+        struct frame *frame = &t->frame[i];
         if (other < 0 || other >= (long)t->frame_count) {
-            transforms_frame_release(frame);
+            frame_release(frame);
             continue;
         }
         frame->world_from_camera = pose[other];
@@ -65,9 +65,9 @@ static void shift_poses(struct transforms *t, int shift) {
     mem_free(pose);
 }
 
-void reading_apply_frames(const struct reading *r, struct transforms *t) {
+void reading_apply_frames(const struct reading *r, struct frames *t) {
     for (size_t i = 0; i < t->frame_count; i++) {
-        struct transforms_frame *frame = &t->frame[i];
+        struct frame *frame = &t->frame[i];
         if (r->axes != AXES_OF_FORMAT && r->axes != t->axes)
             frame->world_from_camera = reading_reinterpret(&frame->world_from_camera, t->axes, r->axes);
         if (r->ignores_exposures) {

@@ -12,7 +12,7 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     struct findings f = {.problems = cJSON_CreateArray()};
-    struct transforms t = {0};
+    struct frames t = {0};
     struct error err = {.message = ""};
     bool binary = size > 0 && (data[0] & 1), is_images = size > 0 && (data[0] & 2);
     const uint8_t *rest = size > 0 ? data + 1 : data;
@@ -28,13 +28,13 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         for (size_t i = 0; i < t.frame_count; i++) {
             struct camera camera;
             MUST(t.frame[i].file[0] != '\0' && isfinite(t.frame[i].world_from_camera.translation[0]));
-            transforms_camera(&t.frame[i], 64, 48, (double[3]){1e6}, &camera, &err);
+            frame_camera(&t.frame[i], 64, 48, (double[3]){1e6}, &camera, &err);
         }
     } else {
         MUST(err.status == STATUS_INPUT && err.message[0] != '\0');
     }
     colmap_cameras_free(c);
-    transforms_release(&t);
+    frames_release(&t);
     cJSON_Delete(f.problems);
     findings_release(&f);
     return 0;

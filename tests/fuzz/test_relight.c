@@ -92,12 +92,12 @@ static bool is_small(char kind, const char *name) {
              (image.width <= PICTURE_MAX && image.height <= PICTURE_MAX);
     } else if (kind == 'c' && json_read(path, 1 << 20, &tree, NULL) == STATUS_OK) {
         struct findings findings = {.problems = cJSON_CreateArray()};
-        struct transforms t;
+        struct frames t;
         transforms_read(tree, name, &t, &findings);
         for (size_t i = 0; i < t.frame_count; i++)
             is = is && !(fmax(t.frame[i].lens.width, t.frame[i].lens.height) > PICTURE_MAX &&
                          fmin(t.frame[i].lens.width, t.frame[i].lens.height) < IMAGE_MAX_SIDE);
-        transforms_release(&t);
+        frames_release(&t);
         cJSON_Delete(findings.problems);
         findings_release(&findings);
     }

@@ -27,27 +27,27 @@ static size_t split(const char *text, size_t size, char name[FILES][64], struct 
     return count;
 }
 
-static void check_frames(const struct transforms *t) {
+static void check_frames(const struct frames *t) {
     struct error err;
-    MUST(t->frame_count <= t->named_count && t->named_count <= TRANSFORMS_MAX_FRAMES + 1);
+    MUST(t->frame_count <= t->named_count && t->named_count <= FRAMES_MAX + 1);
     for (size_t i = 0; i < t->frame_count; i++) {
         struct camera camera;
         MUST(t->frame[i].file && t->frame[i].file[0] && isfinite(t->frame[i].world_from_camera.translation[0]));
-        if (transforms_camera(&t->frame[i], 64, 48, (double[3]){0}, &camera, &err) == STATUS_OK)
+        if (frame_camera(&t->frame[i], 64, 48, (double[3]){0}, &camera, &err) == STATUS_OK)
             MUST(isfinite(camera.fx) && isfinite(camera.fy) && isfinite(camera.cx) && isfinite(camera.cy));
     }
 }
 
 static void read(const struct source *source, const struct listing *l, const char *base) {
     struct findings f = {.problems = cJSON_CreateArray()};
-    struct transforms t;
+    struct frames t;
     struct error err = {.message = ""};
     char *found = source->recognise(l, base);
     struct source_place place = {l, base, found};
     if (found) {
         MUST(source->read(&place, &t, &f, &err) == STATUS_OK);
         check_frames(&t);
-        transforms_release(&t);
+        frames_release(&t);
     }
     cJSON_Delete(f.problems);
     findings_release(&f);

@@ -24,12 +24,12 @@ static const char prism[] = "{\"camera_model\":\"THIN_PRISM_FISHEYE\",\"fl_x\":5
 static const char fisheye[] = "{\"camera_model\":\"OPENCV_FISHEYE\",\"camera_angle_x\":1.5,\"k1\":-0.4,\"frames\":["
                               "{\"file_path\":\"a\",\"transform_matrix\":[[1,0,0,0],[0,1,0,0],[0,0,1,0]]}]}";
 
-static void check_frame(const struct transforms_frame *frame) {
+static void check_frame(const struct frame *frame) {
     struct camera camera;
     struct error err = {.message = ""};
     const char *file = frame->file;
     MUST(file[0] != '\0' && file[0] != '/' && strncmp(file, "../", 3) != 0 && !strstr(file, "/../"));
-    if (transforms_camera(frame, 64, 48, (double[3]){0.0}, &camera, &err) != STATUS_OK) {
+    if (frame_camera(frame, 64, 48, (double[3]){0.0}, &camera, &err) != STATUS_OK) {
         MUST(err.message[0] != '\0');
         return;
     }
@@ -43,12 +43,12 @@ static void check_frame(const struct transforms_frame *frame) {
 
 static void read_tree(const cJSON *tree) {
     struct findings f = {.problems = cJSON_CreateArray()};
-    struct transforms t;
+    struct frames t;
     transforms_read(tree, "case", &t, &f);
     for (size_t i = 0; i < t.frame_count; i++)
         check_frame(&t.frame[i]);
     MUST((size_t)cJSON_GetArraySize(f.problems) <= FINDINGS_MAX);
-    transforms_release(&t);
+    frames_release(&t);
     cJSON_Delete(f.problems);
     findings_release(&f);
 }

@@ -14,7 +14,7 @@ struct source_rig {
     size_t count;
     struct listing listing;
     struct source_match match;
-    struct transforms t;
+    struct frames t;
     struct findings findings;
     char *problems; /* as text */
 };
@@ -53,7 +53,7 @@ static inline void source_rig_drop(struct source_rig *r, const char *path) {
 }
 
 static inline void source_rig_clear(struct source_rig *r) {
-    transforms_release(&r->t);
+    frames_release(&r->t);
     cJSON_Delete(r->findings.problems);
     findings_release(&r->findings);
     mem_free(r->problems);

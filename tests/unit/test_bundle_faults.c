@@ -289,7 +289,7 @@ static void check_content(void) {
     struct buf many;
     buf_init(&many, 1 << 20);
     buf_puts(&many, "{\"frames\":[{}");
-    for (int i = 0; i < TRANSFORMS_MAX_FRAMES; i++)
+    for (int i = 0; i < FRAMES_MAX; i++)
         buf_puts(&many, ",{}");
     buf_puts(&many, "]}");
     put("transforms.json", buf_text(&many));

@@ -48,11 +48,11 @@ static void make_images(struct buf *out) {
     buf_append(out, "sub/c.jpg", 10), put(out, 0, 8);
 }
 
-static void check_frames(const struct transforms *t) {
+static void check_frames(const struct frames *t) {
     CHECK(t->frame_count == 3 && t->named_count == 3);
     if (t->frame_count != 3)
         return;
-    const struct transforms_frame *a = &t->frame[0], *b = &t->frame[1], *c = &t->frame[2];
+    const struct frame *a = &t->frame[0], *b = &t->frame[1], *c = &t->frame[2];
     CHECK_STRING(a->file, "images/a.png");
     CHECK_STRING(b->file, "images/b b.png");
     CHECK_STRING(c->file, "images/sub/c.jpg");
@@ -73,13 +73,13 @@ static void check_frames(const struct transforms *t) {
 static void test_both(void) {
     struct error err = {.message = ""};
     struct findings f = {.problems = cJSON_CreateArray()};
-    struct transforms t;
+    struct frames t;
     struct buf cameras, images;
     struct colmap_cameras *c = cameras_of(CAMERAS, &err);
     CHECK_THAT(c != NULL, "%s", err.message);
     CHECK(colmap_images_parse(IMAGES, strlen(IMAGES), "images.txt", false, c, "images/", &t, &f, &err) == STATUS_OK);
     check_frames(&t);
-    transforms_release(&t);
+    frames_release(&t);
     colmap_cameras_free(c);
 
     make_cameras(&cameras);
@@ -88,18 +88,18 @@ static void test_both(void) {
     CHECK_THAT(c != NULL, "%s", err.message);
     CHECK(colmap_images_parse(images.data, images.length, "images.bin", true, c, "images/", &t, &f, &err) == STATUS_OK);
     check_frames(&t);
-    transforms_release(&t);
+    frames_release(&t);
     CHECK(f.problem_count == 0);
     for (size_t length = 0; length < images.length; length++) {
         CHECK(colmap_images_parse(images.data, length, "images.bin", true, c, "", &t, &f, &err) == STATUS_INPUT);
         CHECK(strstr(err.message, "images.bin is cut off at byte"));
-        transforms_release(&t);
+        frames_release(&t);
     }
     for (size_t length = 0; length < cameras.length; length++)
         CHECK(!colmap_cameras_parse(cameras.data, length, "cameras.bin", true, &err) && err.status == STATUS_INPUT);
     images.data[8 + 4 + 56 + 4 + 8 + 7] = 127; /* points without number */
     CHECK(colmap_images_parse(images.data, images.length, "images.bin", true, c, "", &t, &f, &err) == STATUS_INPUT);
-    transforms_release(&t);
+    frames_release(&t);
     colmap_cameras_free(c);
     cameras.data[12] = 99;
     CHECK(!colmap_cameras_parse(cameras.data, cameras.length, "cameras.bin", true, &err));
@@ -149,24 +149,24 @@ static void test_refused(void) {
     c = cameras_of(CAMERAS, &err);
     for (size_t i = 0; i < sizeof bad_images / sizeof *bad_images; i++) {
         struct findings f = {.problems = cJSON_CreateArray()};
-        struct transforms t;
+        struct frames t;
         CHECK(colmap_images_parse(bad_images[i][0], strlen(bad_images[i][0]), "images.txt", false, c, "", &t, &f,
                                   &err) == STATUS_INPUT);
         CHECK_THAT(strstr(err.message, bad_images[i][1]) && t.frame_count == 0, "%s", err.message);
-        transforms_release(&t);
+        frames_release(&t);
         cJSON_Delete(f.problems);
         findings_release(&f);
     }
     for (size_t i = 0; i < sizeof problems / sizeof *problems; i++) {
         struct findings f = {.problems = cJSON_CreateArray()};
-        struct transforms t;
+        struct frames t;
         CHECK(colmap_images_parse(problems[i][0], strlen(problems[i][0]), "images.txt", false, c, "", &t, &f, &err) ==
               STATUS_OK);
         CHECK(f.problem_count == 1 && t.frame_count == 0 && t.named_count == 1);
         char *text = cJSON_PrintUnformatted(f.problems);
         CHECK_THAT(strstr(text, problems[i][1]) != NULL, "%s", text);
         free(text);
-        transforms_release(&t);
+        frames_release(&t);
         cJSON_Delete(f.problems);
         findings_release(&f);
     }
@@ -176,14 +176,14 @@ static void test_refused(void) {
 /* One more than may be, in each of the kinds of file. */
 static void test_many(void) {
     struct findings f = {.problems = cJSON_CreateArray()};
-    struct transforms t;
+    struct frames t;
     struct error err;
     struct buf cameras, text, binary;
     buf_init(&cameras, 1 << 22);
     buf_init(&text, 1 << 22);
     buf_init(&binary, 1 << 22);
-    put(&binary, TRANSFORMS_MAX_FRAMES + 1, 8);
-    for (uint64_t i = 0; i <= TRANSFORMS_MAX_FRAMES; i++) {
+    put(&binary, FRAMES_MAX + 1, 8);
+    for (uint64_t i = 0; i <= FRAMES_MAX; i++) {
         buf_printf(&cameras, "%d SIMPLE_PINHOLE 4 4 5 2 2\n", (int)i);
         buf_printf(&text, "1 1 0 0 0 0 0 0 7 a.png\n\n");
         put(&binary, 1, 4), put_doubles(&binary, (double[]){1, 0, 0, 0, 0, 0, 0}, 7), put(&binary, 7, 4);
@@ -195,10 +195,10 @@ static void test_many(void) {
     struct colmap_cameras *c = cameras_of(CAMERAS, &err);
     CHECK(colmap_images_parse(text.data, text.length, "images.txt", false, c, "", &t, &f, &err) == STATUS_INPUT);
     CHECK_STRING(err.message, "images.txt has more than 20000 frames");
-    transforms_release(&t);
+    frames_release(&t);
     CHECK(colmap_images_parse(binary.data, binary.length, "images.bin", true, c, "", &t, &f, &err) == STATUS_INPUT);
     CHECK_STRING(err.message, "images.bin has more than 20000 frames");
-    transforms_release(&t);
+    frames_release(&t);
     colmap_cameras_free(c);
     buf_release(&binary);
     buf_release(&text);

@@ -196,14 +196,14 @@ static void test_mesh(const char *dir, const struct mesh *wanted) {
 static void test_views(const char *dir, const double offset[3], const struct camera *wanted) {
     struct error err;
     struct findings findings = {.problems = cJSON_CreateArray()};
-    struct transforms transforms;
+    struct frames transforms;
     struct camera camera = {0};
     cJSON *tree = NULL;
     char *path = file_join(dir, "views.json");
     CHECK(json_read(path, 1 << 20, &tree, &err) == STATUS_OK);
     transforms_read(tree, "views.json", &transforms, &findings);
     CHECK(findings.problem_count == 0 && transforms.frame_count == 1);
-    CHECK(transforms_camera(&transforms.frame[0], wanted->width, wanted->height, offset, &camera, &err) == STATUS_OK);
+    CHECK(frame_camera(&transforms.frame[0], wanted->width, wanted->height, offset, &camera, &err) == STATUS_OK);
     CHECK_STRING(transforms.frame[0].file, "images/003.exr");
     CHECK(camera.model == wanted->model && camera.fx == wanted->fx && camera.fy == wanted->fy);
     CHECK(camera.cx == wanted->cx && camera.cy == wanted->cy);
@@ -213,7 +213,7 @@ static void test_views(const char *dir, const double offset[3], const struct cam
         CHECK_NEAR(camera.world_from_camera.rotation[i / 3][i % 3], wanted->world_from_camera.rotation[i / 3][i % 3],
                    1e-6);
     CHECK(camera.world_from_camera.translation.z == 3.0f);
-    transforms_release(&transforms);
+    frames_release(&transforms);
     cJSON_Delete(findings.problems);
     findings_release(&findings);
     cJSON_Delete(tree);

@@ -10,12 +10,12 @@
 #define POSE "\"transform_matrix\":[[1,0,0,0],[0,-1,0,0],[0,0,-1,0],[0,0,0,1]]" /* looks along +z */
 
 static struct camera finish(struct lens *lens) {
-    struct transforms_frame frame = {.lens = *lens};
+    struct frame frame = {.lens = *lens};
     struct camera c = {0};
     struct error err = {.message = ""};
     for (int i = 0; i < 3; i++)
         frame.world_from_camera.rotation[i][i] = 1.0;
-    CHECK_THAT(transforms_camera(&frame, 640, 480, (double[3]){0.0}, &c, &err) == STATUS_OK, "%s", err.message);
+    CHECK_THAT(frame_camera(&frame, 640, 480, (double[3]){0.0}, &c, &err) == STATUS_OK, "%s", err.message);
     return c;
 }
 
@@ -99,7 +99,7 @@ static struct camera from_json(const char *members, char **found) {
     cJSON *tree = NULL;
     struct error err;
     struct findings f = {.problems = cJSON_CreateArray()};
-    struct transforms t;
+    struct frames t;
     struct camera c = {0};
     snprintf(text, sizeof text, "{\"w\":640,\"h\":480,\"fl_x\":400,%s\"frames\":[{\"file_path\":\"a.png\"," POSE "}]}",
              members);
@@ -108,7 +108,7 @@ static struct camera from_json(const char *members, char **found) {
     if (t.frame_count == 1)
         c = finish(&t.frame[0].lens);
     *found = json_text(f.problems);
-    transforms_release(&t);
+    frames_release(&t);
     cJSON_Delete(tree);
     cJSON_Delete(f.problems);
     findings_release(&f);
@@ -175,7 +175,7 @@ static void test_views(void) {
         struct export_comparison comparison = {.name = "a.png", .camera = &cameras[i]};
         cJSON *json = views_json(&comparison, 1, (double[3]){1.0, 2.0, 3.0});
         struct findings f = {.problems = cJSON_CreateArray()};
-        struct transforms t;
+        struct frames t;
         transforms_read(json, "views.json", &t, &f);
         CHECK(f.problem_count == 0 && t.frame_count == 1);
         struct camera c = finish(&t.frame[0].lens);
@@ -184,7 +184,7 @@ static void test_views(void) {
                        c.fx == cameras[i].fx && c.fold == cameras[i].fold,
                    "case %zu", i);
         CHECK(t.frame[0].world_from_camera.translation[1] == 2.0);
-        transforms_release(&t);
+        frames_release(&t);
         cJSON_Delete(json);
         cJSON_Delete(f.problems);
         findings_release(&f);

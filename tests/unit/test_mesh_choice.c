@@ -29,7 +29,7 @@ static void put_obj(const char *name, int triangles) {
 static void check(const char *base, const char *wanted, uint64_t limit, const char *taken, const char *part) {
     struct listing l;
     struct source_match match = {.base = (char *)(uintptr_t)base, .found = "x"};
-    struct transforms t = {0};
+    struct frames t = {0};
     struct findings f = {.problems = cJSON_CreateArray()};
     struct error err = {.message = ""};
     char *found;
@@ -71,13 +71,13 @@ static void test_choice(void) {
 /* stored = 2 (P x + (1, 2, 3)) with P that makes y of x, -x of y. */
 static void test_undo(void) {
     struct findings f = {.problems = cJSON_CreateArray()};
-    struct transforms_frame frame = {.world_from_camera = {.rotation = {{0, -1, 0}, {1, 0, 0}, {0, 0, 1}},
-                                                           .translation = {2 * (1 - 5), 2 * (2 + 4), 2 * (3 + 6)}}};
-    struct transforms t = {.frame = &frame,
-                           .frame_count = 1,
-                           .has_applied = true,
-                           .applied = {{0, -1, 0, 1}, {1, 0, 0, 2}, {0, 0, 1, 3}},
-                           .applied_scale = 2.0};
+    struct frame frame = {.world_from_camera = {.rotation = {{0, -1, 0}, {1, 0, 0}, {0, 0, 1}},
+                                                .translation = {2 * (1 - 5), 2 * (2 + 4), 2 * (3 + 6)}}};
+    struct frames t = {.frame = &frame,
+                       .frame_count = 1,
+                       .has_applied = true,
+                       .applied = {{0, -1, 0, 1}, {1, 0, 0, 2}, {0, 0, 1, 3}},
+                       .applied_scale = 2.0};
     applied_settle(&t, "transforms.json", "mesh.ply", &f);
     CHECK(t.has_applied && f.warning_count == 1 && strstr(f.warning[0], "moved or scaled"));
     applied_settle(&t, "transforms.json", "a/scene_dense_mesh.ply", &f);

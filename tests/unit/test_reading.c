@@ -128,7 +128,7 @@ static void test_mesh(void) {
 }
 
 static void test_shift(void) {
-    struct transforms t = {.frame_count = 3, .frame = mem_calloc(3, sizeof *t.frame)};
+    struct frames t = {.frame_count = 3, .frame = mem_calloc(3, sizeof *t.frame)};
     for (int i = 0; i < 3; i++) {
         t.frame[i].file = mem_printf("%d.png", i);
         t.frame[i].world_from_camera.translation[0] = i;
@@ -139,7 +139,7 @@ static void test_shift(void) {
     CHECK(t.frame_count == 2);
     CHECK_STRING(t.frame[1].file, "1.png");
     CHECK(t.frame[1].world_from_camera.translation[0] == 2.0);
-    transforms_release(&t);
+    frames_release(&t);
 }
 
 /* What a shell takes from the words is what they were made of. */

@@ -46,13 +46,13 @@ static struct source_rig rig;
 static void put(const char *name, const char *text) { source_rig_put(&rig, name, text); }
 
 /* Reads what was put and checks frame `number`: its pose, its photograph, and that so many frames are there. */
-static const struct transforms_frame *check(size_t number, size_t count, const char *photograph) {
+static const struct frame *check(size_t number, size_t count, const char *photograph) {
     CHECK(source_rig_read(&rig));
     CHECK_STRING(rig.problems, "[]");
     CHECK_THAT(rig.t.frame_count == count, "%s: %zu frames", rig.name, rig.t.frame_count);
     if (rig.t.frame_count <= number)
         exit(1);
-    const struct transforms_frame *frame = &rig.t.frame[number];
+    const struct frame *frame = &rig.t.frame[number];
     CHECK_STRING(frame->file, photograph);
     for (int i = 0; i < 3; i++) {
         for (int j = 0; j < 3; j++)
@@ -128,7 +128,7 @@ static void test_bundler(void) {
                       "\n" BUNDLER_T "\n0 0 0\n0 0 0\n0 0 0\n0 0 0\n0 0 0\n1 2 3\n255 0 0\n0\n");
     put("list.txt", "./x.jpg\n./images/b.jpg 0 541.2\n./y.jpg\n");
     put("images/b.jpg", "");
-    const struct transforms_frame *frame = check(0, 1, "images/b.jpg");
+    const struct frame *frame = check(0, 1, "images/b.jpg");
     CHECK(isnan(frame->lens.cx) && frame->lens.fl_x == 100.0 && frame->lens.k[0] == -0.1 && frame->lens.k[1] == 0.02);
     CHECK(source_rig_warned(&rig, "2 photographs have no pose"));
     put("list.txt", "./x.jpg\n");
@@ -154,7 +154,7 @@ static void test_openmvg(void) {
     put("sfm_data.json",
         MVG("\"value0\":{\"width\":160,\"height\":120,\"focal_length\":104,\"principal_point\":[81,61]},"
             "\"disto_t2\":[0.1,0.2,0.3,0.01,0.02]"));
-    const struct transforms_frame *frame = check(0, 1, "images/b.jpg");
+    const struct frame *frame = check(0, 1, "images/b.jpg");
     check_lens(&frame->lens, 104, 81, 61, 0.1, 0.01, 0.02);
     CHECK(frame->lens.width == 160.0 && source_rig_warned(&rig, "1 photographs have no pose"));
     put("sfm_data.json", MVG("\"width\":160,\"height\":120,\"focal_length\":104,\"principal_point\":[81,61],"
@@ -225,16 +225,15 @@ static void test_realitycapture(void) {
     source_rig_start(&rig, "RealityCapture");
     put("images/b.jpg", "");
     put("export.csv", "#cameras 1\n" RC_HEADER "b.jpg," RC_POSE ",23.4,0.225,0.45,0.1,0,0,0,0.01,0.02\n");
-    const struct transforms_frame *frame = check(0, 1, "images/b.jpg");
+    const struct frame *frame = check(0, 1, "images/b.jpg");
     struct camera camera;
     struct error err = {.message = ""};
-    CHECK(transforms_camera(frame, 160, 120, (double[3]){0}, &camera, &err) == STATUS_OK);
+    CHECK(frame_camera(frame, 160, 120, (double[3]){0}, &camera, &err) == STATUS_OK);
     CHECK_NEAR(camera.fx, 104, 1e-4);
     CHECK_NEAR(camera.cx, 81, 1e-4);
     CHECK_NEAR(camera.cy, 62, 1e-4);
     CHECK_NEAR(camera.p[1], 0.02, 1e-7);
-    CHECK(transforms_camera(frame, 120, 160, (double[3]){0}, &camera, &err) == STATUS_OK &&
-          fabsf(camera.cx - 61) < 1e-4f);
+    CHECK(frame_camera(frame, 120, 160, (double[3]){0}, &camera, &err) == STATUS_OK && fabsf(camera.cx - 61) < 1e-4f);
     put("export.csv", RC_HEADER "b.jpg,1,2,3,0,0,x,23.4,0,0,0,0,0,0,0,0\n");
     source_rig_refused(&rig, "line 2: column 7 is no number");
     put("export.csv", "#name,x,y,alt,heading\nb.jpg,1,2,3,4\n");
@@ -257,10 +256,10 @@ static void test_realitycapture_xmp(void) {
                      "xcr:PrincipalPointV=\"0.0125\"",
                      XMP_POSE));
     put("c.xmp", XMP("", ""));
-    const struct transforms_frame *frame = check(0, 1, "b.jpg");
+    const struct frame *frame = check(0, 1, "b.jpg");
     struct camera camera;
     struct error err = {.message = ""};
-    CHECK(transforms_camera(frame, 160, 120, (double[3]){0}, &camera, &err) == STATUS_OK);
+    CHECK(frame_camera(frame, 160, 120, (double[3]){0}, &camera, &err) == STATUS_OK);
     CHECK_NEAR(camera.fx, 104, 1e-4);
     CHECK_NEAR(camera.cx, 81, 1e-4);
     CHECK_NEAR(camera.cy, 62, 1e-4);
@@ -320,7 +319,7 @@ static void test_arkitscenes(void) {
 }
 
 static void test_tum(void) {
-    const struct transforms *t = &rig.t;
+    const struct frames *t = &rig.t;
     source_rig_start(&rig, "TUM RGB-D");
     put("rgb.txt",
         "# color images\n# file: 'rgbd_dataset_freiburg2_desk.bag'\n# timestamp filename\n1.00 rgb/1.00.png\n"
@@ -357,7 +356,7 @@ static void test_matterport(void) {
     put("v1/scans/17D/matterport_camera_intrinsics/ab12_intrinsics_1.txt",
         "1280 1024 1075 1076 629 522 0.1 0 0.01 0.02 0.3");
     put("v1/scans/17D/matterport_color_images/ab12_i1_4.jpg", "");
-    const struct transforms_frame *frame = check(0, 1, "v1/scans/17D/matterport_color_images/ab12_i1_4.jpg");
+    const struct frame *frame = check(0, 1, "v1/scans/17D/matterport_color_images/ab12_i1_4.jpg");
     check_lens(&frame->lens, 1075, 629, 522, 0.1, 0.01, 0.02);
     CHECK(frame->lens.k[2] == 0.3 && frame->lens.height == 1024.0);
     put("v1/scans/17D/matterport_camera_intrinsics/ab12_intrinsics_1.txt", "1280 1024");

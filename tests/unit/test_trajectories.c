@@ -10,7 +10,7 @@ static struct source_rig rig;
 static void put(const char *name, const char *text) { source_rig_put(&rig, name, text); }
 static void refused(const char *part) { source_rig_refused(&rig, part); }
 
-static void check_pose(const struct transforms_frame *frame) {
+static void check_pose(const struct frame *frame) {
     const double *at = frame->world_from_camera.translation;
     CHECK(at[0] == 0.5 && at[1] == 1.5 && at[2] == -2.5);
     CHECK_NEAR(frame->world_from_camera.rotation[1][2], -1.0, 1e-6);
@@ -18,7 +18,7 @@ static void check_pose(const struct transforms_frame *frame) {
 }
 
 static void test_replica(void) {
-    const struct transforms *t = &rig.t;
+    const struct frames *t = &rig.t;
     source_rig_start(&rig, "NICE-SLAM's Replica");
     CHECK(!source_rig_read(&rig));
     put("traj.txt", POSE "\n\n" LOST "\r\n" POSE);
@@ -45,7 +45,7 @@ static void test_replica(void) {
     refused("line 1: ");
     struct buf many;
     buf_init(&many, 1 << 22);
-    for (int i = 0; i <= TRANSFORMS_MAX_FRAMES; i++)
+    for (int i = 0; i <= FRAMES_MAX; i++)
         buf_puts(&many, POSE "\n");
     put("traj.txt", buf_text(&many));
     refused("\"traj.txt\",\"reason\":\"has more than 20000 frames\"");
@@ -60,7 +60,7 @@ static void test_replica(void) {
 }
 
 static void test_scannet(void) {
-    const struct transforms *t = &rig.t;
+    const struct frames *t = &rig.t;
     source_rig_start(&rig, "ScanNet");
     put("intrinsic/intrinsic_color.txt", "1170 0 647.5 0\n0 1171 483.5 0\n0 0 1 0\n0 0 0 1\n");
     put("pose/10.txt", POSE);

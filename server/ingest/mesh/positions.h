@@ -2,7 +2,7 @@
  *
  * Everything behind ingest computes in single precision, whose step at a coordinate x is up to 2^-23 x: 0.07 m in a
  * map's grid at 600 km, 0.5 m at 5000 km. So a mesh that lies far from the origin of its file is moved: its
- * positions, and the cameras' (transforms_camera), are relative to an offset, which struct mesh keeps and outputs
+ * positions, and the cameras' (frame_camera), are relative to an offset, which struct mesh keeps and outputs
  * carry. Axis by axis, the offset is
  *
  *   0        where the step at the farthest coordinate of a surface is at most POSITIONS_STEP_M (up to 839 m), or the

@@ -108,7 +108,7 @@ static enum status read_view(struct alice_file *file, const cJSON *view, struct 
     return status == STATUS_OK ? frame_list_add(list, m, &lens, path, path, NULL, err) : status;
 }
 
-static enum status read(const struct source_place *place, struct transforms *t, struct findings *f, struct error *err) {
+static enum status read(const struct source_place *place, struct frames *t, struct findings *f, struct error *err) {
     struct frame_list list = frame_list_make(t, place->found, AXES_OPENCV, f);
     struct error own;
     const cJSON *view;

@@ -83,7 +83,7 @@ static enum status read_photograph(const struct source_place *place, const char 
     return status;
 }
 
-static enum status read(const struct source_place *place, struct transforms *t, struct findings *f, struct error *err) {
+static enum status read(const struct source_place *place, struct frames *t, struct findings *f, struct error *err) {
     struct frame_list list = frame_list_make(t, place->found, AXES_OPENCV_INVERSE, f);
     struct pose_track track = {0};
     struct error own;

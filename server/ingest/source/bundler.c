@@ -71,7 +71,7 @@ static enum status read_cameras(const char *text, const char *names, struct fram
     enum status status = STATUS_OK;
     while (*text == '#')
         text += strcspn(text, "\n"), text += *text == '\n';
-    if (!take(&text, 2, counts) || !(counts[0] >= 0.0 && counts[0] <= TRANSFORMS_MAX_FRAMES))
+    if (!take(&text, 2, counts) || !(counts[0] >= 0.0 && counts[0] <= FRAMES_MAX))
         return error_set(err, STATUS_INPUT, "%s: expected the numbers of cameras and of points", list->name);
     for (size_t i = 0; i < (size_t)counts[0] && status == STATUS_OK; i++) {
         char *line = line_take(&names);
@@ -93,7 +93,7 @@ static enum status read_cameras(const char *text, const char *names, struct fram
     return status;
 }
 
-static enum status read(const struct source_place *place, struct transforms *t, struct findings *f, struct error *err) {
+static enum status read(const struct source_place *place, struct frames *t, struct findings *f, struct error *err) {
     struct frame_list list = frame_list_make(t, place->found, AXES_OPENGL_INVERSE, f);
     struct mapping file;
     struct error own;

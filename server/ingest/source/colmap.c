@@ -115,7 +115,7 @@ static enum status read_images_text(struct colmap_cursor *r, struct images *in) 
 }
 
 enum status colmap_images_parse(const void *data, size_t size, const char *name, bool binary,
-                                const struct colmap_cameras *cameras, const char *prefix, struct transforms *t,
+                                const struct colmap_cameras *cameras, const char *prefix, struct frames *t,
                                 struct findings *f, struct error *err) {
     struct colmap_cursor r = {.name = name, .data = data, .size = size, .err = err};
     struct images in = {.cameras = cameras, .prefix = prefix};
@@ -181,7 +181,7 @@ static char *workspace_of(const char *images, const char *base) {
 }
 
 /* Reads one model; *found_count: how many of its photographs are there. */
-static enum status read_model(const struct source_place *place, const char *images, struct transforms *t,
+static enum status read_model(const struct source_place *place, const char *images, struct frames *t,
                               size_t *found_count, struct findings *f, struct error *err) {
     const struct listing *l = place->listing;
     bool binary = strcmp(path_extension(images), "bin") == 0;
@@ -189,7 +189,7 @@ static enum status read_model(const struct source_place *place, const char *imag
     struct colmap_cameras *found = NULL;
     struct mapping file;
     struct error own = {0};
-    *t = (struct transforms){.axes = AXES_OPENCV_INVERSE};
+    *t = (struct frames){.axes = AXES_OPENCV_INVERSE};
     *found_count = 0;
     enum status status = listing_open(l, cameras, "a file of cameras", &file, &own);
     if (status == STATUS_OK) {
@@ -221,7 +221,7 @@ static enum status choose_model(const struct source_place *place, char **chosen,
     *chosen = mem_strdup(place->found);
     while (status == STATUS_OK && (file = next_model(place->listing, place->base, &pattern, &at)) != NULL) {
         struct findings own = {.problems = cJSON_CreateArray()};
-        struct transforms t;
+        struct frames t;
         size_t count;
         status = read_model(place, file->path, &t, &count, &own, err);
         model_count++;
@@ -230,7 +230,7 @@ static enum status choose_model(const struct source_place *place, char **chosen,
             mem_free(*chosen);
             *chosen = mem_strdup(file->path);
         }
-        transforms_release(&t);
+        frames_release(&t);
         cJSON_Delete(own.problems);
         findings_release(&own);
     }
@@ -240,11 +240,11 @@ static enum status choose_model(const struct source_place *place, char **chosen,
     return status;
 }
 
-static enum status read(const struct source_place *place, struct transforms *t, struct findings *f, struct error *err) {
+static enum status read(const struct source_place *place, struct frames *t, struct findings *f, struct error *err) {
     size_t pattern = 0, at = 0, count;
     char *chosen = NULL;
     enum status status = STATUS_OK;
-    *t = (struct transforms){.axes = AXES_OPENCV_INVERSE};
+    *t = (struct frames){.axes = AXES_OPENCV_INVERSE};
     next_model(place->listing, place->base, &pattern, &at);
     if (next_model(place->listing, place->base, &pattern, &at))
         status = choose_model(place, &chosen, f, err);

@@ -72,8 +72,8 @@ static enum status add_camera(const struct colmap_cursor *r, struct colmap_camer
         default: lens.k[model->parameters[i] - '1'] = value[i];
         }
     }
-    if (c->count == TRANSFORMS_MAX_FRAMES)
-        return error_set(r->err, STATUS_INPUT, "%s has more than %d cameras", r->name, TRANSFORMS_MAX_FRAMES);
+    if (c->count == FRAMES_MAX)
+        return error_set(r->err, STATUS_INPUT, "%s has more than %d cameras", r->name, FRAMES_MAX);
     if (c->count == c->capacity) {
         c->capacity = c->capacity ? 2 * c->capacity : 16;
         c->camera = mem_realloc_array(c->camera, c->capacity, sizeof *c->camera);

@@ -10,7 +10,7 @@
 #include <stdint.h>
 
 #include "common/error.h"
-#include "server/ingest/transforms.h"
+#include "server/ingest/frames.h"
 
 struct colmap_cameras; /* opaque */
 

@@ -5,11 +5,11 @@
 #include "common/error.h"
 #include "server/ingest/findings.h"
 #include "server/ingest/source/colmap_cameras.h"
-#include "server/ingest/transforms.h"
+#include "server/ingest/frames.h"
 
 /* Parses an images file in memory. `prefix` is prepended to the photographs' names. */
 enum status colmap_images_parse(const void *data, size_t size, const char *name, bool binary,
-                                const struct colmap_cameras *cameras, const char *prefix, struct transforms *t,
+                                const struct colmap_cameras *cameras, const char *prefix, struct frames *t,
                                 struct findings *f, struct error *err);
 
 #endif

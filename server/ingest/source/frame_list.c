@@ -10,9 +10,9 @@
 
 /* --- frames ----------------------------------------------------------------------------------- */
 
-struct frame_list frame_list_make(struct transforms *t, const char *name, enum matrix_axes axes, struct findings *f) {
+struct frame_list frame_list_make(struct frames *t, const char *name, enum matrix_axes axes, struct findings *f) {
     bool is_opengl = axes == AXES_OPENGL || axes == AXES_OPENGL_INVERSE;
-    *t = (struct transforms){.axes = axes};
+    *t = (struct frames){.axes = axes};
     return (struct frame_list){
         .t = t, .name = name, .axes = is_opengl ? POSE_RIGHT_UP_BACK : POSE_RIGHT_DOWN_FORWARD, .findings = f};
 }
@@ -25,15 +25,15 @@ static bool is_finite(double m[3][4]) {
 }
 
 enum status frame_list_add(struct frame_list *in, double m[3][4], const struct lens *lens, const char *file,
-                           const char *place, struct transforms_frame **frame, struct error *err) {
-    struct transforms *t = in->t;
-    struct transforms_frame made = {.number = t->named_count, .lens = *lens, .exposure_source = EXPOSURE_UNKNOWN};
+                           const char *place, struct frame **frame, struct error *err) {
+    struct frames *t = in->t;
+    struct frame made = {.number = t->named_count, .lens = *lens, .exposure_source = EXPOSURE_UNKNOWN};
     struct error own;
     bool scaled;
     if (frame)
         *frame = NULL;
-    if (t->named_count == TRANSFORMS_MAX_FRAMES)
-        return error_set(err, STATUS_INPUT, "%s has more than %d frames", in->name, TRANSFORMS_MAX_FRAMES);
+    if (t->named_count == FRAMES_MAX)
+        return error_set(err, STATUS_INPUT, "%s has more than %d frames", in->name, FRAMES_MAX);
     t->named_count++;
     if (in->may_be_lost && !is_finite(m)) {
         in->lost_count++;
@@ -65,12 +65,12 @@ void frame_list_finish(const struct frame_list *in) {
 }
 
 static int by_file(const void *a, const void *b) {
-    const struct transforms_frame *x = a, *y = b;
+    const struct frame *x = a, *y = b;
     int order = strcmp(x->file, y->file);
     return order ? order : (x->number > y->number) - (x->number < y->number);
 }
 
-void frame_list_sort(struct transforms *t) {
+void frame_list_sort(struct frames *t) {
     if (t->frame_count > 1)
         qsort(t->frame, t->frame_count, sizeof *t->frame, by_file);
 }

@@ -6,25 +6,25 @@
 #include "server/ingest/source/source.h"
 
 struct frame_list {
-    struct transforms *t; /* receives the frames */
-    const char *name;     /* of the file, for messages */
-    enum pose_axes axes;  /* of the matrices */
+    struct frames *t;    /* receives the frames */
+    const char *name;    /* of the file, for messages */
+    enum pose_axes axes; /* of the matrices */
     struct findings *findings;
     bool may_be_lost; /* a matrix that is not finite stands for lost tracking, and is no fault */
     size_t capacity, lost_count;
 };
 
 /* The list for a file of camera-to-world matrices; empties *t. */
-struct frame_list frame_list_make(struct transforms *t, const char *name, enum matrix_axes axes, struct findings *f);
+struct frame_list frame_list_make(struct frames *t, const char *name, enum matrix_axes axes, struct findings *f);
 /* Adds a frame with the camera-to-world matrix m[3][4] and photograph `file`, which is copied: as the tool wrote it,
  * cleaned by path_clean_foreign; photo_folder_settle then finds the files. A name that is none or a matrix that is no pose
  * is a problem that names `place`; a lost pose is counted. The new frame, borrowed until the next call, or NULL. STATUS_INPUT: too many. */
 enum status frame_list_add(struct frame_list *in, double m[3][4], const struct lens *lens, const char *file,
-                           const char *place, struct transforms_frame **frame, struct error *err);
+                           const char *place, struct frame **frame, struct error *err);
 /* Warns of what was counted. */
 void frame_list_finish(const struct frame_list *in);
 /* Sorts by the photographs' paths, for files that have them in no order. */
-void frame_list_sort(struct transforms *t);
+void frame_list_sort(struct frames *t);
 
 /* A lens without distortion; width and height may be NAN (unknown). cx and cy with pixel centres at .5. */
 struct lens lens_pinhole(double width, double height, double fx, double fy, double cx, double cy);

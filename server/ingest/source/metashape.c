@@ -135,7 +135,7 @@ static enum status read_cameras(struct xml_node *chunk, struct xml_node *parent,
     return status;
 }
 
-static enum status read(const struct source_place *place, struct transforms *t, struct findings *f, struct error *err) {
+static enum status read(const struct source_place *place, struct frames *t, struct findings *f, struct error *err) {
     struct frame_list list = frame_list_make(t, place->found, AXES_OPENCV, f);
     struct mapping file;
     struct error own;

@@ -31,7 +31,7 @@ static char *recognise(const struct listing *l, const char *base) {
     return file && has_frames ? mem_strdup(file->path) : NULL;
 }
 
-static enum status parse(const char *text, const char *name, const struct lens *lens, struct transforms *t,
+static enum status parse(const char *text, const char *name, const struct lens *lens, struct frames *t,
                          struct findings *f, struct error *err) {
     struct frame_list list = frame_list_make(t, name, AXES_OPENCV, f);
     list.may_be_lost = true;
@@ -90,13 +90,13 @@ static const struct lens replica_lens = {.model = CAMERA_OPENCV,
                                          .angle_x = NAN,
                                          .angle_y = NAN};
 
-static enum status read(const struct source_place *place, struct transforms *t, struct findings *f, struct error *err) {
+static enum status read(const struct source_place *place, struct frames *t, struct findings *f, struct error *err) {
     struct lens lens = replica_lens;
     struct mapping file;
     struct error own;
     enum status status = STATUS_OK;
     char *parameters = find_parameters(place->listing, place->base);
-    *t = (struct transforms){.axes = AXES_OPENCV};
+    *t = (struct frames){.axes = AXES_OPENCV};
     if (parameters)
         status = read_parameters(place->listing, parameters, &lens, &own);
     else

@@ -89,7 +89,7 @@ static enum status read_view(struct mvg_file *in, const cJSON *view, struct fram
     return status;
 }
 
-static enum status read(const struct source_place *place, struct transforms *t, struct findings *f, struct error *err) {
+static enum status read(const struct source_place *place, struct frames *t, struct findings *f, struct error *err) {
     struct frame_list list = frame_list_make(t, place->found, AXES_OPENCV_INVERSE, f);
     struct error own;
     const cJSON *view;

@@ -100,7 +100,7 @@ static void warn_of_georeference(const struct source_place *place, struct findin
                          place->found);
 }
 
-static enum status read(const struct source_place *place, struct transforms *t, struct findings *f, struct error *err) {
+static enum status read(const struct source_place *place, struct frames *t, struct findings *f, struct error *err) {
     struct frame_list list = frame_list_make(t, place->found, AXES_OPENCV_INVERSE, f);
     struct error own;
     cJSON *tree;

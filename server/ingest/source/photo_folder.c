@@ -132,7 +132,7 @@ struct choice {
 
 /* Names of the frames' photographs or masks, which NULL stands for where a frame has none. */
 struct names {
-    const struct transforms *t;
+    const struct frames *t;
     bool are_masks;
 };
 
@@ -231,7 +231,7 @@ static char *settle_name(const struct pictures *in, const struct choice *choice,
     return meant.file ? mem_strdup(meant.file->path) : mem_printf("%s%s", base, named);
 }
 
-size_t photo_folder_settle(const struct listing *l, const char *base, bool tells_unposed, struct transforms *t,
+size_t photo_folder_settle(const struct listing *l, const char *base, bool tells_unposed, struct frames *t,
                            struct findings *f) {
     struct pictures in = find_pictures(l);
     const struct names names = {t, false};
@@ -258,7 +258,7 @@ size_t photo_folder_settle(const struct listing *l, const char *base, bool tells
 static int by_text(const void *a, const void *b) { return strcmp(*(char *const *)a, *(char *const *)b); }
 
 /* Leaves out the frames' photographs: where masks are missing, photographs of the same names must not stand for them. */
-static void drop_photographs(struct pictures *in, const struct transforms *t) {
+static void drop_photographs(struct pictures *in, const struct frames *t) {
     const char **path = mem_array(t->frame_count, sizeof *path);
     size_t kept = 0;
     for (size_t i = 0; i < t->frame_count; i++)
@@ -273,7 +273,7 @@ static void drop_photographs(struct pictures *in, const struct transforms *t) {
     mem_free(path);
 }
 
-void photo_folder_settle_masks(const struct listing *l, const char *base, struct transforms *t, struct findings *f) {
+void photo_folder_settle_masks(const struct listing *l, const char *base, struct frames *t, struct findings *f) {
     const struct names names = {t, true};
     const char *first = NULL;
     for (size_t i = 0; i < t->frame_count && !first; i++)

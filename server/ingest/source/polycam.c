@@ -80,7 +80,7 @@ static enum status read_frame(const struct source_place *place, const char *path
     return status;
 }
 
-static enum status read(const struct source_place *place, struct transforms *t, struct findings *f, struct error *err) {
+static enum status read(const struct source_place *place, struct frames *t, struct findings *f, struct error *err) {
     struct frame_list list = frame_list_make(t, place->found, AXES_OPENGL, f);
     struct error own;
     double alignment[4][4];

@@ -115,7 +115,7 @@ static enum status read_row(char *line, size_t number, const struct rc_columns *
     return frame_list_add(list, m, &lens, cell[table->place[NAME]], place, NULL, err);
 }
 
-static enum status read_table(const struct source_place *place, struct transforms *t, struct findings *f,
+static enum status read_table(const struct source_place *place, struct frames *t, struct findings *f,
                               struct error *err) {
     struct frame_list list = frame_list_make(t, place->found, AXES_OPENGL, f);
     struct rc_columns table;
@@ -206,8 +206,7 @@ static enum status read_xmp_file(const struct source_place *place, const char *p
     return findings_settle(list->findings, path, status, &own, err);
 }
 
-static enum status read_xmp(const struct source_place *place, struct transforms *t, struct findings *f,
-                            struct error *err) {
+static enum status read_xmp(const struct source_place *place, struct frames *t, struct findings *f, struct error *err) {
     struct frame_list list = frame_list_make(t, place->found, AXES_OPENCV_INVERSE, f);
     struct error own;
     const struct listed_file *file;

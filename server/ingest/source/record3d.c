@@ -55,7 +55,7 @@ static enum status read_frames(const cJSON *tree, const char *folder, struct fra
     return STATUS_OK;
 }
 
-static enum status read(const struct source_place *place, struct transforms *t, struct findings *f, struct error *err) {
+static enum status read(const struct source_place *place, struct frames *t, struct findings *f, struct error *err) {
     struct frame_list list = frame_list_make(t, place->found, AXES_OPENGL, f);
     struct error own;
     cJSON *tree;

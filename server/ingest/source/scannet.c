@@ -61,7 +61,7 @@ static enum status read_pose(const struct source_place *place, long number, cons
     return status;
 }
 
-static enum status read(const struct source_place *place, struct transforms *t, struct findings *f, struct error *err) {
+static enum status read(const struct source_place *place, struct frames *t, struct findings *f, struct error *err) {
     double k[4][4];
     struct error own;
     long *number;

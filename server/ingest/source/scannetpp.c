@@ -23,7 +23,7 @@ static char *recognise(const struct listing *l, const char *base) {
 }
 
 /* Masks are in a folder of their own. Those that were not downloaded are done without. */
-static void settle_masks(const struct source_place *place, struct transforms *t, struct findings *f) {
+static void settle_masks(const struct source_place *place, struct frames *t, struct findings *f) {
     static const char *const folders[] = {"dslr/resized_anon_masks/", "resized_anon_masks/", "masks/", ""};
     size_t absent_count = 0;
     for (size_t i = 0; i < t->frame_count; i++) {
@@ -42,7 +42,7 @@ static void settle_masks(const struct source_place *place, struct transforms *t,
         findings_warning(f, "%zu masks of ScanNet++ are not in the bundle: what they hide is used", absent_count);
 }
 
-static enum status read(const struct source_place *place, struct transforms *t, struct findings *f, struct error *err) {
+static enum status read(const struct source_place *place, struct frames *t, struct findings *f, struct error *err) {
     char *folder = mem_strndup(place->found, (size_t)(path_base(place->found) - place->found));
     enum status status = transforms_file_read(place, place->found, t, f, err);
     settle_masks(place, t, f);

@@ -41,7 +41,7 @@ static enum status read_pose(const struct source_place *place, const char *path,
     return status;
 }
 
-static enum status read(const struct source_place *place, struct transforms *t, struct findings *f, struct error *err) {
+static enum status read(const struct source_place *place, struct frames *t, struct findings *f, struct error *err) {
     struct lens lens = lens_pinhole(640, 480, 525, 525, 320, 240);
     struct frame_list list = frame_list_make(t, place->found, AXES_OPENCV, f);
     struct error own;

@@ -9,7 +9,7 @@
 #include "common/error.h"
 #include "server/ingest/findings.h"
 #include "server/ingest/listing.h"
-#include "server/ingest/transforms.h"
+#include "server/ingest/frames.h"
 
 /* What a source works on. */
 struct source_place {
@@ -25,8 +25,8 @@ struct source {
     char *(*recognise)(const struct listing *l, const char *base);
     /* Reads cameras and poses. Frames name photographs by path from the root, as the file names them: photo_folder.h
      * finds the files. Faults become problems in *f; other statuses than STATUS_OK are failures of the machine. *t is
-     * the caller's (transforms_release) in any case. */
-    enum status (*read)(const struct source_place *place, struct transforms *t, struct findings *f, struct error *err);
+     * the caller's (frames_release) in any case. */
+    enum status (*read)(const struct source_place *place, struct frames *t, struct findings *f, struct error *err);
 };
 
 #endif

@@ -9,6 +9,7 @@
 #include "common/utf8.h"
 #include "server/ingest/path.h"
 #include "server/ingest/source/photo_folder.h"
+#include "server/ingest/transforms.h"
 
 /* UTF-8, or UTF-16 as PowerShell's > writes it. */
 static enum status parse(const struct mapping *file, const char *path, cJSON **tree, struct error *err) {
@@ -20,12 +21,12 @@ static enum status parse(const struct mapping *file, const char *path, cJSON **t
     return status;
 }
 
-enum status transforms_file_read(const struct source_place *place, const char *path, struct transforms *t,
+enum status transforms_file_read(const struct source_place *place, const char *path, struct frames *t,
                                  struct findings *f, struct error *err) {
     struct mapping file;
     struct error own;
     cJSON *tree = NULL;
-    *t = (struct transforms){.axes = AXES_OPENGL};
+    *t = (struct frames){.axes = AXES_OPENGL};
     enum status status = listing_open(place->listing, path, "a list of frames", &file, &own);
     if (status == STATUS_OK && file.size > TRANSFORMS_MAX_BYTES)
         status = error_set(&own, STATUS_LIMIT, "%s is larger than %zu bytes", path, (size_t)TRANSFORMS_MAX_BYTES);
@@ -39,7 +40,7 @@ enum status transforms_file_read(const struct source_place *place, const char *p
     return STATUS_OK;
 }
 
-void transforms_file_rebase(const char *folder, struct transforms *t) {
+void transforms_file_rebase(const char *folder, struct frames *t) {
     char **path[2] = {&t->mesh, &t->point_cloud};
     for (int i = 0; i < 2; i++) {
         char *old = *path[i];
@@ -55,7 +56,7 @@ static char *recognise(const struct listing *l, const char *base) {
     return file ? mem_strdup(file->path) : NULL;
 }
 
-static enum status read(const struct source_place *place, struct transforms *t, struct findings *f, struct error *err) {
+static enum status read(const struct source_place *place, struct frames *t, struct findings *f, struct error *err) {
     char *folder = mem_strndup(place->found, (size_t)(path_base(place->found) - place->found));
     enum status status = transforms_file_read(place, place->found, t, f, err);
     transforms_file_rebase(folder, t);
@@ -75,7 +76,7 @@ static char *recognise_split(const struct listing *l, const char *base) {
 }
 
 /* Moves the frames of `from` behind those of t; frees the rest. */
-static void append(struct transforms *t, struct transforms *from) {
+static void append(struct frames *t, struct frames *from) {
     t->frame = mem_realloc_array(t->frame, t->frame_count + from->frame_count + 1, sizeof *t->frame);
     for (size_t i = 0; i < from->frame_count; i++) {
         from->frame[i].is_test = true;
@@ -85,17 +86,17 @@ static void append(struct transforms *t, struct transforms *from) {
     t->frame_count += from->frame_count;
     t->named_count += from->named_count;
     from->frame_count = 0;
-    transforms_release(from);
+    frames_release(from);
 }
 
 /* Frames without a photograph: BlenderNeRF writes test views without rendering them. */
-static void drop_absent(const struct listing *l, const char *name, struct transforms *t, struct findings *f) {
+static void drop_absent(const struct listing *l, const char *name, struct frames *t, struct findings *f) {
     size_t kept = 0;
     for (size_t i = 0; i < t->frame_count; i++) {
         if (listing_find(l, "", t->frame[i].file))
             t->frame[kept++] = t->frame[i];
         else
-            transforms_frame_release(&t->frame[i]);
+            frame_release(&t->frame[i]);
     }
     if (kept < t->frame_count)
         findings_warning(f, "%s: %zu of its %zu frames have no photograph and were left out", name,
@@ -103,7 +104,7 @@ static void drop_absent(const struct listing *l, const char *name, struct transf
     t->frame_count = kept;
 }
 
-static enum status read_split(const struct source_place *place, struct transforms *t, struct findings *f,
+static enum status read_split(const struct source_place *place, struct frames *t, struct findings *f,
                               struct error *err) {
     static const char *const names[] = {"transforms_val.json", "transforms_test.json"};
     enum status status = transforms_file_read(place, place->found, t, f, err);
@@ -111,7 +112,7 @@ static enum status read_split(const struct source_place *place, struct transform
     photo_folder_settle(place->listing, place->base, false, t, f);
     photo_folder_settle_masks(place->listing, place->base, t, f);
     for (int i = 0; i < 2 && status == STATUS_OK; i++) {
-        struct transforms held_out;
+        struct frames held_out;
         const struct listed_file *file = listing_find(place->listing, place->base, names[i]);
         if (!file)
             continue;

@@ -106,7 +106,7 @@ static enum status read_photographs(const char *list_text, const struct pose_tra
     return status;
 }
 
-static enum status read(const struct source_place *place, struct transforms *t, struct findings *f, struct error *err) {
+static enum status read(const struct source_place *place, struct frames *t, struct findings *f, struct error *err) {
     struct frame_list list = frame_list_make(t, place->found, AXES_OPENCV, f);
     struct pose_track track = {0};
     struct lens lens;
