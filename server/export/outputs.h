@@ -1,9 +1,7 @@
 /* outputs.h -- what a job leaves for its user: textures, previews, the mesh, side-by-sides, the
  * report.
  *
- * Every file is written under a temporary name, synced and renamed, and only then announced: a
- * reader (or a crash) sees the old content or the new and never a part. The same input gives the
- * same bytes.
+ * Every file appears whole (output_files.h). The same input gives the same bytes.
  *
  *   base_color.exr  roughness.exr  specular.exr  emission.exr   half, tiled, ZIP; R G B or Y. The
  *                    values continue EXPORT_MARGIN texels beyond the charts, so that other
@@ -40,11 +38,7 @@
 
 #include "common/error.h"
 #include "server/export/input.h"
-
-/* Called after each file is complete under its final name; `type` is EVENT_PREVIEW or EVENT_OUTPUT, `name` is
- * relative to the folder. A failure ends the export. NULL: no announcements. */
-typedef enum status export_announce(void *user, const char *type, const char *name, const char *content_type,
-                                    struct error *err);
+#include "server/export/output_files.h"
 
 /* Writes what is known by now to preview/ under the folder `dir`, which exists. Needs no report and no comparisons. */
 enum status export_preview(const char *dir, const struct export_input *input, export_announce *announce, void *user,
