@@ -22,10 +22,10 @@
 #include <math.h>
 #include <string.h>
 
-#include "common/mem.h"
 #include "server/render/accel.h"
 #include "server/render/light.h"
 #include "server/render/path_batch.h"
+#include "server/render/path_lights.h"
 #include "server/render/sampler.h"
 #include "server/render/shade.h"
 
@@ -37,65 +37,6 @@
  * equal time by 8 %, and the paths per second by a sixth. */
 #define DERIVATIVE_RR_SCALE 1.25f
 #define BUCKETS 256 /* of the counting sort of shadow rays */
-
-static struct path_batch *batch_new(size_t capacity, int max_depth) {
-    assert(max_depth >= 1 && max_depth <= PATH_MAX_DEPTH);
-    struct path_batch *b = mem_calloc(1, sizeof *b);
-    b->capacity = capacity;
-    b->max_depth = max_depth;
-    b->shade = mem_calloc_large(1, sizeof *b->shade);
-    b->derivative = mem_calloc_large(1, sizeof *b->derivative);
-    b->state = mem_array(capacity, sizeof *b->state);
-    b->ray = mem_array(capacity, sizeof *b->ray);
-    b->shadow_ray = mem_array(capacity, sizeof *b->shadow_ray);
-    b->hit = mem_array(capacity, sizeof *b->hit);
-    b->shadow = mem_array(capacity, sizeof *b->shadow);
-    b->bucket = mem_array(capacity, sizeof *b->bucket);
-    b->sorted_ray = mem_array(capacity, sizeof *b->sorted_ray);
-    b->sorted = mem_array(capacity, sizeof *b->sorted);
-    b->occluded = mem_array(capacity, sizeof *b->occluded);
-    b->key = mem_array(capacity, sizeof *b->key);
-    b->sample = mem_array(capacity, sizeof *b->sample);
-    b->dropped = mem_array(capacity, sizeof *b->dropped);
-    return b;
-}
-
-struct path_batch *path_batch_new(size_t capacity, int max_depth) {
-    struct path_batch *b = batch_new(capacity, max_depth);
-    b->keeps_vertices = true;
-    size_t blocks = (capacity + LANES - 1) / LANES;
-    for (int k = 0; k < max_depth; k++)
-        b->vertex[k] = mem_calloc_large(blocks, sizeof *b->vertex[k]);
-    return b;
-}
-
-struct path_batch *path_batch_new_forward(size_t capacity) {
-    struct path_batch *b = batch_new(capacity, PATH_MAX_DEPTH);
-    b->vertex[0] = mem_calloc_large(1, sizeof *b->vertex[0]);
-    return b;
-}
-
-void path_batch_free(struct path_batch *b) {
-    if (!b)
-        return;
-    for (int k = 0; k < b->max_depth; k++)
-        mem_free(b->vertex[k]);
-    mem_free(b->shade);
-    mem_free(b->derivative);
-    mem_free(b->state);
-    mem_free(b->ray);
-    mem_free(b->shadow_ray);
-    mem_free(b->hit);
-    mem_free(b->shadow);
-    mem_free(b->bucket);
-    mem_free(b->sorted_ray);
-    mem_free(b->sorted);
-    mem_free(b->occluded);
-    mem_free(b->key);
-    mem_free(b->sample);
-    mem_free(b->dropped);
-    mem_free(b);
-}
 
 /* The vertices of a block while it is shaded. */
 static struct vertex_block *block_at(const struct path_batch *b, int depth, size_t block) {
@@ -184,72 +125,6 @@ static void add_emission(const struct vertex_block *v, int count, rgb *radiance)
         rgb emission = lanes3_rgb(&v->emission, i);
         if (!rgb_is_black(emission))
             add(&radiance[v->path[i]], rgb_mul(lanes3_rgb(&v->beta, i), rgb_scale(emission, v->emission_weight[i])));
-    }
-}
-
-/* Looks up the guide row of every lane and prefetches it for shade_pick. */
-static void load_guide_rows(struct shade_block *s, const struct guide *guide) {
-    shade_cells(s, &guide->grid);
-    for (int i = 0; i < LANES; i++) {
-        s->guide_row[i] = guide->row[s->cell[i]];
-        const float *row = guide->cumulative + s->guide_row[i] * guide->stride;
-        for (size_t k = 0; k < guide->stride; k += 64 / sizeof *row)
-            __builtin_prefetch(row + k);
-    }
-}
-
-static void load_light(struct shade_block *s, struct vertex_block *v, int lane, const struct lights *lights) {
-    const struct light_triangle *t = &lights->triangle[s->light[lane]];
-    lanes3_set(&s->light_corner, lane, t->corner);
-    lanes3_set(&s->light_edge1, lane, t->edge1);
-    lanes3_set(&s->light_edge2, lane, t->edge2);
-    lanes3_set_rgb(&s->radiance, lane, t->radiance);
-    if (lights->materials->emission_pattern) {
-        rgb pattern = lights_pattern(lights, t, s->light_u[lane], s->light_v[lane]);
-        lanes3_set_rgb(&v->light_pattern, lane, pattern);
-        lanes3_set_rgb(&s->radiance, lane, rgb_mul(t->radiance, pattern));
-    }
-    s->light_density[lane] = t->density * s->density_factor[lane];
-    v->light_segment[lane] = t->segment;
-}
-
-/* Chooses a light triangle for every lane and loads it; false when the scene has no light. */
-static bool pick_lights(struct shade_block *s, struct vertex_block *v, const struct world *world, int count) {
-    const struct lights *lights = world->lights;
-    if (!(lights->triangles.total > 0.0))
-        return lights_any(lights);
-    if (world->guide) {
-        load_guide_rows(s, world->guide);
-        shade_pick(s, world->guide, lights);
-    }
-    for (int i = 0; i < count; i++) {
-        if (s->pick[i] < lights->environment_chance)
-            continue; /* see sample_environment */
-        if (!world->guide) {
-            s->light[i] = (int32_t)(lights_pick(lights, s->pick[i]) - lights->triangle);
-            s->density_factor[i] = 1.0f;
-        }
-        load_light(s, v, i, lights);
-    }
-    return true;
-}
-
-/* Light samples of the lanes that chose the environment, lane by lane, since they are few. */
-static void sample_environment(struct shade_block *s, struct vertex_block *v, const struct lights *lights, int count) {
-    for (int i = 0; i < count; i++) {
-        if (s->pick[i] >= lights->environment_chance)
-            continue;
-        struct light_sample light;
-        vec3 point = lanes3_get(&s->point, i);
-        lights_sample(lights, point, s->pick[i], s->light_u[i], s->light_v[i], &light);
-        v->light_segment[i] = LIGHT_ENVIRONMENT;
-        s->light[i] = 0;
-        s->light_pdf[i] = light.pdf;
-        lanes3_set(&s->light_direction, i, light.direction);
-        lanes3_set_rgb(&s->radiance, i, light.radiance);
-        lanes3_set(&s->shadow_origin, i, accel_offset(point, lanes3_get(&s->normal, i), light.direction));
-        lanes3_set(&s->shadow_direction, i, light.direction);
-        s->shadow_far[i] = INFINITY;
     }
 }
 
@@ -346,12 +221,12 @@ static void shade(struct path_batch *b, const struct world *world, const struct 
     if (b->keeps_vertices)
         memset(&v->next, 0, sizeof v->next);
     shade_numbers(s, depth);
-    if (pick_lights(s, v, world, count))
+    if (path_lights_pick(s, v, world, count))
         shade_light(s);
     else
         memset(s->light_pdf, 0, sizeof s->light_pdf);
     if (world->lights->environment_chance > 0.0f)
-        sample_environment(s, v, world->lights, count);
+        path_lights_environment(s, v, world->lights, count);
     gather_texels(v, s, texture, count);
     shade_texture(v, s);
     shade_scatter(v, s, roulette_at(settings, depth + 2));

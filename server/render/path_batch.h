@@ -1,5 +1,5 @@
-/* path_batch.h -- the paths of a batch while they are traced and walked backwards: path.c makes them, path_backward.c
- * reads them. Internal to these two. */
+/* path_batch.h -- the paths of a batch while they are traced and walked backwards: path_memory.c makes room for them,
+ * path.c fills it, path_backward.c reads it. Internal to these three. */
 #ifndef UNBAKE_RENDER_PATH_BATCH_H
 #define UNBAKE_RENDER_PATH_BATCH_H
 
