@@ -16,8 +16,7 @@
 
 #include "common/image.h"
 #include "common/json.h"
-#include "common/parallel.h"
-#include "server/capture/views.h"
+#include "common/vec.h"
 
 /* Bounds of the map's width, pixels; by hand. */
 #define ENVIRONMENT_MIN_WIDTH 64   /* +25 %: no change */
@@ -37,11 +36,8 @@ struct environment {
     double seen_luminance, luminance; /* means over what was seen and over the sphere */
 };
 
-/* The map has about the angular resolution of the photographs: its width is the largest power of two up to 2 pi x the
- * median focal length in pixels, within the limits above. Exposures must be known. *e is to be released in any case.
- * False when no photograph has open pixels. The same for any number of threads. */
-bool environment_make(struct environment *e, const struct views *views, struct parallel *pool);
-/* A black map of the least width of which nothing was seen. */
+/* A black map of `width` x `width` / 2 of which nothing was seen, and one of the least width. */
+void environment_make_empty(struct environment *e, uint32_t width);
 void environment_make_unseen(struct environment *e);
 void environment_release(struct environment *e);
 
@@ -53,6 +49,9 @@ bool environment_is_seen(const struct environment *e, vec3 direction);
 
 /* Whether its radiance is measured: a photograph shows it and is not saturated there. */
 bool environment_is_measured(const struct environment *e, vec3 direction);
+
+/* Solid angle of a cell in a row. */
+double environment_cell_angle(const struct environment *e, size_t row);
 
 /* Unit direction of the centre of a pixel of the map. */
 vec3 environment_direction(const struct environment *e, size_t column, size_t row);

@@ -8,6 +8,7 @@
 #include "common/mem.h"
 #include "common/protocol.h"
 #include "server/capture/clip.h"
+#include "server/capture/environment_gather.h"
 #include "server/capture/fireflies.h"
 #include "server/capture/orient.h"
 #include "server/capture/radiance_preview.h"
@@ -301,7 +302,7 @@ static enum status prepare(struct stage_run *run, struct error *err) {
     noise_set_black(&r->noise, r->scene);
     clip_mark(r->scene, &run->views, &r->noise, r->pool);
     fireflies_mark(r->scene, &run->views, &r->noise, r->pool);
-    environment_make(&r->environment, &run->views, r->pool);
+    environment_gather(&r->environment, &run->views, r->pool);
     light_by_environment(r);
     prepare_advance(run, CALIBRATE_SHARE);
     status = remap_surface(run, split_bright_parts(run), err);

@@ -52,7 +52,7 @@ static inline vec3 look_out_often(int frame) {
     return frame % 2 ? anywhere : (vec3){0.8f + 0.6f * anywhere.x, 0.8f + 0.5f * anywhere.y, -0.5f};
 }
 
-/* What environment_make needs of a scene. */
+/* What environment_gather needs of a scene. */
 struct rig {
     struct scene *scene;
     struct segments segments;
