@@ -76,9 +76,9 @@ static const struct config_option table[] = {
     INT(user_pledge_percent, "%", 0, 100, "50",
         "Share of the free space that one user's unfinished uploads may hold before they arrive; more is refused with 507. 0: all."),
     INT(user_max_uploads, "uploads", 0, 10000, "50",
-        "Unfinished uploads of one user; more are refused with 429. 0: no limit."),
+        "Unfinished uploads of one user, in parts or in one request; more are refused with 429. 0: no limit."),
     INT(user_max_checks, "scenes", 0, 10000, "50",
-        "Scenes of one user that wait to be checked; more uploads are refused with 429. 0: no limit."),
+        "Scenes of one user that wait to be checked, unfinished uploads included; more are refused with 429. 0: no limit."),
     REAL(
         upload_start_minutes, "min", 0.001, 1440, "10",
         "Time for which an upload holds space for what is still to come while nothing of it arrives; one without a byte is removed then."),

@@ -51,6 +51,7 @@ struct api_config {
 struct hub;            /* events/hub.h */
 struct digests;        /* uploads/digests.h */
 struct resumables;     /* uploads/resumable.h */
+struct arrivals;       /* uploads/upload.h */
 struct listener;       /* transport/listener.h */
 struct request_counts; /* request_counts.h */
 struct auth_throttle;  /* auth_throttle.h */
@@ -65,6 +66,7 @@ struct api {
     struct hub *hub;
     struct digests *digests;
     struct resumables *resumables;
+    struct arrivals *arrivals;
     struct readiness *readiness;
     struct listener *listener; /* NULL before it listens; for metrics */
     struct request_counts *request_counts;

@@ -7,6 +7,7 @@
 #include "common/file.h"
 #include "common/mem.h"
 #include "server/transport/problem.h"
+#include "server/uploads/upload.h"
 
 #define ADMIN_STREAMS 10 /* one stream in ten is kept for admins */
 
@@ -22,6 +23,25 @@ static struct response *refuse(const struct request *r, int status, const char *
     return reply;
 }
 
+/* Uploads under way: in parts, and in one request each. */
+static enum status count_uploads(struct api *api, const struct request *r, size_t *count, struct error *err) {
+    enum status status = store_user_uploads(api->store, r->caller.user_id, count, err);
+    *count += arrivals_of(api->arrivals, r->caller.user_id, NULL).count;
+    return status;
+}
+
+static struct response *check_count(struct api *api, const struct request *r) {
+    size_t uploads = 0, most = api->config.user_max_uploads;
+    struct error err;
+    if (most > 0 && count_uploads(api, r, &uploads, &err) != STATUS_OK)
+        return problem_from(r, &err);
+    if (most > 0 && uploads >= most)
+        return refuse(
+            r, 429, "user_max_uploads", "finish or remove some",
+            mem_printf("%zu of your uploads are under way already, and one user may have %zu", uploads, most));
+    return NULL;
+}
+
 static struct response *check_pledge(struct api *api, const struct request *r, uint64_t bytes) {
     uint64_t room, pledged, keep = api->config.min_free_bytes + api->config.admin_free_bytes;
     struct error err;
@@ -31,6 +51,7 @@ static struct response *check_pledge(struct api *api, const struct request *r, u
         store_user_pledged(api->store, r->caller.user_id, clock_unix_ms() - api->config.empty_upload_ms, &pledged,
                            &err) != STATUS_OK)
         return problem_from(r, &err);
+    pledged += arrivals_of(api->arrivals, r->caller.user_id, NULL).pledged;
     /* Pledged bytes are allocated already: they are no longer free. */
     uint64_t share = ((room > keep ? room - keep : 0) + pledged) / 100 * api->config.user_pledge_percent;
     if (pledged + bytes <= share)
@@ -44,22 +65,29 @@ static struct response *check_pledge(struct api *api, const struct request *r, u
 }
 
 struct response *limits_check_checks(struct api *api, const struct request *r) {
-    size_t checks, most = api->config.user_max_checks;
+    size_t checks, uploads, most = api->config.user_max_checks;
     struct error err;
-    if (!limits_bind(r))
+    if (!limits_bind(r) || most == 0)
         return NULL;
-    if (most > 0 && store_user_checks(api->store, r->caller.user_id, &checks, &err) != STATUS_OK)
+    if (store_user_checks(api->store, r->caller.user_id, &checks, &err) != STATUS_OK ||
+        count_uploads(api, r, &uploads, &err) != STATUS_OK)
         return problem_from(r, &err);
-    if (most > 0 && checks >= most)
-        return refuse(
-            r, 429, "user_max_checks", "wait until some of them are checked",
-            mem_printf("%zu of your scenes wait to be checked already; the limit of one user is %zu", checks, most));
-    return NULL;
+    if (checks + uploads < most)
+        return NULL;
+    return refuse(
+        r, 429, "user_max_checks", "finish or remove uploads, and wait until scenes are checked",
+        mem_printf("%zu of your scenes wait to be checked already, and %zu uploads are under way; the limit of"
+                   " one user is %zu together",
+                   checks, uploads, most));
 }
 
 struct response *limits_check_upload(struct api *api, const struct request *r, uint64_t bytes) {
-    struct response *refusal = limits_check_checks(api, r);
-    return refusal || !limits_bind(r) ? refusal : check_pledge(api, r, bytes);
+    if (!limits_bind(r))
+        return NULL;
+    struct response *refusal = check_count(api, r);
+    if (!refusal)
+        refusal = limits_check_checks(api, r);
+    return refusal ? refusal : check_pledge(api, r, bytes);
 }
 
 struct hub_limits limits_of_streams(const struct api *api, const struct request *r) {

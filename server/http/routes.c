@@ -241,7 +241,9 @@ struct response *routes_data(struct api *api, struct request *r, const void *dat
 }
 
 struct response *routes_finish(struct api *api, struct request *r) {
-    return answer(r, r->route->handle(api, r));
+    struct response *reply = answer(r, r->route->handle(api, r));
+    routes_drop_body(r); /* before the reply: limits must not count it against the next request */
+    return reply;
 }
 
 void routes_drop_body(struct request *r) {

@@ -20,7 +20,7 @@ struct response *routes_find(struct request *r);
 struct response *routes_begin(struct api *api, struct request *r);
 struct response *routes_data(struct api *api, struct request *r, const void *data, size_t length);
 struct response *routes_finish(struct api *api, struct request *r);
-/* Drops what has arrived of the body, on disk too: the request was refused, or is over. */
+/* Drops what has arrived of the body, on disk too: the request was refused or answered, or has broken off. */
 void routes_drop_body(struct request *r);
 
 #endif

@@ -38,14 +38,18 @@ struct response *scene_body_begin(struct api *api, struct request *r) {
     struct response *refusal = check_request(r);
     if (!refusal)
         mem_free(scene_reading_query(r, &refusal));
-    if (!refusal)
-        refusal = limits_check_upload(api, r, length);
+    if (refusal)
+        return refusal;
+    pthread_mutex_lock(&api->folder.scene_mutex); /* two at once would both find room */
+    refusal = limits_check_upload(api, r, length);
     if (!refusal)
         refusal = space_check_room(api, r, length);
     if (!refusal)
         refusal = space_check_share(api, r, NULL, length);
-    if (!refusal && upload_new(&r->upload, api->folder.dir, length, &err) != STATUS_OK)
+    if (!refusal &&
+        upload_new(&r->upload, api->arrivals, r->caller.user_id, api->folder.dir, length, &err) != STATUS_OK)
         refusal = problem_from(r, &err);
+    pthread_mutex_unlock(&api->folder.scene_mutex);
     return refusal;
 }
 

@@ -152,10 +152,12 @@ struct response *scenes_patch(struct api *api, struct request *r) {
         reply = problem_full(r, 412, "the scene is not as If-Match says", "GET it and try again", NULL);
     if (!reply)
         read_patch(r, &body, &patch, &reading, &reply);
+    pthread_mutex_lock(&api->folder.scene_mutex); /* two at once would both find the limit unreached */
     if (!reply && reading && row.state != SCENE_CHECKING)
         reply = limits_check_checks(api, r);
     if (!reply && store_scene_patch(api->store, &r->caller, row.id, &patch, &err) != STATUS_OK)
         reply = problem_from(r, &err);
+    pthread_mutex_unlock(&api->folder.scene_mutex);
     if (!reply && reading)
         scheduler_wake(api->scheduler);
     mem_free(reading);

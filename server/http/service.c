@@ -10,6 +10,7 @@
 #include "server/http/routes.h"
 #include "server/uploads/digests.h"
 #include "server/uploads/resumable.h"
+#include "server/uploads/upload.h"
 
 static void renew_reserve(void *store) { store_reserve_renew(store); }
 
@@ -46,6 +47,7 @@ enum status service_new(struct api **out, const struct api_config *config, struc
     api->scheduler = scheduler;
     api->request_counts = request_counts_new();
     api->auth_throttle = auth_throttle_new();
+    api->arrivals = arrivals_new();
     api->hub = hub_new(config->keepalive_sec);
     *out = api;
     enum status status = store_keep(store, config->scene_keep_ms, config->job_keep_ms, config->upload_keep_ms, err);
@@ -129,6 +131,7 @@ void service_free(struct api *api) {
     hub_free(api->hub);
     request_counts_free(api->request_counts);
     auth_throttle_free(api->auth_throttle);
+    arrivals_free(api->arrivals);
     digests_free(api->digests);
     readiness_free(api->readiness);
     folder_close(&api->folder);

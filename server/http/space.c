@@ -3,6 +3,7 @@
 
 #include "server/http/limits.h"
 #include "server/transport/problem.h"
+#include "server/uploads/upload.h"
 
 static struct response *refuse(const struct request *r, const struct error *err, enum status if_full) {
     return err->status == if_full ? problem_full(r, 507, err->message, err->hint, NULL) : problem_from(r, err);
@@ -19,7 +20,8 @@ struct response *space_check_room(struct api *api, const struct request *r, uint
 struct response *space_check_share(struct api *api, const struct request *r, const char *but_scene, uint64_t bytes) {
     struct error err;
     const struct share share = {api->config.user_max_bytes, r->caller.user_id, but_scene, 0};
-    if (store_share_check(api->store, &share, bytes, &err) != STATUS_OK)
+    const struct arrivals_sum others = arrivals_of(api->arrivals, r->caller.user_id, r->upload);
+    if (store_share_check(api->store, &share, others.bytes + bytes, &err) != STATUS_OK)
         return refuse(r, &err, STATUS_LIMIT);
     return NULL;
 }

@@ -42,6 +42,16 @@ enum status store_user_pledged(struct store *store, int64_t user_id, int64_t sin
     return status;
 }
 
+enum status store_user_uploads(struct store *store, int64_t user_id, size_t *count, struct error *err) {
+    int64_t found = 0;
+    store_lock(store);
+    enum status status = sql_int(&store->sql, 0, &found, err,
+                                 "SELECT count(*) FROM uploads WHERE owner_id = ? AND scene_id = ''", "i", user_id);
+    store_unlock(store);
+    *count = (size_t)found;
+    return status;
+}
+
 enum status store_user_checks(struct store *store, int64_t user_id, size_t *count, struct error *err) {
     int64_t found = 0;
     store_lock(store);

@@ -230,9 +230,11 @@ enum status store_reconcile(struct store *store, size_t *requeued, struct error 
 enum status store_user_bytes(struct store *store, int64_t user_id, const char *but_scene, int64_t but_job,
                              uint64_t *bytes, struct error *err);
 /* Bytes still to arrive of the user's uploads that were made or received something since since_ms (older ones reserve
- * no space: resumables_maintain); number of the user's scenes that are being checked or waiting for it. */
+ * no space: resumables_maintain); number of the user's unfinished uploads; number of the user's scenes that are being
+ * checked or waiting for it. */
 enum status store_user_pledged(struct store *store, int64_t user_id, int64_t since_ms, uint64_t *bytes,
                                struct error *err);
+enum status store_user_uploads(struct store *store, int64_t user_id, size_t *count, struct error *err);
 enum status store_user_checks(struct store *store, int64_t user_id, size_t *count, struct error *err);
 struct share {
     uint64_t limit_bytes;  /* 0: no limit */

@@ -3,6 +3,8 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <pthread.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <sys/stat.h>
@@ -19,16 +21,84 @@ struct upload {
     int fd;
     char *path; /* NULL once published */
     struct sha256 hash;
-    uint64_t bytes;
+    atomic_ullong bytes; /* that have arrived; arrivals_of reads it from other threads */
     uint64_t step_start; /* where the current step began */
     bool is_reserved;    /* all of its space is allocated */
+    /* Constant while it is listed: */
+    int64_t user_id;
+    uint64_t length; /* 0: unknown */
+    /* Under the arrivals' mutex: */
+    struct arrivals *arrivals; /* NULL: it is not listed */
+    struct upload *next, *previous;
 };
 
-uint64_t upload_bytes(const struct upload *u) { return u->bytes; }
+/* --- all of them -------------------------------------------------------------------------------- */
+
+struct arrivals {
+    pthread_mutex_t mutex;
+    struct upload *first;
+};
+
+struct arrivals *arrivals_new(void) {
+    struct arrivals *a = mem_calloc(1, sizeof *a);
+    pthread_mutex_init(&a->mutex, NULL);
+    return a;
+}
+
+void arrivals_free(struct arrivals *a) {
+    if (a)
+        pthread_mutex_destroy(&a->mutex);
+    mem_free(a);
+}
+
+static void list(struct upload *u, struct arrivals *a) {
+    pthread_mutex_lock(&a->mutex);
+    u->arrivals = a;
+    u->next = a->first;
+    if (u->next)
+        u->next->previous = u;
+    a->first = u;
+    pthread_mutex_unlock(&a->mutex);
+}
+
+static void unlist(struct upload *u) {
+    struct arrivals *a = u->arrivals;
+    if (!a)
+        return;
+    pthread_mutex_lock(&a->mutex);
+    if (u->next)
+        u->next->previous = u->previous;
+    if (u->previous)
+        u->previous->next = u->next;
+    else
+        a->first = u->next;
+    u->arrivals = NULL;
+    pthread_mutex_unlock(&a->mutex);
+}
+
+struct arrivals_sum arrivals_of(struct arrivals *a, int64_t user_id, const struct upload *but) {
+    struct arrivals_sum sum = {0};
+    pthread_mutex_lock(&a->mutex);
+    for (const struct upload *u = a->first; u; u = u->next) {
+        uint64_t bytes = upload_bytes(u);
+        if (u->user_id != user_id || u == but)
+            continue;
+        sum.count++;
+        sum.bytes += u->length > bytes ? u->length : bytes;
+        sum.pledged += u->length > bytes ? u->length - bytes : 0;
+    }
+    pthread_mutex_unlock(&a->mutex);
+    return sum;
+}
+
+/* --- one of them -------------------------------------------------------------------------------- */
+
+uint64_t upload_bytes(const struct upload *u) { return atomic_load(&u->bytes); }
 
 void upload_free(struct upload *u) {
     if (!u)
         return;
+    unlist(u);
     if (u->fd >= 0)
         close(u->fd);
     if (u->path)
@@ -37,8 +107,12 @@ void upload_free(struct upload *u) {
     mem_free(u);
 }
 
-enum status upload_new(struct upload **out, const char *data_dir, uint64_t length, struct error *err) {
+enum status upload_new(struct upload **out, struct arrivals *arrivals, int64_t user_id, const char *data_dir,
+                       uint64_t length, struct error *err) {
     struct upload *u = *out = mem_calloc(1, sizeof *u);
+    u->user_id = user_id;
+    u->length = length;
+    list(u, arrivals);
     sha256_init(&u->hash);
     u->path = layout_upload(data_dir, LAYOUT_RANDOM);
     u->fd = mkostemp(u->path, O_CLOEXEC);
@@ -68,12 +142,12 @@ enum status upload_write(struct upload *u, const void *data, size_t length, bool
     if (status != STATUS_OK)
         return status;
     sha256_update(&u->hash, data, length);
-    u->bytes += length;
-    if (u->bytes - u->step_start < STEP_BYTES)
+    uint64_t bytes = atomic_fetch_add(&u->bytes, length) + length;
+    if (bytes - u->step_start < STEP_BYTES)
         return STATUS_OK;
     /* Only a hint to the kernel; the final sync is what counts. */
-    (void)sync_file_range(u->fd, (off_t)u->step_start, (off_t)(u->bytes - u->step_start), SYNC_FILE_RANGE_WRITE);
-    u->step_start = u->bytes;
+    (void)sync_file_range(u->fd, (off_t)u->step_start, (off_t)(bytes - u->step_start), SYNC_FILE_RANGE_WRITE);
+    u->step_start = bytes;
     *must_check_room = !u->is_reserved;
     return STATUS_OK;
 }
@@ -113,6 +187,7 @@ enum status upload_publish(struct upload *u, const char *data_dir, const char *i
     if (status == STATUS_OK) {
         mem_free(u->path);
         u->path = NULL;
+        unlist(u); /* from here on it counts as a scene */
     }
     return status;
 }

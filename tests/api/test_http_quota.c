@@ -5,6 +5,7 @@
 #include "common/clock.h"
 #include "server/data/collector.h"
 #include "server/uploads/resumable.h"
+#include "server/uploads/upload.h"
 #include "server/uploads/upload_session.h"
 #include "tests/api/rig.h"
 
@@ -72,7 +73,84 @@ static void test_pledges(void) {
         rig_must(store_upload_delete(rig.store, id[i], &err), &err, "store_upload_delete");
 }
 
+/* Begins an upload in one request, of so many bytes, and waits for its admission or refusal; the connection. */
+static int begin(uint64_t bytes) {
+    char *text = mem_printf("POST /v1/scenes HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer %s\r\n"
+                            "Expect: 100-continue\r\nContent-Length: %llu\r\n\r\n",
+                            anna, (unsigned long long)bytes);
+    int fd = rig_connect(&rig);
+    rig_send(fd, text, strlen(text));
+    mem_free(text);
+    return fd;
+}
+
+/* 100 where it was admitted, else the refusal's status; `option` is named by a refusal. */
+static int answer_to(int fd, const char *option) {
+    struct buf reply;
+    buf_init(&reply, 1 << 20);
+    rig_receive(fd, &reply, "\r\n\r\n");
+    int status = rig_status(&reply);
+    if (status != 100 && !strstr(buf_text(&reply), option))
+        rig_receive(fd, &reply, option);
+    buf_release(&reply);
+    return status;
+}
+
+/* Waits until none is under way in one request: the daemon has seen that they were cut off. */
+static void await_no_arrivals(void) {
+    while (arrivals_of(rig.api->arrivals, anna_id, NULL).count > 0)
+        usleep(1000);
+}
+
+/* What comes in one request counts from its admission, too: of a burst as many are admitted as may be under way, and what
+ * they are to hold is pledged, kept and to be checked. */
+static void test_arrivals(void) {
+    enum { MOST = 3, BURST = 12 };
+    int fds[BURST], admitted = 0, refused = 0;
+    char id[33];
+    struct buf reply;
+    uint64_t room;
+    rig_must(file_free_bytes(rig.dir, &room, &err), &err, "file_free_bytes");
+    rig.api->config.max_upload_bytes = INT64_MAX;
+    rig.api->config.user_max_uploads = MOST;
+    for (int i = 0; i < BURST; i++)
+        fds[i] = begin(1000);
+    for (int i = 0; i < BURST; i++) {
+        int status = answer_to(fds[i], "user_max_uploads");
+        admitted += status == 100;
+        refused += status == 429;
+    }
+    CHECK_THAT(admitted == MOST && refused == BURST - MOST, "%d were admitted, %d refused", admitted, refused);
+    expect(anna, 1000, 429, "user_max_uploads");
+    expect(chief, 1000, 201, "");
+    for (int i = 0; i < BURST; i++)
+        close(fds[i]);
+    await_no_arrivals();
+    rig.api->config.user_max_uploads = 0;
+
+    fds[0] = begin(room / 1000 * 6);
+    rig.api->config.user_pledge_percent = 1;
+    CHECK(answer_to(fds[0], "user_pledge_percent") == 100);
+    fds[1] = begin(room / 1000 * 6);
+    CHECK(answer_to(fds[1], "user_pledge_percent") == 507);
+    expect(anna, room / 1000 * 6, 507, "user_pledge_percent");
+    rig.api->config.user_pledge_percent = 0;
+    rig.api->config.user_max_bytes = room / 1000 * 10;
+    CHECK(create(anna, room / 1000 * 6, id, &reply) == 507 && strstr(buf_text(&reply), "a user may keep"));
+    buf_release(&reply);
+    rig.api->config.user_max_bytes = 0;
+    rig.api->config.user_max_checks = 1;
+    expect(anna, 1000, 429, "user_max_checks");
+    rig.api->config.user_max_checks = 0;
+    close(fds[0]);
+    close(fds[1]);
+    await_no_arrivals();
+    expect(anna, 1000, 201, "");
+}
+
 static void test_checks(int64_t user) {
+    char id[33];
+    struct buf reply;
     bool existed;
     rig.api->config.user_max_checks = 1;
     expect(anna, 1000, 201, "");
@@ -80,7 +158,12 @@ static void test_checks(int64_t user) {
     expect(anna, 1000, 429, "user_max_checks");
     expect(chief, 1000, 201, "");
     rig_must(store_scene_ready(rig.store, RIG_SCENE, NULL, "{}", &err), &err, "store_scene_ready");
+    CHECK(create(anna, 1000, id, &reply) == 201); /* which becomes a scene to check */
+    buf_release(&reply);
+    expect(anna, 1000, 429, "user_max_checks");
+    rig_must(store_upload_delete(rig.store, id, &err), &err, "store_upload_delete");
     expect(anna, 1000, 201, "");
+    rig.api->config.user_max_checks = 0;
 }
 
 static bool is_there(const char *id) {
@@ -183,9 +266,10 @@ int main(void) {
     rig_must(store_token_add(rig.store, "chief", ROLE_ADMIN, chief, &id, &err), &err, "token");
     rig_must(store_token_find(rig.store, anna, &who, &err), &err, "token");
     test_pledges();
+    anna_id = who.user_id;
+    test_arrivals();
     test_checks(who.user_id);
     test_age();
-    anna_id = who.user_id;
     test_idle();
     test_streams();
     rig_stop(&rig);

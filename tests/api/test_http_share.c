@@ -29,30 +29,36 @@ static int send_chunked(const struct rig *rig, const char *token, size_t length,
     return status;
 }
 
-/* Two bodies that began when there was room for either: one gets it. */
-static void test_two_at_once(const struct rig *rig, const char *token) {
+/* Two bodies of which there is room for one. Where the lengths are known, the second is refused before it is sent; else
+ * both begin, and the first that is whole gets the room. */
+static void test_two_at_once(const struct rig *rig, const char *token, bool has_length) {
     int fd[2];
     struct buf reply;
     char *text = mem_printf("POST /v1/scenes HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n"
-                            "Authorization: Bearer %s\r\nContent-Length: 600000\r\nExpect: 100-continue\r\n\r\n",
-                            token);
+                            "Authorization: Bearer %s\r\n%s\r\nExpect: 100-continue\r\n\r\n",
+                            token, has_length ? "Content-Length: 600000" : "Transfer-Encoding: chunked");
     char *body = mem_calloc(1, 600000);
     for (int i = 0; i < 2; i++) {
         fd[i] = rig_connect(rig);
         rig_send(fd[i], text, strlen(text));
         buf_init(&reply, 1 << 20);
-        rig_receive(fd[i], &reply, "100 Continue"); /* it has been let in */
+        rig_receive(fd[i], &reply, has_length && i == 1 ? "HTTP/1.1 507" : "100 Continue");
         buf_release(&reply);
     }
-    for (int i = 0; i < 2; i++) {
-        body[0] = (char)i;
+    for (int i = 0; i < (has_length ? 1 : 2); i++) {
+        body[0] = (char)(i + 2 * has_length);
+        if (!has_length)
+            rig_send(fd[i], "927c0\r\n", 7);
         rig_send(fd[i], body, 600000);
+        if (!has_length)
+            rig_send(fd[i], "\r\n0\r\n\r\n", 7);
         buf_init(&reply, 1 << 20);
         rig_receive(fd[i], &reply, NULL);
         CHECK(strstr(buf_text(&reply), i == 0 ? "HTTP/1.1 201" : "HTTP/1.1 507"));
         buf_release(&reply);
-        close(fd[i]);
     }
+    close(fd[0]);
+    close(fd[1]);
     mem_free(body);
     mem_free(text);
 }
@@ -148,7 +154,7 @@ int main(void) {
     struct rig rig;
     struct error err;
     struct buf reply;
-    char alice[TOKEN_SIZE], bob[TOKEN_SIZE], carol[TOKEN_SIZE];
+    char alice[TOKEN_SIZE], bob[TOKEN_SIZE], carol[TOKEN_SIZE], dora[TOKEN_SIZE];
     int64_t id;
     int status = 0;
     rig_start(&rig, &rig_patient, 60);
@@ -177,7 +183,9 @@ int main(void) {
     CHECK(send_chunked(&rig, alice, 600 << 10, ' ', &reply) == 200);
     buf_release(&reply);
     rig_must(store_token_add(rig.store, "carol", ROLE_USER, carol, &id, &err), &err, "token");
-    test_two_at_once(&rig, carol);
+    test_two_at_once(&rig, carol, true);
+    rig_must(store_token_add(rig.store, "dora", ROLE_USER, dora, &id, &err), &err, "token");
+    test_two_at_once(&rig, dora, false);
 
     test_streams(&rig, alice, bob);
 
