@@ -1,0 +1,283 @@
+/* prepare.c -- see prepare.h. */
+#include "server/reconstruct/prepare.h"
+
+#include <stdio.h>
+
+#include "common/mem.h"
+#include "server/capture/clip.h"
+#include "server/capture/environment_gather.h"
+#include "server/capture/fireflies.h"
+#include "server/capture/orient.h"
+#include "server/capture/radiance_preview.h"
+#include "server/capture/seen_share.h"
+#include "server/capture/texel_density.h"
+#include "server/light/split.h"
+#include "server/reconstruct/calibrate.h"
+#include "server/scene/mesh_denoise.h"
+#include "server/scene/normals.h"
+
+/* Initial material, with NEUTRAL_BASE_COLOR. By hand. */
+#define NEUTRAL_ROUGHNESS 0.5f
+#define NEUTRAL_SPECULAR 0.5f
+
+#define MIN_TRAINING 16 /* training photographs that must remain for any to be held out */
+
+/* Parts of the time of prepare, measured on staircase2 at 2048 x 2048: atlas; visibility; calibration. The rest is the
+ * second atlas. */
+#define MAP_SHARE 0.08
+#define VIEWS_SHARE 0.06
+#define CALIBRATE_SHARE 0.72
+
+struct prepare {
+    struct reconstruction *r;
+    struct views *views;
+    const struct pace *pace;
+    size_t flipped;      /* flipped triangles */
+    const char *normals; /* their source: given, estimated, none */
+    float mesh_noise_m;  /* standard deviation of the vertices' noise; 0: not denoised */
+    float roughness;     /* of a mesh whose normals are estimated */
+};
+
+void prepare_environment(struct reconstruction *r) {
+    if (r->environment.map.pixel)
+        world_set_environment(&r->world, &r->environment.map, r->pool);
+}
+
+/* Holds photographs out for the report if the capture itself holds out none, and if MIN_TRAINING remain for
+ * training. */
+static void hold_out(struct reconstruction *r) {
+    struct scene *scene = r->scene;
+    size_t every = (size_t)settings_number(r->settings, "hold_out_every");
+    for (size_t i = 0; i < scene->photograph_count; i++) {
+        if (scene->photograph[i].is_test)
+            return;
+    }
+    if (every == 0 || scene->photograph_count - scene->photograph_count / every < MIN_TRAINING)
+        return;
+    for (size_t i = every - 1; i < scene->photograph_count; i += every)
+        scene->photograph[i].is_test = true;
+}
+
+static void make_segments(struct reconstruction *r) {
+    const struct mesh *mesh = &r->scene->mesh;
+    bool given = mesh->object_id && !settings_is(r->settings, "segmentation", "automatic");
+    if (given)
+        segments_from_object_id(&r->segments, mesh);
+    else
+        segments_automatic(&r->segments, mesh);
+    json_add_string(r->report, "segmentation", given ? "given" : "automatic");
+}
+
+static void add_prepare_figures(const struct prepare *p) {
+    const struct reconstruction *r = p->r;
+    const struct mesh *mesh = &r->scene->mesh;
+    cJSON *figures = cJSON_AddObjectToObject(r->report, "prepare");
+    json_add_int(figures, "triangles", (int64_t)mesh->triangle_count);
+    json_add_int(figures, "degenerate_triangles_dropped", (int64_t)r->scene->mesh_report.degenerate_count);
+    json_add_int(figures, "duplicate_triangles_dropped", (int64_t)r->scene->mesh_report.duplicate_count);
+    json_add_int(figures, "triangles_turned", (int64_t)p->flipped);
+    json_add_string(figures, "normals", p->normals);
+    json_add_number(figures, "mesh_noise_m", (double)p->mesh_noise_m);
+    json_add_number(figures, "mesh_roughness", (double)p->roughness);
+    json_add_int(figures, "segments", (int64_t)r->segments.count);
+    json_add_int(figures, "charts", (int64_t)r->atlas.chart_count);
+    json_add_int(figures, "texture_width", r->atlas.width);
+    json_add_int(figures, "texture_height", r->atlas.height);
+    json_add_number(figures, "texels_per_metre", (double)r->atlas.texels_per_metre);
+    json_add_int(figures, "valid_texels", (int64_t)r->inverse.valid_count);
+    json_add_number(figures, "atlas_utilisation",
+                    (double)r->inverse.valid_count / ((double)r->atlas.width * (double)r->atlas.height));
+    json_add_int(figures, "training_photographs", (int64_t)p->views->train_count);
+    json_add_number(figures, "median_radiance", (double)p->views->median_radiance);
+}
+
+/* Makes everything that depends on the segments. density[triangle_count]: texture density (atlas_make_uneven), or
+ * NULL. */
+static enum status map_surface(struct reconstruction *r, const float *density, struct error *err) {
+    const struct mesh *mesh = &r->scene->mesh;
+    uint32_t size = (uint32_t)settings_number(r->settings, "texture_size");
+    float texels_per_metre = (float)settings_number(r->settings, "texels_per_metre");
+    enum status status = density ? atlas_make_uneven(&r->atlas, mesh, &r->segments, size, density, err)
+                                 : atlas_make(&r->atlas, mesh, &r->segments, size, texels_per_metre, err);
+    if (status != STATUS_OK)
+        return status;
+    inverse_uv_make(&r->inverse, &r->atlas, mesh->triangle_count, r->pool);
+    materials_init(&r->materials, &r->inverse, r->segments.count, rgb_gray(NEUTRAL_BASE_COLOR), NEUTRAL_ROUGHNESS,
+                   NEUTRAL_SPECULAR);
+    r->is_emitter = mem_calloc(r->segments.count, sizeof *r->is_emitter);
+    r->evidence = mem_calloc(r->segments.count, sizeof *r->evidence);
+    return world_init(&r->world, mesh, &r->segments, &r->atlas, &r->materials, NULL, r->pool, err);
+}
+
+static void release_surface(struct reconstruction *r) {
+    world_release(&r->world);
+    mem_free(r->evidence);
+    mem_free(r->is_emitter);
+    r->evidence = NULL;
+    r->is_emitter = NULL;
+    materials_release(&r->materials);
+    inverse_uv_release(&r->inverse);
+    atlas_release(&r->atlas);
+}
+
+static void report_split(const struct prepare *p, const struct split *split) {
+    cJSON *list = cJSON_AddArrayToObject(p->r->report, "parts_that_shine");
+    for (size_t i = 0; i < split->part_count; i++) {
+        cJSON *entry = cJSON_CreateObject();
+        json_add_int(entry, "segment", (int64_t)(split->old_count + i));
+        json_add_int(entry, "of_segment", (int64_t)split->whole[i]);
+        cJSON_AddItemToArray(list, entry);
+    }
+    char line[128];
+    snprintf(line, sizeof line, "segments: %zu parts that shine were split off, as segments of their own",
+             split->part_count);
+    if (split->part_count > 0)
+        p->pace->hooks->log(p->pace->hooks->user, line);
+}
+
+/* Splits bright parts off their segments; true when there were any. */
+static bool split_bright_parts(struct prepare *p) {
+    struct split split;
+    split_segments(&split, p->r, p->views);
+    report_split(p, &split);
+    bool any = split.part_count > 0;
+    split_release(&split);
+    return any;
+}
+
+/* Makes the atlas again, with the split segments and a density by visibility. */
+static enum status remap_surface(struct prepare *p, bool has_split, struct error *err) {
+    struct reconstruction *r = p->r;
+    bool even = settings_number(r->settings, "texels_per_metre") > 0.0;
+    if (even && !has_split)
+        return STATUS_OK;
+    float *density = even ? NULL : mem_array(r->scene->mesh.triangle_count, sizeof *density);
+    if (density)
+        texel_density_from_views(p->views, &r->atlas, r->pool, density);
+    release_surface(r);
+    mem_free(r->radiance_preview); /* of the former atlas */
+    r->radiance_preview = NULL;
+    enum status status = map_surface(r, density, err);
+    mem_free(density);
+    if (status != STATUS_OK)
+        return status;
+    views_update_segments(p->views, r->world.accel, r->pool);
+    prepare_environment(r);
+    return STATUS_OK;
+}
+
+static void denoise_mesh(struct prepare *p) {
+    char line[128];
+    if (settings_bool(p->r->settings, "denoise_mesh"))
+        p->mesh_noise_m = mesh_denoise(&p->r->scene->mesh, p->r->pool);
+    if (p->mesh_noise_m == 0.0f)
+        return;
+    snprintf(line, sizeof line, "mesh: its vertices are off by %.2g mm; they were put back",
+             1e3 * (double)p->mesh_noise_m);
+    p->pace->hooks->log(p->pace->hooks->user, line);
+}
+
+static void estimate_normals(struct prepare *p) {
+    struct mesh *mesh = &p->r->scene->mesh;
+    bool had_some = mesh->normal != NULL;
+    if (normals_estimate(mesh, p->r->pool, &p->roughness) && !had_some)
+        p->pace->hooks->log(p->pace->hooks->user, "mesh: it has no normals; they are estimated");
+    p->normals = had_some ? "given" : mesh->normal ? "estimated" : "none";
+}
+
+/* A first preview, before the slow steps. */
+static enum status show_radiance(struct prepare *p, struct error *err) {
+    struct reconstruction *r = p->r;
+    const struct reconstruct_hooks *hooks = p->pace->hooks;
+    if (!hooks->preview_due(hooks->user))
+        return STATUS_OK;
+    r->radiance_preview = radiance_preview(p->views, &r->atlas, &r->inverse, r->pool);
+    return hooks->preview(hooks->user, r, err);
+}
+
+/* Reports a part of prepare as done. */
+static void advance(struct prepare *p, double share) { pace_advance(p->pace, "prepare", PLAN_PREPARE, share); }
+
+/* The segments that settings name must be there. */
+static enum status check_segment_settings(const struct reconstruction *r, struct error *err) {
+    for (size_t i = 0; i < r->settings->segment_count; i++) {
+        uint32_t segment = r->settings->segment[i].segment;
+        if (segment >= r->segments.count)
+            return error_set(err, STATUS_INPUT, "emitters.%u: there are %zu segments, from 0", segment,
+                             r->segments.count);
+    }
+    return STATUS_OK;
+}
+
+/* Ends a job that could measure next to nothing before it takes minutes. */
+static enum status require_seen_surface(struct prepare *p, struct error *err) {
+    struct seen_share share = seen_share_measure(p->views, p->r->pool);
+    json_add_number(p->r->report, "seen_surface_share", share.surface);
+    return seen_share_require(&share, settings_is(p->r->settings, "fit", "ignore"), err);
+}
+
+/* Room for what is found of each pixel of the photographs that are used. */
+static enum status reserve_pixels(const struct reconstruction *r, struct error *err) {
+    size_t count = 0;
+    uint64_t pixels = 0;
+    for (size_t i = 0; i < r->scene->photograph_count; i++) {
+        const struct photograph *photo = &r->scene->photograph[i];
+        count += !photo->is_test;
+        pixels += photo->is_test ? 0 : (uint64_t)photo->camera.width * photo->camera.height;
+    }
+    return spill_reserve(r->scene->spill, "the classes of the photographs' pixels", PHOTOGRAPH_LATER_BYTES * count,
+                         PHOTOGRAPH_LATER_BYTES * pixels, 0, err);
+}
+
+/* Rights the mesh, and maps it to texels. */
+static enum status make_surface(struct prepare *p, struct error *err) {
+    struct reconstruction *r = p->r;
+    enum status status = orient_mesh(r->scene, r->pool, &p->flipped, err);
+    if (status != STATUS_OK)
+        return status;
+    denoise_mesh(p);
+    estimate_normals(p);
+    make_segments(r);
+    status = map_surface(r, NULL, err);
+    if (status == STATUS_OK)
+        advance(p, MAP_SHARE);
+    return status;
+}
+
+/* Calibrates the photographs, and finds what of them is to be trusted and the distant light they show. */
+static void measure_photographs(struct prepare *p) {
+    struct reconstruction *r = p->r;
+    calibrate(r, p->views, p->pace->hooks);
+    noise_measure(&r->noise, p->views);
+    noise_set_black(&r->noise, r->scene);
+    clip_mark(r->scene, p->views, &r->noise, r->pool);
+    fireflies_mark(r->scene, p->views, &r->noise, r->pool);
+    environment_gather(&r->environment, p->views, r->pool);
+    prepare_environment(r);
+    advance(p, CALIBRATE_SHARE);
+}
+
+enum status prepare_run(struct reconstruction *r, struct views *views, const struct pace *pace, struct error *err) {
+    struct prepare prepare = {.r = r, .views = views, .pace = pace}, *p = &prepare;
+    if (settings_is(r->settings, "segmentation", "given") && !r->scene->mesh.object_id)
+        return error_set(err, STATUS_INPUT, "segmentation=given, but the mesh has no object_id per face");
+    hold_out(r);
+    enum status status = reserve_pixels(r, err);
+    if (status == STATUS_OK)
+        status = make_surface(p, err);
+    if (status != STATUS_OK)
+        return status;
+    views_init(p->views, r->scene, &r->segments, r->world.accel, r->pool);
+    advance(p, VIEWS_SHARE);
+    status = require_seen_surface(p, err);
+    if (status == STATUS_OK)
+        status = show_radiance(p, err);
+    if (status != STATUS_OK)
+        return status;
+    measure_photographs(p);
+    status = remap_surface(p, split_bright_parts(p), err);
+    add_prepare_figures(p);
+    pace_measure_room(p->pace, r->scene, &r->inverse);
+    advance(p, 1.0 - MAP_SHARE - VIEWS_SHARE - CALIBRATE_SHARE);
+    return status == STATUS_OK ? check_segment_settings(r, err) : status;
+}
