@@ -28,7 +28,8 @@ struct client_room {
 #define ROOM_OPTIONS                                                                                                   \
     {"scene", 0, OPTION_TEXT, "SCENE", "a room that is there already, instead of ROOM"}, {                             \
         "scene-set", 0, OPTION_LIST, "KEY=VALUE",                                                                      \
-            "how the room is to be read: transforms, mesh, axes, mesh_axes, scale, shift or exposures"                 \
+            "how the room is to be read: transforms, mesh, axes, mesh_axes, scale, shift, coordinates, lens, "         \
+            "distortion or exposures"                                                                                  \
     }
 
 /* ROOM of the command line, or --scene: what is there of it. STATUS_OK also where it is not on the server. */

@@ -12,6 +12,8 @@
 
 #define MIN_SCALE 1e-6
 #define MAX_SCALE 1e6
+#define MIN_LENS 0.01
+#define MAX_LENS 100.0
 
 static const char *const axes_name[] = {
     [AXES_OF_FORMAT] = "",
@@ -22,15 +24,17 @@ static const char *const axes_name[] = {
 };
 #define AXES_COUNT (sizeof axes_name / sizeof *axes_name)
 
-const char *const reading_keys[] = {"transforms", "mesh", "axes", "mesh_axes", "scale", "shift", "exposures", NULL};
+const char *const reading_keys[] = {"transforms",  "mesh", "axes",       "mesh_axes", "scale", "shift",
+                                    "coordinates", "lens", "distortion", "exposures", NULL};
 
 struct reading reading_default(void) {
-    return (struct reading){.mesh_axes = {.axis = {0, 1, 2}, .sign = {1.0f, 1.0f, 1.0f}}, .scale = 1.0};
+    return (struct reading){.mesh_axes = {.axis = {0, 1, 2}, .sign = {1.0f, 1.0f, 1.0f}}, .scale = 1.0, .lens = 1.0};
 }
 
 void reading_release(struct reading *reading) {
     mem_free(reading->transforms);
     mem_free(reading->mesh);
+    mem_free(reading->coordinates);
     *reading = reading_default();
 }
 
@@ -38,6 +42,7 @@ struct reading reading_copy(const struct reading *reading) {
     struct reading copy = *reading;
     copy.transforms = reading->transforms ? mem_strdup(reading->transforms) : NULL;
     copy.mesh = reading->mesh ? mem_strdup(reading->mesh) : NULL;
+    copy.coordinates = reading->coordinates ? mem_strdup(reading->coordinates) : NULL;
     return copy;
 }
 
@@ -81,11 +86,23 @@ static enum status parse_mesh_axes(const cJSON *value, struct signed_axes *axes,
     return error_set(err, STATUS_INPUT, "mesh_axes must name x, y and z once each, with signs, such as \"x -z y\"");
 }
 
-static enum status parse_exposures(const cJSON *value, bool *ignored, struct error *err) {
+static enum status parse_coordinates(const cJSON *value, char **name, struct error *err) {
+    static const char *const names[] = {"file", "capture", "chunk", "local"};
+    const char *text = cJSON_GetStringValue(value);
+    for (size_t i = 0; text && i < sizeof names / sizeof *names; i++)
+        if (strcmp(text, names[i]) == 0) {
+            *name = mem_strdup(text);
+            return STATUS_OK;
+        }
+    return error_set(err, STATUS_INPUT, "coordinates must be \"file\", \"capture\", \"chunk\" or \"local\"");
+}
+
+/* "told" or "ignored". */
+static enum status parse_ignored(const cJSON *value, bool *ignored, struct error *err) {
     const char *text = cJSON_GetStringValue(value);
     *ignored = text && strcmp(text, "ignored") == 0;
     if (!*ignored && (!text || strcmp(text, "told") != 0))
-        return error_set(err, STATUS_INPUT, "exposures must be \"told\" or \"ignored\"");
+        return error_set(err, STATUS_INPUT, "%s must be \"told\" or \"ignored\"", value->string);
     return STATUS_OK;
 }
 
@@ -101,7 +118,17 @@ static enum status parse_member(const cJSON *member, struct reading *r, struct e
     if (strcmp(key, "mesh_axes") == 0)
         return parse_mesh_axes(member, &r->mesh_axes, err);
     if (strcmp(key, "exposures") == 0)
-        return parse_exposures(member, &r->ignores_exposures, err);
+        return parse_ignored(member, &r->ignores_exposures, err);
+    if (strcmp(key, "distortion") == 0)
+        return parse_ignored(member, &r->ignores_distortion, err);
+    if (strcmp(key, "coordinates") == 0)
+        return parse_coordinates(member, &r->coordinates, err);
+    if (strcmp(key, "lens") == 0) {
+        if (!cJSON_IsNumber(member) || !(value >= MIN_LENS && value <= MAX_LENS))
+            return error_set(err, STATUS_INPUT, "lens must be a number from %g to %g", MIN_LENS, MAX_LENS);
+        r->lens = value;
+        return STATUS_OK;
+    }
     if (strcmp(key, "scale") == 0) {
         if (!cJSON_IsNumber(member) || !(value >= MIN_SCALE && value <= MAX_SCALE))
             return error_set(err, STATUS_INPUT, "scale must be a number from %g to %g", MIN_SCALE, MAX_SCALE);
@@ -116,8 +143,8 @@ static enum status parse_member(const cJSON *member, struct reading *r, struct e
         return STATUS_OK;
     }
     return error_set(err, STATUS_INPUT,
-                     "unknown \"%.40s\"; known are transforms, mesh, axes, mesh_axes, scale, shift and "
-                     "exposures",
+                     "unknown \"%.40s\"; known are transforms, mesh, axes, mesh_axes, scale, shift, "
+                     "coordinates, lens, distortion and exposures",
                      key);
 }
 
@@ -140,7 +167,8 @@ enum status reading_parse_assignment(const char *text, cJSON *object, struct err
         return error_set(err, STATUS_INPUT, "\"%s\" is not of the form NAME=VALUE", text);
     char *key = mem_strndup(text, (size_t)(equals - text)), *end;
     double value = strtod(equals + 1, &end);
-    bool is_number = (strcmp(key, "scale") == 0 || strcmp(key, "shift") == 0) && end != equals + 1 && *end == '\0';
+    bool is_number = (strcmp(key, "scale") == 0 || strcmp(key, "shift") == 0 || strcmp(key, "lens") == 0) &&
+                     end != equals + 1 && *end == '\0';
     struct reading ignored;
     if (cJSON_HasObjectItem(object, key))
         cJSON_DeleteItemFromObjectCaseSensitive(object, key);
@@ -176,6 +204,12 @@ cJSON *reading_json(const struct reading *r) {
         json_add_number(json, "scale", r->scale);
     if (r->shift != 0)
         json_add_int(json, "shift", r->shift);
+    if (r->coordinates)
+        json_add_string(json, "coordinates", r->coordinates);
+    if (r->lens != 1.0)
+        json_add_number(json, "lens", r->lens);
+    if (r->ignores_distortion)
+        json_add_string(json, "distortion", "ignored");
     if (r->ignores_exposures)
         json_add_string(json, "exposures", "ignored");
     return json;

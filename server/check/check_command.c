@@ -17,7 +17,8 @@
 
 const struct flag check_flags[] = {
     {"--scene-set", "KEY=VALUE",
-     "how the bundle is to be read: transforms, mesh, axes, mesh_axes, scale, shift, exposures"},
+     "how the bundle is to be read: transforms, mesh, axes, mesh_axes, scale, shift, coordinates, lens, distortion, "
+     "exposures"},
     {"--set", "NAME=VALUE", "a setting of the job that memory and time are estimated for"},
     {"--pictures", "DIR", "draw the mesh's edges over photographs, a plan, and exposures there"},
     {"--json", NULL, "print the facts as JSON"},

@@ -77,8 +77,7 @@ static bool is_better(const struct search_result *r, double sure, double gain) {
 static bool is_plain(const struct search_result *r) {
     bool is_even = r->found.photograph_count < EVEN_PHOTOGRAPHS || consistency_evenness(&r->found) > TAKEN_EVENNESS;
     double least = search_is_unit_scale(r->best.scale) ? TAKEN_CORRELATION : TAKEN_CORRELATION_SCALED;
-    return is_better(r, TAKEN_SURE, TAKEN_GAIN) && is_even && r->found.correlation > least &&
-           hypothesis_is_reading(&r->best);
+    return is_better(r, TAKEN_SURE, TAKEN_GAIN) && is_even && r->found.correlation > least;
 }
 
 /* Without a remedy, and where the photographs do not agree. */
@@ -182,8 +181,7 @@ cJSON *fit_json(const struct fit_result *fit, const struct reading *loaded) {
         cJSON_AddItemToArray(evidence, json_new_string(fit->evidence[i]));
     struct reading reading = hypothesis_reading(&r->best, loaded);
     char *text = fit->has_remedy ? hypothesis_text(&r->best, loaded) : NULL;
-    json_add(json, "remedy",
-             fit->has_remedy && hypothesis_is_reading(&r->best) ? reading_json(&reading) : cJSON_CreateNull());
+    json_add(json, "remedy", fit->has_remedy ? reading_json(&reading) : cJSON_CreateNull());
     json_add_string(json, "remedy_text", text);
     json_add_number(json, "correlation", r->given.correlation);
     json_add_number(json, "deviations", r->given.z);

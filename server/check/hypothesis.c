@@ -23,10 +23,8 @@ struct hypothesis hypothesis_given(void) {
 
 bool hypothesis_is_given(const struct hypothesis *h) {
     return h->axes == AXES_OF_FORMAT && same_axes(&h->mesh_axes, &identity) && h->scale == 1.0 && h->shift == 0 &&
-           hypothesis_is_reading(h);
+           !h->coordinates.name && h->lens == 1.0 && !h->is_pinhole;
 }
-
-bool hypothesis_is_reading(const struct hypothesis *h) { return h->lens == 1.0 && !h->is_pinhole; }
 
 struct signed_axes hypothesis_signed_axes(int number) {
     static const int order[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}};
@@ -81,10 +79,16 @@ bool hypothesis_camera(const struct hypothesis *h, const struct scene *scene, si
     if (source < 0 || source >= (long)scene->photograph_count)
         return false;
     *camera = scene->photograph[index].camera;
-    if (h->shift != 0 || h->axes != AXES_OF_FORMAT || h->scale != 1.0 || !same_axes(&h->mesh_axes, &identity)) {
+    if (h->shift != 0 || h->axes != AXES_OF_FORMAT || h->coordinates.name || h->scale != 1.0 ||
+        !same_axes(&h->mesh_axes, &identity)) {
         struct exact_pose pose = told_pose(&scene->photograph[source].camera.world_from_camera, scene->mesh.offset);
         if (h->axes != AXES_OF_FORMAT)
             pose = reading_reinterpret(&pose, scene->pose_axes, h->axes);
+        if (h->coordinates.name) {
+            double inverse[3][4];
+            coordinates_invert(h->coordinates.poses_from, inverse);
+            pose_transform((const double(*)[4])inverse, &pose);
+        }
         camera->world_from_camera = placed_pose(h, &pose, scene->mesh.offset);
         camera->camera_from_world = rigid_inverse(&camera->world_from_camera);
     }
@@ -96,7 +100,8 @@ bool hypothesis_camera(const struct hypothesis *h, const struct scene *scene, si
         camera->model = CAMERA_OPENCV;
         memset(camera->k, 0, sizeof camera->k);
         memset(camera->p, 0, sizeof camera->p);
-        camera->fold = 0.0f;
+        memset(camera->s, 0, sizeof camera->s);
+        camera->k8 = camera->fold = 0.0f;
     }
     if (h->lens != 1.0) {
         camera->fx *= (float)h->lens;
@@ -120,6 +125,12 @@ struct reading hypothesis_reading(const struct hypothesis *h, const struct readi
     }
     r.scale *= h->scale;
     r.shift += h->shift;
+    if (h->coordinates.name) {
+        mem_free(r.coordinates);
+        r.coordinates = mem_strdup(h->coordinates.name);
+    }
+    r.lens *= h->lens;
+    r.ignores_distortion = r.ignores_distortion || h->is_pinhole;
     return r;
 }
 
@@ -160,6 +171,8 @@ char *hypothesis_text(const struct hypothesis *h, const struct reading *loaded) 
     buf_init(&text, 4096);
     if (h->axes != AXES_OF_FORMAT)
         buf_printf(&text, "the pose matrices are %s", axes_meaning(h->axes));
+    if (h->coordinates.name)
+        buf_printf(&text, "%sthe mesh's coordinates are %s", text.length ? "; " : "", h->coordinates.text);
     describe_mesh(h, &text);
     if (h->shift != 0)
         buf_printf(&text, "%seach photograph has the pose of the frame %s it", text.length ? "; " : "",
@@ -168,13 +181,9 @@ char *hypothesis_text(const struct hypothesis *h, const struct reading *loaded) 
                    : h->shift > 0   ? "some frames after"
                                     : "some frames before");
     if (h->is_pinhole)
-        buf_printf(&text,
-                   "%sthe pictures have no lens distortion: leave it out of the cameras' file (camera_model PINHOLE)",
-                   text.length ? "; " : "");
+        buf_printf(&text, "%sthe pictures have no lens distortion", text.length ? "; " : "");
     if (h->lens != 1.0)
-        buf_printf(&text,
-                   "%sfocal length and principal point are those of a picture of %.4g times the size: give them, or w "
-                   "and h, for the pictures as they are",
+        buf_printf(&text, "%sfocal length and principal point are those of a picture of %.4g times the size",
                    text.length ? "; " : "", 1.0 / h->lens);
     struct reading reading = hypothesis_reading(h, loaded);
     cJSON *now = reading_json(&reading), *before = reading_json(loaded), *member;

@@ -12,13 +12,14 @@
 #include "server/scene/scene.h"
 
 struct hypothesis {
-    enum matrix_axes axes;        /* that the file's matrices mean; AXES_OF_FORMAT: as loaded */
-    struct signed_axes mesh_axes; /* of the mesh as loaded, in the cameras' world */
-    double scale;                 /* of the mesh as loaded, units of the cameras' world */
-    int shift;                    /* photograph i has the pose of photograph i + shift */
-    double lens;                  /* factor of focal lengths and principal point */
-    vec3 offset;                  /* of the mesh, in its own units: another origin, which no reading can say */
-    bool is_pinhole;              /* the pictures have no distortion, whatever their lens has */
+    enum matrix_axes axes;          /* that the file's matrices mean; AXES_OF_FORMAT: as loaded */
+    struct signed_axes mesh_axes;   /* of the mesh as loaded, in the cameras' world */
+    double scale;                   /* of the mesh as loaded, units of the cameras' world */
+    int shift;                      /* photograph i has the pose of photograph i + shift */
+    struct coordinates coordinates; /* that the mesh is in, one of scene->other; of name NULL: as loaded */
+    double lens;                    /* factor of focal lengths and principal point */
+    vec3 offset;                    /* of the mesh, in its own units: another origin, which no reading can say */
+    bool is_pinhole;                /* the pictures have no distortion, whatever their lens has */
 };
 
 /* As loaded. */
@@ -30,11 +31,8 @@ bool hypothesis_is_given(const struct hypothesis *h);
 bool hypothesis_camera(const struct hypothesis *h, const struct scene *scene, size_t index, struct camera *camera);
 
 /* The reading that would load the scene in this way, given the one by which it was loaded; the caller's
- * (reading_release). What is changed of the lens has no part in it. */
+ * (reading_release). An offset has no part in it. */
 struct reading hypothesis_reading(const struct hypothesis *h, const struct reading *loaded);
-
-/* Whether a reading can say all of it. */
-bool hypothesis_is_reading(const struct hypothesis *h);
 
 /* "the mesh is y-up: set mesh_axes=\"x -z y\""; the caller's. */
 char *hypothesis_text(const struct hypothesis *h, const struct reading *loaded);

@@ -115,6 +115,11 @@ static void try_neighbours(struct state *s, const struct hypothesis *from) {
         try(s, &h);
     }
     h = *from;
+    for (size_t i = 0; i < s->scene->other_count; i++) {
+        h.coordinates = s->scene->other[i];
+        try(s, &h);
+    }
+    h = *from;
     for (int shift = -3; shift <= 3; shift++) {
         h.shift = shift;
         if ((size_t)(shift < 0 ? -shift : shift) + 2 <= s->scene->photograph_count)
@@ -256,7 +261,7 @@ static void measure_extent(struct state *s) {
         vec3 o = camera_origin(&s->scene->photograph[i].camera);
         first = vec3_make(fminf(first.x, o.x), fminf(first.y, o.y), fminf(first.z, o.z));
         last = vec3_make(fmaxf(last.x, o.x), fmaxf(last.y, o.y), fmaxf(last.z, o.z));
-        s->is_distorted = s->is_distorted || s->scene->photograph[i].camera.fold > 0.0f;
+        s->is_distorted = s->is_distorted || camera_is_distorted(&s->scene->photograph[i].camera);
     }
     s->spread = (double)vec3_length(vec3_sub(last, first));
 }

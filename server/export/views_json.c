@@ -10,6 +10,7 @@ static void add_lens(cJSON *frame, const struct camera *camera) {
         [CAMERA_OPENCV_FISHEYE] = "OPENCV_FISHEYE",
         [CAMERA_THIN_PRISM_FISHEYE] = "THIN_PRISM_FISHEYE",
         [CAMERA_FOV] = "FOV",
+        [CAMERA_DIVISION] = "DIVISION",
     };
     bool has_octic = camera->k8 != 0.0f; /* then there is no denominator: k4 is nerfstudio's */
     json_add_string(frame, "camera_model", has_octic ? "OPENCV" : name[camera->model]);
@@ -21,6 +22,10 @@ static void add_lens(cJSON *frame, const struct camera *camera) {
     json_add_number(frame, "cy", (double)camera->cy);
     if (camera->model == CAMERA_FOV) {
         json_add_number(frame, "omega", (double)camera->k[0]);
+        return;
+    }
+    if (camera->model == CAMERA_DIVISION) {
+        json_add_number(frame, "k1", (double)camera->k[0]);
         return;
     }
     int count = camera->model == CAMERA_OPENCV && !has_octic ? 6 : 4;

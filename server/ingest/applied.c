@@ -8,46 +8,28 @@
 
 #include "server/ingest/path.h"
 
-/* inverse = m^-1 for the affine m; returns the determinant of its linear part. */
-static double invert(const double m[3][4], double inverse[3][4]) {
-    double det = 0.0;
-    for (int j = 0; j < 3; j++)
-        det += m[0][j] * (m[1][(j + 1) % 3] * m[2][(j + 2) % 3] - m[1][(j + 2) % 3] * m[2][(j + 1) % 3]);
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            int i1 = (i + 1) % 3, i2 = (i + 2) % 3, j1 = (j + 1) % 3, j2 = (j + 2) % 3;
-            inverse[j][i] = (m[i1][j1] * m[i2][j2] - m[i1][j2] * m[i2][j1]) / det;
-        }
-    for (int i = 0; i < 3; i++)
-        inverse[i][3] = -(inverse[i][0] * m[0][3] + inverse[i][1] * m[1][3] + inverse[i][2] * m[2][3]);
-    return det;
-}
+#define CAPTURE "capture"
 
-/* pose = inverse(applied) of the pose whose position is divided by the scale. */
-static void undo(const double inverse[3][4], double stretch, double scale, struct exact_pose *pose) {
-    struct exact_pose old = *pose;
-    for (int i = 0; i < 3; i++) {
-        pose->translation[i] = inverse[i][3];
-        for (int k = 0; k < 3; k++)
-            pose->translation[i] += inverse[i][k] * old.translation[k] / scale;
-        for (int j = 0; j < 3; j++) {
-            pose->rotation[i][j] = 0.0;
-            for (int k = 0; k < 3; k++)
-                pose->rotation[i][j] += inverse[i][k] * stretch * old.rotation[k][j];
-        }
-    }
+/* poses = m * the capture's. */
+static void similarity(const struct frames *t, double m[3][4]) {
+    for (int i = 0; i < 12; i++)
+        m[i / 4][i % 4] = t->applied_scale * t->applied[i / 4][i % 4];
 }
 
 void applied_undo(struct frames *t, const char *name, const char *reason, struct findings *f) {
-    double inverse[3][4], det = invert((const double(*)[4])t->applied, inverse);
+    double applied[3][4], inverse[3][4];
+    similarity(t, applied);
+    double det = coordinates_invert((const double(*)[4])applied, inverse);
     if (!(det > 1e-9 && isfinite(det))) {
         findings_problem(f, name, "applied_transform %s, which no pose can be turned back from",
                          det < 0.0 ? "mirrors space" : "is singular");
         return;
     }
     for (size_t i = 0; i < t->frame_count; i++)
-        undo((const double(*)[4])inverse, cbrt(det), t->applied_scale, &t->frame[i].world_from_camera);
+        pose_transform((const double(*)[4])inverse, &t->frame[i].world_from_camera);
     t->has_applied = false;
+    t->coordinates = CAPTURE;
+    frames_know(t, "file", "those of the cameras' file", (const double(*)[4])inverse);
     findings_warning(f, "%s: the poses are in nerfstudio's axes (applied_transform) and were turned back: %s", name,
                      reason);
 }
@@ -88,7 +70,17 @@ static bool is_polycam(const struct frames *t, const char *mesh) {
            fnmatch("frame_[0-9][0-9][0-9][0-9][0-9].*", path_base(t->frame[0].file), 0) == 0;
 }
 
-void applied_settle(struct frames *t, const char *name, const char *mesh, struct findings *f) {
+/* The capture's coordinates, where they differ; a transform that mirrors space or is singular has none. */
+static void know_capture(struct frames *t) {
+    double m[3][4], inverse[3][4];
+    similarity(t, m);
+    double det = coordinates_invert((const double(*)[4])m, inverse);
+    if (det > 1e-9 && isfinite(det))
+        frames_know(t, CAPTURE, "those of the capture before nerfstudio's applied_transform and applied_scale",
+                    (const double(*)[4])m);
+}
+
+void applied_settle(struct frames *t, const char *name, const char *mesh, const char *given, struct findings *f) {
     static const double polycam[3][4] = {{0, 0, 1, 0}, {1, 0, 0, 0}, {0, 1, 0, 0}};
     static const double identity[3][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
     char axes[16], reason[300];
@@ -99,18 +91,22 @@ void applied_settle(struct frames *t, const char *name, const char *mesh, struct
     }
     if (!t->has_applied || (t->applied_scale == 1.0 && memcmp(t->applied, identity, sizeof identity) == 0))
         return;
-    if (is_of_capture(mesh)) {
+    if (given) {
+        know_capture(t);
+    } else if (is_of_capture(mesh)) {
         snprintf(reason, sizeof reason, "%.200s is a mesh of the capture itself", mesh);
         applied_undo(t, name, reason, f);
     } else if (as_axes(t, axes)) {
+        know_capture(t);
         findings_warning(f,
                          "%s: the poses are in nerfstudio's axes (applied_transform); a mesh in those of the capture "
                          "needs mesh_axes=\"%s\"",
                          name, axes);
     } else {
+        know_capture(t);
         findings_warning(f,
                          "%s: nerfstudio moved or scaled the poses (applied_transform, applied_scale); a mesh in the "
-                         "capture's own coordinates does not fit them",
+                         "capture's own coordinates needs coordinates=" CAPTURE,
                          name);
     }
 }

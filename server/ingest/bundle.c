@@ -178,6 +178,17 @@ static void check_frames_meet_mesh(const struct scene *scene, struct findings *f
                          far_count, scene->photograph_count);
 }
 
+/* Those of the poses from now on, and the others, for the check of fit. */
+static enum status settle_coordinates(struct frames *t, const char *name, const char *given, struct scene *scene,
+                                      struct findings *f, struct error *err) {
+    struct error own;
+    enum status status =
+        frames_settle_coordinates(t, given, scene->mesh.triangle_count > 0 ? &scene->mesh : NULL, &own);
+    memcpy(scene->other, t->other, sizeof scene->other);
+    scene->other_count = t->other_count;
+    return findings_settle(f, name, status, &own, err);
+}
+
 /* --- all of it --------------------------------------------------------------------------- */
 
 static void move_warnings(struct findings *f, struct scene *scene) {
@@ -256,11 +267,13 @@ enum status bundle_load(const char *dir, const struct reading *given, const stru
     if (match.source) /* else what is missing has been said */
         status = mesh_choose(&choice, &mesh, &f, err);
     if (match.source == &source_nerfstudio)
-        applied_settle(&t, name, mesh, &f);
-    reading_apply_frames(&reading, &t);
-    scene->pose_axes = reading.axes != AXES_OF_FORMAT ? reading.axes : t.axes;
+        applied_settle(&t, name, mesh, reading.coordinates, &f);
     if (mesh)
         status = load_mesh(root, mesh, &reading, limits, scene, &f, err);
+    if (status == STATUS_OK && match.source)
+        status = settle_coordinates(&t, name, reading.coordinates, scene, &f, err);
+    reading_apply_frames(&reading, &t);
+    scene->pose_axes = reading.axes != AXES_OF_FORMAT ? reading.axes : t.axes;
     if (status == STATUS_OK && has_frames)
         status = load_photographs(root, name, &t, limits, pool, scene, &f, err);
     if (status == STATUS_OK && f.problem_count > 0)

@@ -1,8 +1,11 @@
 /* frames.c -- see frames.h. */
 #include "server/ingest/frames.h"
 
+#include <assert.h>
 #include <math.h>
+#include <string.h>
 
+#include "common/buf.h"
 #include "common/mem.h"
 
 void frame_release(struct frame *frame) {
@@ -18,6 +21,93 @@ void frames_release(struct frames *t) {
     mem_free(t->point_cloud);
     *t = (struct frames){0};
 }
+
+/* --- coordinates ------------------------------------------------------------------------- */
+
+#define FILE_COORDINATES "file"
+
+void frames_know(struct frames *t, const char *name, const char *text, const double poses_from[3][4]) {
+    assert(t->other_count < COORDINATES_MAX);
+    struct coordinates *added = &t->other[t->other_count++];
+    *added = (struct coordinates){.name = name, .text = text};
+    memcpy(added->poses_from, poses_from, sizeof added->poses_from);
+}
+
+/* The present ones take the place of the others' number `index`. */
+static void move(struct frames *t, size_t index) {
+    const struct coordinates to = t->other[index];
+    double inverse[3][4], moved[3][4];
+    coordinates_invert(to.poses_from, inverse);
+    for (size_t i = 0; i < t->frame_count; i++)
+        pose_transform((const double(*)[4])inverse, &t->frame[i].world_from_camera);
+    for (size_t i = 0; i < t->other_count; i++) {
+        coordinates_product((const double(*)[4])inverse, t->other[i].poses_from, moved);
+        memcpy(t->other[i].poses_from, moved, sizeof moved);
+    }
+    struct coordinates *old = &t->other[index];
+    *old = (struct coordinates){.name = t->coordinates ? t->coordinates : FILE_COORDINATES,
+                                .text = "those of the cameras' file"};
+    memcpy(old->poses_from, inverse, sizeof inverse);
+    t->coordinates = to.name;
+}
+
+/* Cameras within the mesh's bounds, grown by their half, after `from` was undone. */
+static size_t count_inside(const struct frames *t, const double poses_from[3][4], const struct mesh *mesh) {
+    vec3 lower, upper;
+    double inverse[3][4];
+    size_t count = 0;
+    mesh_bounds(mesh, &lower, &upper);
+    const float low[3] = {lower.x, lower.y, lower.z}, high[3] = {upper.x, upper.y, upper.z};
+    coordinates_invert(poses_from, inverse);
+    for (size_t f = 0; f < t->frame_count; f++) {
+        struct exact_pose pose = t->frame[f].world_from_camera;
+        bool is_inside = true;
+        pose_transform((const double(*)[4])inverse, &pose);
+        for (int i = 0; i < 3; i++) {
+            double at = pose.translation[i] - mesh->offset[i], grown = 0.5 * (double)(high[i] - low[i]);
+            is_inside = is_inside && at > (double)low[i] - grown && at < (double)high[i] + grown;
+        }
+        count += is_inside;
+    }
+    return count;
+}
+
+static void move_to_mesh(struct frames *t, const struct mesh *mesh) {
+    static const double identity[3][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
+    size_t best = t->other_count, most = count_inside(t, identity, mesh);
+    for (size_t i = 0; i < t->other_count; i++) {
+        size_t count = count_inside(t, (const double(*)[4])t->other[i].poses_from, mesh);
+        best = count > most ? i : best;
+        most = count > most ? count : most;
+    }
+    if (best < t->other_count)
+        move(t, best);
+}
+
+enum status frames_settle_coordinates(struct frames *t, const char *given, const struct mesh *mesh, struct error *err) {
+    if (!given) {
+        if (t->is_placed_by_mesh && mesh)
+            move_to_mesh(t, mesh);
+        return STATUS_OK;
+    }
+    for (size_t i = 0; i < t->other_count; i++)
+        if (strcmp(given, t->other[i].name) == 0) {
+            move(t, i);
+            return STATUS_OK;
+        }
+    if (strcmp(given, t->coordinates ? t->coordinates : FILE_COORDINATES) == 0)
+        return STATUS_OK;
+    struct buf known;
+    buf_init(&known, 1024);
+    for (size_t i = 0; i < t->other_count; i++)
+        buf_printf(&known, ", \"%s\"", t->other[i].name);
+    error_set(err, STATUS_INPUT, "coordinates=%s: the cameras' file knows no such coordinates, only \"%s\"%s", given,
+              t->coordinates ? t->coordinates : FILE_COORDINATES, buf_text(&known));
+    buf_release(&known);
+    return err->status;
+}
+
+/* --- cameras ----------------------------------------------------------------------------- */
 
 enum status frame_camera(const struct frame *frame, uint32_t width, uint32_t height, const double offset[3],
                          struct camera *camera, struct error *err) {
@@ -70,6 +160,12 @@ enum status frame_camera(const struct frame *frame, uint32_t width, uint32_t hei
     for (int i = 0; i < 2; i++) {
         camera->p[i] = (float)lens->p[i];
         camera->s[i] = (float)lens->s[i];
+    }
+    if (lens->rescale > 0.0) {
+        camera->fx *= (float)lens->rescale;
+        camera->fy *= (float)lens->rescale;
+        camera->cx *= (float)lens->rescale;
+        camera->cy *= (float)lens->rescale;
     }
     camera_find_fold(camera);
     return STATUS_OK;

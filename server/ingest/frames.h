@@ -11,6 +11,8 @@
 #include "common/reading.h"
 #include "server/ingest/pose.h"
 #include "server/scene/camera.h"
+#include "server/scene/coordinates.h"
+#include "server/scene/mesh.h"
 
 #define FRAMES_MAX 20000
 
@@ -19,6 +21,7 @@ struct lens {
     /* NAN if absent. */
     double width, height, fl_x, fl_y, cx, cy, angle_x, angle_y;
     double k[6], k8, p[2], s[2]; /* as in struct camera */
+    double rescale;              /* of focal lengths and principal point in pixels, at last; 0: none */
     bool is_relative; /* fl_x, fl_y are shares of the picture's longer side; cx, cy, too, from the picture's centre */
 };
 
@@ -48,13 +51,25 @@ struct frames {
     /* stored = applied_scale * applied (world of the capture), where the file says so: applied.h */
     bool has_applied;
     double applied[3][4], applied_scale;
-    size_t named_count; /* frames in the file */
-    size_t frame_count; /* usable frames: faulty ones are left out */
+    /* Others than those of the poses, which are called `coordinates`; NULL: "file". */
+    const char *coordinates;
+    struct coordinates other[COORDINATES_MAX];
+    size_t other_count;
+    bool is_placed_by_mesh; /* nothing tells which the mesh is in: where the cameras stand about it decides */
+    size_t named_count;     /* frames in the file */
+    size_t frame_count;     /* usable frames: faulty ones are left out */
     struct frame *frame;
 };
 
 void frames_release(struct frames *t);
 void frame_release(struct frame *frame);
+
+/* Adds coordinates of which the poses' are poses_from * those. */
+void frames_know(struct frames *t, const char *name, const char *text, const double poses_from[3][4]);
+/* Takes the poses to those that the reading names ("file": as the files are) or, where it names none and nothing else
+ * tells, to those in which most cameras stand within the mesh's bounds (NULL: no mesh). STATUS_INPUT: the capture knows
+ * none of that name. */
+enum status frames_settle_coordinates(struct frames *t, const char *given, const struct mesh *mesh, struct error *err);
 
 /* The camera of a frame whose picture is width x height pixels, in coordinates whose origin lies at `offset` in the
  * file's (that of struct mesh). STATUS_INPUT when the file states another size or an invalid lens. */

@@ -100,3 +100,18 @@ void pose_to_rigid(const struct exact_pose *pose, const double offset[3], struct
     forward->translation = vec3_make((float)t[0], (float)t[1], (float)t[2]);
     inverse->translation = vec3_make((float)back[0], (float)back[1], (float)back[2]);
 }
+
+void pose_transform(const double to[3][4], struct exact_pose *pose) {
+    const struct exact_pose old = *pose;
+    double scale = sqrt(to[0][0] * to[0][0] + to[1][0] * to[1][0] + to[2][0] * to[2][0]);
+    for (int i = 0; i < 3; i++) {
+        pose->translation[i] = to[i][3];
+        for (int k = 0; k < 3; k++)
+            pose->translation[i] += to[i][k] * old.translation[k];
+        for (int j = 0; j < 3; j++) {
+            pose->rotation[i][j] = 0.0;
+            for (int k = 0; k < 3; k++)
+                pose->rotation[i][j] += to[i][k] / scale * old.rotation[k][j];
+        }
+    }
+}

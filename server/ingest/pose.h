@@ -24,6 +24,9 @@ struct exact_pose {
 enum status pose_from_matrix(const double matrix[3][4], const char *what, enum pose_axes axes,
                              struct exact_pose *world_from_camera, bool *scaled, struct error *err);
 
+/* The pose in the coordinates to which `to` leads: a similarity, whose scale goes to the position only. */
+void pose_transform(const double to[3][4], struct exact_pose *pose);
+
 /* The pose and its inverse in single precision, in coordinates whose origin lies at `offset` in the file's. */
 void pose_to_rigid(const struct exact_pose *world_from_camera, const double offset[3], struct rigid *forward,
                    struct rigid *inverse);

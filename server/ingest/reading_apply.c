@@ -65,11 +65,23 @@ static void shift_poses(struct frames *t, int shift) {
     mem_free(pose);
 }
 
+/* The pinhole of its focal length and principal point. */
+static void lens_straighten(struct lens *lens) {
+    lens->model = CAMERA_OPENCV;
+    memset(lens->k, 0, sizeof lens->k);
+    memset(lens->p, 0, sizeof lens->p);
+    memset(lens->s, 0, sizeof lens->s);
+    lens->k8 = 0.0;
+}
+
 void reading_apply_frames(const struct reading *r, struct frames *t) {
     for (size_t i = 0; i < t->frame_count; i++) {
         struct frame *frame = &t->frame[i];
         if (r->axes != AXES_OF_FORMAT && r->axes != t->axes)
             frame->world_from_camera = reading_reinterpret(&frame->world_from_camera, t->axes, r->axes);
+        frame->lens.rescale = r->lens;
+        if (r->ignores_distortion)
+            lens_straighten(&frame->lens);
         if (r->ignores_exposures) {
             frame->exposure_source = EXPOSURE_UNKNOWN;
             frame->exposure = 0.0;

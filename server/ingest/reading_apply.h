@@ -6,7 +6,7 @@
 #include "server/ingest/frames.h"
 #include "server/scene/mesh.h"
 
-/* Axes, shift and exposures. Exposures that only the photographs' EXIF tells are read later and not seen here. */
+/* Axes, lens, shift and exposures. Exposures that only the photographs' EXIF tells are read later and not seen here. */
 void reading_apply_frames(const struct reading *reading, struct frames *t);
 /* Axes and scale. */
 void reading_apply_mesh(const struct reading *reading, struct mesh *mesh);

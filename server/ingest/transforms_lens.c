@@ -21,10 +21,11 @@ static void unknown_model(struct frame_context *c, const char *name) {
         {"FISHEYE624", "undistort the photographs, or calibrate as OPENCV_FISHEYE or THIN_PRISM_FISHEYE"},
     };
     struct error err;
-    error_set(&err, STATUS_INPUT,
-              "%s: unknown camera_model \"%.80s\"; known are PINHOLE, SIMPLE_PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, "
-              "FULL_OPENCV, OPENCV_FISHEYE, SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE, THIN_PRISM_FISHEYE and FOV",
-              c->place, name);
+    error_set(
+        &err, STATUS_INPUT,
+        "%s: unknown camera_model \"%.80s\"; known are PINHOLE, SIMPLE_PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, "
+        "FULL_OPENCV, OPENCV_FISHEYE, SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE, THIN_PRISM_FISHEYE, FOV and DIVISION",
+        c->place, name);
     error_hint(&err, "colmap image_undistorter makes pinhole photographs of any");
     for (size_t i = 0; i < sizeof others / sizeof *others; i++)
         if (strcasecmp(name, others[i].name) == 0)
@@ -52,6 +53,7 @@ static enum camera_model read_model(struct frame_context *c, bool *is_rational) 
         {"RADIAL_FISHEYE", CAMERA_OPENCV_FISHEYE},
         {"THIN_PRISM_FISHEYE", CAMERA_THIN_PRISM_FISHEYE},
         {"FOV", CAMERA_FOV},
+        {"DIVISION", CAMERA_DIVISION},
     };
     const char *name = frame_context_string(c, frame_context_holder(c, "camera_model"), "camera_model");
     struct error err;

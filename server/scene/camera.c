@@ -9,6 +9,7 @@
  *                   x' = s a + 2 p1 a b + p2 (t^2 + 2 a^2) + s1 t^2
  *                   y' = s b + 2 p2 a b + p1 (t^2 + 2 b^2) + s2 t^2
  *   FOV             r' = atan(2 r tan(w / 2)) / w,  (x', y') = r' (x, y) / r
+ *   DIVISION        (x, y) = (x', y') / (1 + k1 r'^2), so that (x', y') = 2 (x, y) / (1 + sqrt(1 - 4 k1 r^2))
  *
  * with (x, y) = (X / Z, Y / Z). The Jacobian determinant is positive at the axis; where it stops being so, the picture
  * folds over. The radial part's fold is found once (camera_find_fold); the sign of the tangential and prism parts is
@@ -24,7 +25,7 @@
 #define NEWTON_STEPS 50
 #define NEWTON_PIXELS 1e-6 /* residual at which the inverse is taken as found */
 
-static bool has_distortion(const struct camera *c) {
+bool camera_is_distorted(const struct camera *c) {
     float sum = fabsf(c->k8) + fabsf(c->p[0]) + fabsf(c->p[1]) + fabsf(c->s[0]) + fabsf(c->s[1]);
     for (int i = 0; i < 6; i++)
         sum += fabsf(c->k[i]);
@@ -115,7 +116,7 @@ static double radial_growth(const struct camera *c, double r, double *distorted)
 
 void camera_find_fold(struct camera *c) {
     c->fold = 0.0f;
-    if (!has_distortion(c) || c->model == CAMERA_FOV)
+    if (!camera_is_distorted(c) || c->model == CAMERA_FOV || c->model == CAMERA_DIVISION)
         return;
     /* March over the angle in even steps to just below 90 degrees. Twice the picture's corner leaves room for the
      * tangential part. */
@@ -195,12 +196,22 @@ static bool project_fov(const struct camera *c, float x, float y, float *u, floa
     return true;
 }
 
+/* False beyond the radius that is the edge of the picture's plane, or its fold where k1 is positive. */
+static bool project_division(const struct camera *c, float x, float y, float *u, float *v) {
+    double root = 1.0 - 4.0 * (double)c->k[0] * ((double)x * (double)x + (double)y * (double)y);
+    double scale = 2.0 / (1.0 + sqrt(fmax(root, 0.0)));
+    *u = (float)(scale * (double)x);
+    *v = (float)(scale * (double)y);
+    return root > 0.0;
+}
+
 /* The lens, from the plane at distance 1 to the distorted one. */
 static bool project_lens(const struct camera *c, float x, float y, float *u, float *v) {
     switch (c->model) {
     case CAMERA_OPENCV_FISHEYE: return project_fisheye(c, x, y, u, v);
     case CAMERA_THIN_PRISM_FISHEYE: return project_thin_prism(c, x, y, u, v);
     case CAMERA_FOV: return project_fov(c, x, y, u, v);
+    case CAMERA_DIVISION: return project_division(c, x, y, u, v);
     case CAMERA_OPENCV: break;
     }
     return project_opencv(c, x, y, u, v);
@@ -291,16 +302,27 @@ static bool invert_fov(const struct camera *c, double *x, double *y) {
     return true;
 }
 
+static bool invert_division(const struct camera *c, double *x, double *y) {
+    double bent = (double)c->k[0] * (*x * *x + *y * *y);
+    if (!(bent > -1.0 && bent < 1.0)) /* the plane's edge, and the fold */
+        return false;
+    *x /= 1.0 + bent;
+    *y /= 1.0 + bent;
+    return true;
+}
+
 /* From the distorted plane to the direction (x, y, *z), of any length. */
 static bool invert_lens(const struct camera *c, double *x, double *y, double *z) {
     *z = 1.0;
     if (c->model == CAMERA_FOV)
         return invert_fov(c, x, y);
+    if (c->model == CAMERA_DIVISION)
+        return invert_division(c, x, y);
     if (c->model == CAMERA_OPENCV)
-        return !has_distortion(c) || invert_plane(c, x, y);
+        return !camera_is_distorted(c) || invert_plane(c, x, y);
     double bent = hypot(*x, *y), t = bent;
     if (c->model == CAMERA_THIN_PRISM_FISHEYE) {
-        if (has_distortion(c) && !invert_plane(c, x, y))
+        if (camera_is_distorted(c) && !invert_plane(c, x, y))
             return false;
         bent = t = hypot(*x, *y);
     } else if (!invert_fisheye(c, bent, &t)) {

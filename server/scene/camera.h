@@ -6,6 +6,7 @@
  *                       eighth power of the radius, which nerfstudio and others have. Pinhole: all zero
  *   OPENCV_FISHEYE      k1 to k4 (Kannala-Brandt), as OpenCV's fisheye page defines it
  *   THIN_PRISM_FISHEYE  k1 to k4, p1 p2, s1 s2, as COLMAP defines it
+ *   DIVISION            k[0] is Fitzgibbon's lambda (2001), as RealityCapture's "division" has it
  *   FOV                 k[0] is the angle omega in radians (Devernay & Faugeras 2001), as COLMAP defines it */
 #ifndef UNBAKE_SCENE_CAMERA_H
 #define UNBAKE_SCENE_CAMERA_H
@@ -15,7 +16,7 @@
 
 #include "common/vec.h"
 
-enum camera_model { CAMERA_OPENCV, CAMERA_OPENCV_FISHEYE, CAMERA_THIN_PRISM_FISHEYE, CAMERA_FOV };
+enum camera_model { CAMERA_OPENCV, CAMERA_OPENCV_FISHEYE, CAMERA_THIN_PRISM_FISHEYE, CAMERA_FOV, CAMERA_DIVISION };
 
 struct camera {
     enum camera_model model;
@@ -31,9 +32,12 @@ struct camera {
 
 /* Finds where the distortion stops growing and sets `fold`, the limit up to which the model is one-to-one: tan of the
  * angle from the axis (OPENCV) or that angle in radians (fisheye); well outside the picture if it never folds; 0 without
- * distortion and for FOV, which never folds. Beyond it the polynomial maps directions outside the view into the picture. Call once after
+ * distortion and for FOV and DIVISION, which have closed forms. Beyond it the polynomial maps directions outside the view into the picture. Call once after
  * size and lens parameters are set. */
 void camera_find_fold(struct camera *camera);
+
+/* Whether the lens differs from a pinhole. */
+bool camera_is_distorted(const struct camera *camera);
 
 /* Projects a world point, in closed form. False when it is behind the camera, beyond the fold or outside the picture.
  * *depth_m is along the optical axis. */

@@ -5,6 +5,7 @@
 #include <stddef.h>
 
 #include "common/reading.h"
+#include "server/scene/coordinates.h"
 #include "server/scene/mesh.h"
 #include "server/scene/photograph.h"
 
@@ -16,6 +17,8 @@ struct scene {
     char *source;               /* kind of capture: "COLMAP"; NULL in scenes that were not read from a bundle; owned */
     size_t named_count;         /* frames that its files name, of which the photographs are those that can be used */
     enum matrix_axes pose_axes; /* what the matrices of the cameras' file were taken for */
+    struct coordinates other[COORDINATES_MAX]; /* others than the poses', in which the mesh might be */
+    size_t other_count;
     struct spill *spill; /* for arrays with an element for each pixel of all photographs; NULL: memory; borrowed */
     size_t warning_count;
     char **warning; /* [warning_count] sentences for the user; owned */

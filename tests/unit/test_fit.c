@@ -70,6 +70,28 @@ static void double_lens(struct scene *scene) {
     }
 }
 
+/* Poses that nerfstudio turned, moved and scaled; the scene knows by what. */
+static void apply_transform(struct scene *scene) {
+    static const double to[3][4] = {{0.3, -0.4, 0.0, 1.5}, {0.4, 0.3, 0.0, -0.7}, {0.0, 0.0, 0.5, 2.0}};
+    for (size_t i = 0; i < scene->photograph_count; i++) {
+        struct exact_pose pose;
+        const struct rigid *rigid = &scene->photograph[i].camera.world_from_camera;
+        const float t[3] = {rigid->translation.x, rigid->translation.y, rigid->translation.z};
+        for (int row = 0; row < 3; row++) {
+            pose.translation[row] = (double)t[row];
+            for (int column = 0; column < 3; column++)
+                pose.rotation[row][column] = (double)rigid->rotation[row][column];
+        }
+        struct rigid inverse, moved;
+        pose_transform(to, &pose);
+        pose_to_rigid(&pose, (double[3]){0}, &moved, &inverse);
+        set_pose(&scene->photograph[i].camera, moved);
+    }
+    scene->other[0] = (struct coordinates){.name = "capture", .text = "those before applied_transform"};
+    memcpy(scene->other[0].poses_from, to, sizeof to);
+    scene->other_count = 1;
+}
+
 static void distort(struct scene *scene) {
     for (size_t i = 0; i < scene->photograph_count; i++) {
         struct camera *c = &scene->photograph[i].camera;
@@ -140,8 +162,10 @@ static const struct {
     {"OpenCV's axes", flip_cameras, FIT_NO, "{\"axes\":\"opencv\"}", true, "OpenCV"},
     {"world-to-camera", invert_cameras, FIT_NO, "{\"axes\":\"opengl-inverse\"}", true, "world-to-camera"},
     {"a frame too late", shift_by_one, FIT_NO, "{\"shift\":1}", true, "frame after"},
-    {"another picture's size", double_lens, FIT_NO, NULL, false, "2 times the size"},
-    {"undistorted pictures", distort, FIT_NO, NULL, false, "no lens distortion"},
+    {"another picture's size", double_lens, FIT_NO, "{\"lens\":0.5}", true, "2 times the size"},
+    {"undistorted pictures", distort, FIT_NO, "{\"distortion\":\"ignored\"}", true, "no lens distortion"},
+    {"a mesh before applied_transform", apply_transform, FIT_NO, "{\"coordinates\":\"capture\"}", true,
+     "applied_transform"},
     {"another origin", move_a_little, FIT_DOUBTFUL, NULL, false, NULL},
     {"another place", move_away, FIT_NO, NULL, false, ""},
 };

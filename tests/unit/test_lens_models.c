@@ -65,6 +65,36 @@ static void test_fov(void) {
     CHECK(!camera_direction(&c, 1.0f, 1.0f, &(vec3){0}) && camera_direction(&c, 300.0f, 200.0f, &(vec3){0}));
 }
 
+/* Of a lens of 122 degrees, as RealityCapture has measured it. */
+static void test_division(void) {
+    struct camera c = {.model = CAMERA_DIVISION,
+                       .width = 640,
+                       .height = 480,
+                       .fx = 281.0f,
+                       .fy = 281.0f,
+                       .cx = 322.0f,
+                       .cy = 236.0f,
+                       .k = {-0.2664f}};
+    for (int i = 0; i < 3; i++)
+        c.world_from_camera.rotation[i][i] = c.camera_from_world.rotation[i][i] = 1.0f;
+    camera_find_fold(&c);
+    CHECK(c.fold == 0.0f && camera_is_distorted(&c));
+    for (int i = 0; i < 4; i++) {
+        /* the model's own definition: from the picture outwards */
+        double x = seen[i][0], y = seen[i][1], below = 1.0 - 0.2664 * (x * x + y * y);
+        float px = NAN, py = NAN, depth_m;
+        CHECK(camera_project(&c, vec3_make((float)(x / below), (float)(y / below), 1.0f), &px, &py, &depth_m));
+        CHECK_NEAR(px, 281.0 * x + 322.0, 1e-3);
+        CHECK_NEAR(py, 281.0 * y + 236.0, 1e-3);
+    }
+    check_round_trip(&c, "DIVISION");
+    c.k[0] = 0.2f;
+    check_round_trip(&c, "DIVISION with a cushion");
+    CHECK(!camera_project(&c, vec3_make(2.0f, 0.0f, 1.0f), &(float){0}, &(float){0}, &(float){0})); /* its fold */
+    c.k[0] = -2.0f;
+    CHECK(!camera_direction(&c, 1.0f, 1.0f, &(vec3){0}) && camera_direction(&c, 300.0f, 200.0f, &(vec3){0}));
+}
+
 static void test_thin_prism(void) {
     const double k1 = 0.02, k2 = -0.011, p1 = 0.0013, p2 = -0.0021, k3 = 0.004, k4 = -0.0007, sx1 = 0.0031,
                  sy1 = -0.0017;
@@ -211,6 +241,7 @@ static void test_utf16(void) {
 
 int main(void) {
     test_fov();
+    test_division();
     test_thin_prism();
     test_nerfstudio();
     test_spellings();

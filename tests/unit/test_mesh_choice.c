@@ -68,6 +68,14 @@ static void test_choice(void) {
     check("", NULL, 100, "scene_dense_mesh_refine_texture.obj", "and 2 more");
 }
 
+static void check_undone(const struct exact_pose *pose) {
+    for (int i = 0; i < 3; i++) {
+        CHECK_NEAR(pose->translation[i], 4 + i, 1e-12);
+        for (int j = 0; j < 3; j++)
+            CHECK_NEAR(pose->rotation[i][j], i == j, 1e-12);
+    }
+}
+
 /* stored = 2 (P x + (1, 2, 3)) with P that makes y of x, -x of y. */
 static void test_undo(void) {
     struct findings f = {.problems = cJSON_CreateArray()};
@@ -78,16 +86,28 @@ static void test_undo(void) {
                        .has_applied = true,
                        .applied = {{0, -1, 0, 1}, {1, 0, 0, 2}, {0, 0, 1, 3}},
                        .applied_scale = 2.0};
-    applied_settle(&t, "transforms.json", "mesh.ply", &f);
-    CHECK(t.has_applied && f.warning_count == 1 && strstr(f.warning[0], "moved or scaled"));
-    applied_settle(&t, "transforms.json", "a/scene_dense_mesh.ply", &f);
-    const struct exact_pose *pose = &frame.world_from_camera;
+    const struct exact_pose stored = frame.world_from_camera;
+    applied_settle(&t, "transforms.json", "mesh.ply", NULL, &f);
+    CHECK(t.has_applied && f.warning_count == 1 && strstr(f.warning[0], "needs coordinates=capture"));
+    /* As the user says, or the check of fit finds; and back. */
+    CHECK(t.other_count == 1 && frames_settle_coordinates(&t, "capture", NULL, NULL) == STATUS_OK);
+    check_undone(&frame.world_from_camera);
+    CHECK(frames_settle_coordinates(&t, "capture", NULL, NULL) == STATUS_OK);
+    check_undone(&frame.world_from_camera);
+    CHECK(frames_settle_coordinates(&t, "file", NULL, NULL) == STATUS_OK);
+    for (int i = 0; i < 3; i++)
+        CHECK_NEAR(frame.world_from_camera.translation[i], stored.translation[i], 1e-12);
+    struct error err;
+    CHECK(frames_settle_coordinates(&t, "chunk", NULL, &err) == STATUS_INPUT);
+    CHECK_THAT(strstr(err.message, "only \"file\", \"capture\""), "%s", err.message);
+    t.other_count = 0;
+    /* By the mesh's name; it may be wrong, so the file's are known. */
+    applied_settle(&t, "transforms.json", "a/scene_dense_mesh.ply", NULL, &f);
     CHECK(!t.has_applied && f.warning_count == 2 && strstr(f.warning[1], "were turned back"));
-    for (int i = 0; i < 3; i++) {
-        CHECK_NEAR(pose->translation[i], 4 + i, 1e-12);
-        for (int j = 0; j < 3; j++)
-            CHECK_NEAR(pose->rotation[i][j], i == j, 1e-12);
-    }
+    check_undone(&frame.world_from_camera);
+    CHECK(t.other_count == 1 && frames_settle_coordinates(&t, "file", NULL, NULL) == STATUS_OK);
+    for (int i = 0; i < 3; i++)
+        CHECK_NEAR(frame.world_from_camera.translation[i], stored.translation[i], 1e-12);
     t.has_applied = true;
     t.applied[2][2] = -1;
     applied_undo(&t, "transforms.json", "", &f);

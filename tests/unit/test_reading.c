@@ -16,7 +16,7 @@ static void test_round_trip(void) {
     static const char *const texts[] = {
         "{}",
         "{\"transforms\":\"a/b.json\",\"mesh\":\"m.ply\",\"axes\":\"opencv-inverse\",\"mesh_axes\":\"x -z y\",\"scale\":0.001,"
-        "\"shift\":-1,\"exposures\":\"ignored\"}",
+        "\"shift\":-1,\"coordinates\":\"capture\",\"lens\":0.5,\"distortion\":\"ignored\",\"exposures\":\"ignored\"}",
     };
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
         struct reading reading;
@@ -48,6 +48,10 @@ static void test_faults(void) {
         {"{\"shift\":11}", "shift must"},
         {"{\"mesh\":\"\"}", "mesh must"},
         {"{\"exposures\":true}", "exposures must"},
+        {"{\"distortion\":\"no\"}", "distortion must"},
+        {"{\"coordinates\":\"elsewhere\"}", "coordinates must"},
+        {"{\"lens\":0}", "lens must"},
+        {"{\"lens\":\"2\"}", "lens must"},
     };
     for (size_t i = 0; i < sizeof faults / sizeof *faults; i++) {
         struct reading reading;
@@ -68,6 +72,8 @@ static void test_assignments(void) {
     CHECK_STRING(text, "{\"mesh_axes\":\"x,-z,y\",\"scale\":0.001}");
     mem_free(text);
     CHECK(reading_parse_assignment("scale", json, &err) == STATUS_INPUT);
+    CHECK(reading_parse_assignment("lens=0.5", json, &err) == STATUS_OK);
+    CHECK(reading_parse_assignment("lens=wide", json, &err) == STATUS_INPUT);
     CHECK(reading_parse_assignment("scale=big", json, &err) == STATUS_INPUT);
     cJSON_Delete(json);
 }
@@ -157,8 +163,40 @@ static void test_words(void) {
     cJSON_Delete(object);
 }
 
+/* The lens of pictures of half the size, and of none. */
+static void test_lens(void) {
+    const struct lens stated = {.model = CAMERA_THIN_PRISM_FISHEYE,
+                                .width = 640,
+                                .height = 480,
+                                .fl_x = 600,
+                                .fl_y = 500,
+                                .cx = 400,
+                                .cy = 200,
+                                .angle_x = NAN,
+                                .angle_y = NAN,
+                                .k = {0.1},
+                                .k8 = 0.2,
+                                .p = {0.3},
+                                .s = {0.4}};
+    struct frame frame = {.lens = stated, .world_from_camera = {.rotation = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}};
+    struct frames t = {.frame = &frame, .frame_count = 1};
+    struct reading reading = reading_default();
+    struct camera camera;
+    reading.lens = 0.5;
+    reading_apply_frames(&reading, &t);
+    CHECK(frame_camera(&frame, 640, 480, (double[3]){0}, &camera, &err) == STATUS_OK);
+    CHECK(camera.fx == 300.0f && camera.fy == 250.0f && camera.cx == 200.0f && camera.cy == 100.0f);
+    CHECK(camera.model == CAMERA_THIN_PRISM_FISHEYE && camera_is_distorted(&camera));
+    reading.lens = 1.0;
+    reading.ignores_distortion = true;
+    reading_apply_frames(&reading, &t);
+    CHECK(frame_camera(&frame, 640, 480, (double[3]){0}, &camera, &err) == STATUS_OK);
+    CHECK(camera.fx == 600.0f && camera.model == CAMERA_OPENCV && !camera_is_distorted(&camera));
+}
+
 int main(void) {
     test_words();
+    test_lens();
     test_round_trip();
     test_faults();
     test_assignments();

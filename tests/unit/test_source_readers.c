@@ -1,6 +1,7 @@
 /* test_source_readers.c -- readers of sources without a capture in the test data: one view of the demo room, written as each
  * tool has it, is read as the pose that transforms.json of the room has. The texts were computed from that pose by the
  * formulas that the tools document (named in the readers), apart from this program. */
+#include "server/ingest/source/values.h"
 #include "tests/unit/source_rig.h"
 
 #define RECORD3D_POSE                                                                                                  \
@@ -265,7 +266,13 @@ static void test_realitycapture_xmp(void) {
     CHECK_NEAR(camera.cy, 62, 1e-4);
     CHECK(source_rig_warned(&rig, "1 files .xmp hold no pose"));
     put("b.xmp", XMP("xcr:DistortionModel=\"division\" xcr:FocalLength35mm=\"23.4\"", XMP_POSE));
-    source_rig_refused(&rig, "division");
+    frame = check(0, 1, "b.jpg");
+    CHECK(frame_camera(frame, 160, 120, (double[3]){0}, &camera, &err) == STATUS_OK);
+    CHECK(camera.model == CAMERA_DIVISION && camera.k[0] == 0.1f);
+    put("b.xmp", XMP("xcr:DistortionModel=\"division2\" xcr:FocalLength35mm=\"23.4\"",
+                     "<xcr:Rotation>" W2C "</xcr:Rotation>\n<xcr:Position>" CENTRE "</xcr:Position>"
+                     "<xcr:DistortionCoeficients>0.1 0.2 0 0 0 0</xcr:DistortionCoeficients>"));
+    source_rig_refused(&rig, "division2");
     put("b.xmp", "<a><b></a>");
     source_rig_refused(&rig, "b.xmp");
     source_rig_stop(&rig);
@@ -283,6 +290,45 @@ static void test_realitycapture_xmp(void) {
     "<transform><rotation locked=\"true\">0 -1 0 1 0 0 0 0 1</rotation><translation>1 2 3</translation>"               \
     "<scale>2</scale></transform>"
 
+/* Where the camera stands in each of the coordinates that a model may have. */
+static void test_geocentric(struct frames *t) {
+    double m[16], camera[3]; /* in the chunk's */
+    CHECK(numbers_parse(META_CAMERA, 16, m));
+    for (int i = 0; i < 3; i++)
+        camera[i] = m[4 * i + 3];
+    const double *at = t->frame[0].world_from_camera.translation;
+    double scale = 12.354192447331316, distance = 0.0, origin[3] = {-2499366.429888, -4256836.520906, 4029217.965003};
+    struct mesh mesh = {0};
+    CHECK(t->other_count == 2 && t->is_placed_by_mesh);
+    for (int i = 0; i < 3; i++)
+        distance += (at[i] - origin[i]) * (at[i] - origin[i]);
+    CHECK_NEAR(sqrt(distance), scale * sqrt(camera[0] * camera[0] + camera[1] * camera[1] + camera[2] * camera[2]),
+               1e-3);
+    double height = sqrt(at[0] * at[0] + at[1] * at[1] + at[2] * at[2]);
+    CHECK(frames_settle_coordinates(t, "local", NULL, NULL) == STATUS_OK);
+    double across = sqrt(at[0] * at[0] + at[1] * at[1] + at[2] * at[2]);
+    CHECK_NEAR(across, sqrt(distance), 1e-6);
+    /* Up is away from the Earth's centre, but for a fifth of a degree. */
+    double middle = sqrt(origin[0] * origin[0] + origin[1] * origin[1] + origin[2] * origin[2]);
+    CHECK_NEAR(at[2], height - middle, 0.0034 * across + 1e-3);
+    CHECK(frames_settle_coordinates(t, "chunk", NULL, NULL) == STATUS_OK);
+    for (int i = 0; i < 3; i++)
+        CHECK_NEAR(at[i], camera[i], 1e-6);
+    /* By a mesh about the cameras in one of them. */
+    CHECK(frames_settle_coordinates(t, "file", NULL, NULL) == STATUS_OK);
+    vec3 corner[2] = {{-8.0f, -8.0f, -8.0f}, {8.0f, 8.0f, 8.0f}};
+    uint32_t index[1][3] = {{0, 1, 0}};
+    mesh.position = corner;
+    mesh.vertex_count = 2;
+    mesh.index = index;
+    mesh.triangle_count = 1;
+    CHECK(frames_settle_coordinates(t, NULL, &mesh, NULL) == STATUS_OK);
+    CHECK_STRING(t->coordinates, "chunk");
+    memcpy(mesh.offset, origin, sizeof origin);
+    CHECK(frames_settle_coordinates(t, NULL, &mesh, NULL) == STATUS_OK);
+    CHECK_STRING(t->coordinates, "file");
+}
+
 static void test_metashape(void) {
     source_rig_start(&rig, "Metashape");
     put("photos/b.jpg", "");
@@ -299,7 +345,8 @@ static void test_metashape(void) {
             "<transform><rotation locked=\"true\">0.8710699454 0.3070967021 -0.3833128821 -0.4909742007 0.5658364395 "
             "-0.6623997719 0.0134716110 0.7651932691 0.6436596744</rotation><translation locked=\"true\">-2499366.429888 "
             "-4256836.520906 4029217.965003</translation><scale locked=\"true\">12.354192447331316</scale></transform>"));
-    source_rig_refused(&rig, "geocentric");
+    CHECK(source_rig_read(&rig) && rig.t.frame_count == 1 && rig.findings.problem_count == 0);
+    test_geocentric(&rig.t);
     source_rig_stop(&rig);
 }
 

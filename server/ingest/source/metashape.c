@@ -1,9 +1,12 @@
 /* metashape.c -- Agisoft Metashape's "Export Cameras", XML (Metashape manual, appendices C and D).
  *
  * A camera's transform is camera-to-chunk, 4 x 4, row-major, with our camera axes; the chunk's transform (or, since 2.0,
- * the camera's component's) takes it to the coordinates in which models are exported. A chunk in geocentric coordinates
- * has no such transform for models in a projected system, which is refused. Distortion: k1 to k4 of even powers, p1
- * (r^2 + 2 x^2) + 2 p2 x y for x: OpenCV's with p1 and p2 exchanged; cx, cy from the picture's centre; fx = f + b1. */
+ * the camera's component's) takes it to the coordinates in which models are exported. That of a georeferenced chunk leads
+ * to geocentric coordinates, in which models are seldom exported: theirs may also be the chunk's own ("chunk") or have
+ * their origin in the chunk's region, x to the east and z up ("local"). A model in a projected system fits none of these.
+ *
+ * Distortion: k1 to k4 of even powers, p1 (r^2 + 2 x^2) + 2 p2 x y for x: OpenCV's with p1 and p2 exchanged; cx, cy from
+ * the picture's centre; fx = f + b1. */
 #include <math.h>
 #include <string.h>
 
@@ -15,6 +18,7 @@
 
 /* Millions of metres from the origin: the centre of the Earth, 6.4 million metres below. */
 #define GEOCENTRIC_M 5e6
+#define WGS84_AXES_RATIO (6356752.314245 / 6378137.0) /* polar over equatorial radius */
 
 /* By what it begins with: its name is the user's. */
 static char *recognise(const struct listing *l, const char *base) {
@@ -67,6 +71,41 @@ static enum status read_sensor(const struct xml_node *sensor, const char *name, 
     return STATUS_OK;
 }
 
+/* Axes that point east, north and up where a geocentric point is, and that as their origin: WGS 84's normal there. */
+static void make_local(const double at[3], double local[3][4]) {
+    double up[3] = {at[0], at[1], at[2] / (WGS84_AXES_RATIO * WGS84_AXES_RATIO)}, length = 0.0;
+    double east[3] = {-at[1], at[0], 0.0}, across = hypot(at[0], at[1]);
+    for (int i = 0; i < 3; i++)
+        length += up[i] * up[i];
+    for (int i = 0; i < 3; i++) {
+        up[i] /= sqrt(length);
+        east[i] = across > 0.0 ? east[i] / across : i == 0;
+    }
+    for (int i = 0; i < 3; i++) {
+        int a = (i + 1) % 3, b = (i + 2) % 3;
+        local[i][0] = east[i];
+        local[i][1] = up[a] * east[b] - up[b] * east[a];
+        local[i][2] = up[i];
+        local[i][3] = at[i];
+    }
+}
+
+/* What a model of a georeferenced chunk may be in. */
+static void know_coordinates(const struct xml_node *chunk, const double geocentric[3][4], struct frames *t) {
+    struct xml_node *centre = xml_child(xml_child(chunk, "region"), "center");
+    double at[3] = {0}, placed[3], local[3][4];
+    if (centre && !numbers_parse(centre->text, 3, at))
+        memset(at, 0, sizeof at);
+    for (int i = 0; i < 3; i++)
+        placed[i] = geocentric[i][0] * at[0] + geocentric[i][1] * at[1] + geocentric[i][2] * at[2] + geocentric[i][3];
+    make_local(placed, local);
+    frames_know(t, "chunk", "the chunk's own", geocentric);
+    frames_know(t, "local", "local ones with the origin in the chunk's region", (const double(*)[4])local);
+    t->is_placed_by_mesh = true;
+}
+
+static bool is_geocentric(const double m[3][4]) { return hypot(hypot(m[0][3], m[1][3]), m[2][3]) > GEOCENTRIC_M; }
+
 /* World from chunk: scale * rotation and translation, of a <transform>; identity where it has none. */
 static enum status read_chunk(const struct xml_node *transform, const char *name, double m[3][4], struct error *err) {
     const struct xml_node *rotation = xml_child(transform, "rotation"),
@@ -74,12 +113,6 @@ static enum status read_chunk(const struct xml_node *transform, const char *name
     double r[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, t[3] = {0}, scale = value_of(transform, "scale", 1.0);
     if ((rotation && !numbers_parse(rotation->text, 9, r)) || (translation && !numbers_parse(translation->text, 3, t)))
         return error_set(err, STATUS_INPUT, "%s: the chunk's transform is not 9 numbers and 3", name);
-    if (hypot(hypot(t[0], t[1]), t[2]) > GEOCENTRIC_M) {
-        error_set(err, STATUS_INPUT,
-                  "%s: the chunk is georeferenced in geocentric coordinates, which no model is exported in", name);
-        return error_hint(err,
-                          "in Metashape's Reference pane choose \"Local Coordinates\", then export cameras and model");
-    }
     for (int i = 0; i < 12; i++)
         m[i / 4][i % 4] = i % 4 < 3 ? scale * r[3 * (i / 4) + i % 4] : t[i / 4];
     return STATUS_OK;
@@ -119,6 +152,8 @@ static enum status read_camera(struct xml_node *chunk, struct xml_node *camera, 
     if (status != STATUS_OK)
         return status;
     place_camera(placed, own, m);
+    if (is_geocentric((const double(*)[4])placed) && list->t->other_count == 0)
+        know_coordinates(chunk, (const double(*)[4])placed, list->t);
     return frame_list_add(list, m, &lens, label, label, NULL, err);
 }
 

@@ -4,7 +4,8 @@
  * In the table a camera with all angles 0 looks down (-z) with north (y) up; its rotation is Rz(-heading) Rx(pitch)
  * Ry(roll) with OpenGL's camera axes. f is a focal length of 35 mm film: f / 36 of the longer side; px and py likewise.
  * In XMP, xcr:Rotation turns the world into the camera, row-major, with our camera axes; xcr:Position is the camera's
- * centre; xcr:PrincipalPointU and V are shares of the longer side. z is up in both. */
+ * centre; xcr:PrincipalPointU and V are shares of the longer side. xcr:DistortionModel "division" is Fitzgibbon's, of
+ * coordinates in focal lengths; others are Brown's. z is up in both. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -175,12 +176,15 @@ static enum status read_description(struct xml_node *d, const char *photograph, 
     take(d, "xcr:PrincipalPointU", 1, &u);
     take(d, "xcr:PrincipalPointV", 1, &v);
     take(d, "xcr:DistortionCoeficients", 6, distortion);
-    if (model && strncmp(model, "division", 8) == 0 && distortion[0] != 0.0) {
-        error_set(err, STATUS_INPUT, "%s: the distortion model \"division\" is not read", list->name);
-        return error_hint(
-            err, "set RealityCapture's distortion model to Brown3 and align again, or export undistorted images");
-    }
     struct lens lens = make_lens(focal / FILM_WIDTH_MM, u, v, distortion);
+    if (model && strncasecmp(model, "division", 8) == 0) {
+        if (distortion[1] != 0.0 || distortion[2] != 0.0 || distortion[3] != 0.0) {
+            error_set(err, STATUS_INPUT, "%s: the distortion model \"%.40s\" has more than one coefficient", list->name,
+                      model);
+            return error_hint(err, "set RealityCapture's distortion model to Brown3 and align again");
+        }
+        lens.model = CAMERA_DIVISION;
+    }
     pose_at_centre(r, centre, m);
     return frame_list_add(list, m, &lens, photograph, "xcr:Rotation", NULL, err);
 }
