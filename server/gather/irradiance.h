@@ -28,6 +28,12 @@ void irradiance_gather(struct irradiance *irradiance, struct incident *scratch, 
 /* Adds light from one unit direction; `flux` is its irradiance on a surface that faces it. */
 void irradiance_add(struct irradiance *irradiance, vec3 shading, vec3 direction, rgb flux);
 
+/* The irradiance itself, the integral of L c. */
+static inline rgb irradiance_flux(const struct irradiance *irradiance) {
+    const float *sum = irradiance->moment[0];
+    return rgb_make(sum[0], sum[1], sum[2]);
+}
+
 /* Radiance that the diffuse lobe with base colour 1 reflects towards unit `wo`. */
 rgb irradiance_diffuse(const struct irradiance *irradiance, vec3 shading, float roughness, vec3 wo);
 

@@ -34,19 +34,13 @@
 /* Lower bounds of Lambert radiance, parts of the median radiance: of the divisor, and for use by detail.h. */
 #define MIN_LAMBERT 1e-4f        /* +25 %: no change */
 #define MIN_LAMBERT_DETAIL 1e-3f /* +25 %: no change */
-/* Bound of one observation's base colour, against division by almost nothing. */
-#define MAX_ALBEDO 4.0f /* +25 %: 0 dB */
-/* Variance by light of other surfaces at which a measured base colour and the denoised one count alike in outgoing
- * radiance. */
-#define MIXING_HALF 0.01f /* +25 %: 0 dB */
 
 size_t divide_highlight_samples(double texels_per_pixel) {
     double samples = SAMPLES_PER_PIXEL / fmax(texels_per_pixel, 1.0);
     return (size_t)fmin(fmax(samples, MIN_SAMPLES), MAX_SAMPLES);
 }
 
-/* Irradiance without the sun's. */
-static bool light_without_sun(const struct divide *d, uint32_t texel, struct surface_point *at,
+bool divide_light_without_sun(const struct divide *d, uint32_t texel, struct surface_point *at,
                               struct irradiance *light) {
     const struct surface *s = &d->surface;
     struct probe_mix mix;
@@ -58,7 +52,7 @@ static bool light_without_sun(const struct divide *d, uint32_t texel, struct sur
 }
 
 static bool light_at(const struct divide *d, uint32_t texel, struct surface_point *at, struct irradiance *light) {
-    if (!light_without_sun(d, texel, at, light))
+    if (!divide_light_without_sun(d, texel, at, light))
         return false;
     sun_add_light(d->sun, d->accel, at, light);
     return true;
@@ -149,10 +143,10 @@ static struct robust_sample observation_of(const struct divide *d, uint32_t texe
         weight /= 1.0f + part * part;
     }
     rgb fused = fused_radiance(d->fused, texel), deviation = noise_deviation(d->noise, d->views, &c->view, fused);
-    rgb usual = rgb_clamp(divide_channels(fused, unit_diffuse, MIN_LAMBERT * median), 0.0f, MAX_ALBEDO);
+    rgb usual = rgb_clamp(divide_channels(fused, unit_diffuse, MIN_LAMBERT * median), 0.0f, DIVIDE_MAX_ALBEDO);
     rgb base = rgb_clamp(divide_channels(rgb_sub(c->observed, specular), unit_diffuse, MIN_LAMBERT * median),
-                         -MAX_ALBEDO, MAX_ALBEDO);
-    rgb noise = rgb_clamp(divide_channels(deviation, unit_diffuse, MIN_LAMBERT * median), 0.0f, MAX_ALBEDO);
+                         -DIVIDE_MAX_ALBEDO, DIVIDE_MAX_ALBEDO);
+    rgb noise = rgb_clamp(divide_channels(deviation, unit_diffuse, MIN_LAMBERT * median), 0.0f, DIVIDE_MAX_ALBEDO);
     return (struct robust_sample){.value = base,
                                   .gray = logf(fmaxf(rgb_mean(base), 0.0f) + OUTLIER_FLOOR),
                                   .deviation = rgb_mean(noise) / (rgb_mean(usual) + OUTLIER_FLOOR),
@@ -178,19 +172,13 @@ static void observe_all(const struct divide *d, uint32_t texel, struct incident 
             observation_of(d, texel, &at, &candidates.candidate[observations->count], scratch);
 }
 
-static rgb texel_color(const struct divide *d, uint32_t texel) {
+rgb divide_color(const struct divide *d, uint32_t texel) {
     const float *from = d->materials->base_color.texel[texel];
     return rgb_make(from[0], from[1], from[2]);
 }
 
-/* Irradiance over the whole sphere, without a cosine. */
-static rgb fluence_of(const struct irradiance *light) {
-    const float *sum = light->moment[0];
-    return rgb_make(sum[0], sum[1], sum[2]);
-}
-
 static struct measured mean_of(struct measured_observations *observations, const struct irradiance *light) {
-    return measured_mean(observations, OUTLIER_SCALE, divide_channels(light->noise, fluence_of(light), FLT_MIN));
+    return measured_mean(observations, OUTLIER_SCALE, divide_channels(light->noise, irradiance_flux(light), FLT_MIN));
 }
 
 /* The texel whose measurement this one takes: its own, or that of its stride x stride block. */
@@ -232,7 +220,7 @@ void divide_texels(struct divide *d, const uint32_t *texel, size_t count) {
     parallel_for(d->pool, (count + CHUNK - 1) / CHUNK, divide_chunk, &list);
 }
 
-/* A function to be called for each valid texel, in any order. */
+/* A function called for each valid texel. */
 struct each {
     const struct divide *divide;
     void (*of)(const void *job, uint32_t texel);
@@ -248,7 +236,7 @@ static void each_chunk(void *user, size_t chunk, int thread) {
         each->of(each->job, inverse->valid[i]);
 }
 
-static void each_valid(const struct divide *d, void (*of)(const void *job, uint32_t texel), const void *job) {
+void divide_each(const struct divide *d, void (*of)(const void *job, uint32_t texel), const void *job) {
     struct each each = {d, of, job};
     parallel_for(d->pool, (d->surface.inverse->valid_count + CHUNK - 1) / CHUNK, each_chunk, &each);
 }
@@ -266,7 +254,7 @@ static void diffuse_texel(const void *user, uint32_t texel) {
         !divide_lambert(job->divide, texel, &lambert))
         return;
     job->diffuse->count[texel] = m->weight;
-    rgb_to_half(job->diffuse->radiance[texel], rgb_mul(rgb_clamp(measured_value(m), 0.0f, MAX_ALBEDO), lambert));
+    rgb_to_half(job->diffuse->radiance[texel], rgb_mul(rgb_clamp(measured_value(m), 0.0f, DIVIDE_MAX_ALBEDO), lambert));
 }
 
 void divide_diffuse(const struct divide *d, struct fused *diffuse) {
@@ -276,7 +264,7 @@ void divide_diffuse(const struct divide *d, struct fused *diffuse) {
     diffuse->radiance = mem_calloc_large(texels, sizeof *diffuse->radiance);
     diffuse->count = mem_calloc_large(texels, sizeof *diffuse->count);
     diffuse->is_bound = mem_calloc_large(texels, sizeof *diffuse->is_bound);
-    each_valid(d, diffuse_texel, &(struct diffuse_job){d, diffuse});
+    divide_each(d, diffuse_texel, &(struct diffuse_job){d, diffuse});
 }
 
 struct lambert_job {
@@ -294,7 +282,7 @@ static void lambert_texel(const void *user, uint32_t texel) {
 }
 
 void divide_lambert_all(const struct divide *d, uint16_t (*lambert)[3]) {
-    each_valid(d, lambert_texel, &(struct lambert_job){d, lambert});
+    divide_each(d, lambert_texel, &(struct lambert_job){d, lambert});
 }
 
 /* Mean base colour over the observed texels of each segment. */
@@ -306,7 +294,7 @@ static void find_typical(struct divide *d) {
         uint32_t texel = inverse->valid[i], segment = surface_segment(&d->surface, texel);
         if (!(d->fused->count[texel] > 0.0f))
             continue;
-        sum[segment][0] += (double)rgb_mean(texel_color(d, texel));
+        sum[segment][0] += (double)rgb_mean(divide_color(d, texel));
         sum[segment][1] += 1.0;
     }
     for (size_t i = 0; i < segments; i++)
@@ -329,55 +317,7 @@ static void keep_measured(struct divide *d, const struct color_prior *prior) {
     }
 }
 
-struct outgoing_job {
-    const struct divide *divide;
-    const float *specular_albedo; /* [segment_count] */
-    const struct divide_outgoing *outgoing;
-};
-
-/* Outgoing radiance of a texel, mean over directions. (Photographs show more: they observe floors at grazing angles and
- * walls towards the light.) The more a measurement may be light of other surfaces, the more the denoised base colour
- * replaces it: a thin window frame would otherwise be as bright as the window. Mirrored sun is left to
- * sun_caustics.h. */
-static void find_outgoing(const void *user, uint32_t texel) {
-    const struct outgoing_job *job = user;
-    const struct divide *d = job->divide;
-    const struct measured *m = &d->measured[texel];
-    uint32_t segment = surface_segment(&d->surface, texel);
-    struct surface_point at;
-    struct irradiance light;
-    if (d->is_emitter[segment] || !light_without_sun(d, texel, &at, &light))
-        return;
-    bool mirrors = job->outgoing->lobe[segment].specular > 0.0f;
-    rgb fluence = fluence_of(&light);
-    sun_add_light(d->sun, d->accel, &at, &light);
-    if (!mirrors)
-        fluence = fluence_of(&light);
-    float known = m->weight > 0.0f ? MIXING_HALF / (MIXING_HALF + image_float_from_half(m->mixing)) : 0.0f;
-    rgb measured = rgb_clamp(measured_value(m), 0.0f, MAX_ALBEDO), expected = texel_color(d, texel);
-    rgb base = rgb_mad(rgb_scale(expected, 1.0f - known), known, measured);
-    rgb unit_diffuse = irradiance_diffuse_mean(&light, at.shading, d->materials->roughness[segment]);
-    rgb diffuse = rgb_mul(base, unit_diffuse);
-    rgb total = rgb_mad(diffuse, job->specular_albedo[segment] * (1.0f / BSDF_PI), fluence);
-    rgb_to_half(job->outgoing->total[texel], total);
-    rgb_to_half(job->outgoing->unmirrored[texel], mirrors ? diffuse : total);
-}
-
-static void find_all_outgoing(const struct divide *d, const struct divide_outgoing *outgoing) {
-    const struct materials *m = d->materials;
-    size_t segments = d->surface.segments->count;
-    float *specular_albedo = mem_array(segments, sizeof *specular_albedo);
-    for (uint32_t i = 0; i < segments; i++) {
-        float roughness = m->roughness[i], specular = m->specular[i];
-        bool mirrors = materials_is_polished(m, i) && !d->is_emitter[i];
-        specular_albedo[i] = highlight_albedo(roughness, specular);
-        outgoing->lobe[i] = (struct incident_lobe){roughness, mirrors ? specular : 0.0f};
-    }
-    each_valid(d, find_outgoing, &(struct outgoing_job){d, specular_albedo, outgoing});
-    mem_free(specular_albedo);
-}
-
-void divide_finish(struct divide *d, const struct divide_outgoing *outgoing) {
+void divide_finish(struct divide *d) {
     const struct surface *s = &d->surface;
     for (size_t i = 0; i < s->inverse->valid_count; i++)
         d->measured[s->inverse->valid[i]] = d->measured[source_texel(d, s->inverse->valid[i])];
@@ -389,5 +329,4 @@ void divide_finish(struct divide *d, const struct divide_outgoing *outgoing) {
         keep_measured(d, prior);
     mem_free(prior);
     find_typical(d);
-    find_all_outgoing(d, outgoing);
 }

@@ -60,14 +60,22 @@ bool divide_lambert(const struct divide *d, uint32_t texel, rgb *lambert);
 /* The same for all measured texels, [height][width]; 0 where it is too dark to divide by. */
 void divide_lambert_all(const struct divide *d, uint16_t (*lambert)[3]);
 
-/* Outgoing radiance of texels, half precision: the mean over directions, and the same without the specular part of
- * polished segments, whose lobes follow it in a light_field. */
-struct divide_outgoing {
-    uint16_t (*total)[3], (*unmirrored)[3]; /* [height][width] */
-    struct incident_lobe *lobe;             /* [segment_count] specular 0: not polished */
-};
+/* After all texels: writes materials->base_color. */
+void divide_finish(struct divide *d);
 
-/* After all texels: writes materials->base_color, and to `outgoing` all texels but those of emitters. */
-void divide_finish(struct divide *d, const struct divide_outgoing *outgoing);
+/* --- for divide_outgoing.h --- */
+
+/* Bound of one observation's base colour, against division by almost nothing. */
+#define DIVIDE_MAX_ALBEDO 4.0f /* +25 %: 0 dB */
+
+/* Base colour of a texel as it is. */
+rgb divide_color(const struct divide *d, uint32_t texel);
+
+/* The point of a texel and its irradiance without the sun's; false where the texel is not valid. */
+bool divide_light_without_sun(const struct divide *d, uint32_t texel, struct surface_point *at,
+                              struct irradiance *light);
+
+/* Calls of(job, texel) for each valid texel, in any order and on all threads. */
+void divide_each(const struct divide *d, void (*of)(const void *job, uint32_t texel), const void *job);
 
 #endif

@@ -1,0 +1,137 @@
+/* solve_emitters.c -- see solve_emitters.h. */
+#include "server/reconstruct/solve_emitters.h"
+
+#include <string.h>
+
+#include "common/mem.h"
+#include "server/light/changing_light.h"
+#include "server/light/sky_doubt.h"
+#include "server/material/emission_pattern.h"
+#include "server/reconstruct/inputs.h"
+#include "server/scene/by_segment.h"
+
+/* Least part of a segment's radiance beyond the reflection of base colour 1 that makes an emitter. White walls of
+ * albedo .9 stay near .1; bowls around lamps, whose pixels mix with the lamp, stay below .25. Higher where all pixels
+ * are mixed. */
+#define EMITTER_SHARE 0.25f
+#define EMITTER_SHARE_MIXED 0.3f
+/* Added where all incident light is an estimate (unseen_light.h), which may be half of the truth. */
+#define EMITTER_SHARE_UNSEEN 0.25f
+/* Unobserved sky may be brighter than assumed by this factor of its radiance. */
+#define SKY_DOUBT 1.0f
+/* Part of a segment's surface whose light must have changed for it to be an emitter. */
+#define EMITTER_CHANGES 0.08f
+#define EVIDENCE_STRIDE 3 /* every third valid texel is used for the mean incident light, for time */
+
+void solve_emitters_init(struct solve_emitters *s, struct reconstruction *r, const struct views *views,
+                         const struct divide *divide) {
+    *s = (struct solve_emitters){r, views, divide, mem_calloc(r->segments.count, sizeof *s->pattern_emitters)};
+}
+
+void solve_emitters_release(struct solve_emitters *s) { mem_free(s->pattern_emitters); }
+
+/* Finds emission patterns, unless the emitters are those of the last time. */
+static void find_patterns(struct solve_emitters *s) {
+    struct reconstruction *r = s->r;
+    if (memcmp(s->pattern_emitters, r->is_emitter, r->segments.count * sizeof *s->pattern_emitters) == 0)
+        return;
+    memcpy(s->pattern_emitters, r->is_emitter, r->segments.count * sizeof *s->pattern_emitters);
+    const struct emission_pattern_input input = inputs_of_pattern(r, s->views);
+    emission_pattern_find(&input, &r->materials, r->evidence);
+}
+
+void solve_emitters_light(struct solve_emitters *s) {
+    struct reconstruction *r = s->r;
+    find_patterns(s);
+    for (size_t i = 0; i < r->segments.count; i++)
+        r->materials.emission[i] = r->is_emitter[i] ? r->evidence[i].radiance : rgb_gray(0.0f);
+    world_update_lights(&r->world);
+}
+
+/* Sums of Lambert radiance over a segment's texels: all, and those about as bright as the segment. The latter are used
+ * if there are any: next to a window light falls off steeply, and a dim end must not be compared with a bright one. */
+struct lambert_sums {
+    double all[4], bright[4]; /* red, green, blue, texels */
+};
+
+static void add_lambert(double sum[4], rgb lambert) {
+    sum[0] += (double)lambert.r;
+    sum[1] += (double)lambert.g;
+    sum[2] += (double)lambert.b;
+    sum[3] += 1.0;
+}
+
+/* Fills evidence.lambert with means over the observed texels; all texels of a segment that was observed only in mixed
+ * pixels, such as a lamp thinner than a pixel. */
+static void average_lambert(const struct solve_emitters *s) {
+    const struct reconstruction *r = s->r;
+    struct lambert_sums *sum = mem_calloc(r->segments.count, sizeof *sum);
+    for (size_t i = 0; i < r->inverse.valid_count; i += EVIDENCE_STRIDE) {
+        uint32_t texel = r->inverse.valid[i];
+        size_t segment = reconstruction_segment(r, texel);
+        rgb lambert;
+        bool is_seen = r->fused.count[texel] > 0.0f || r->evidence[segment].only_mixed;
+        if (!is_seen || !divide_lambert(s->divide, texel, &lambert))
+            continue;
+        add_lambert(sum[segment].all, lambert);
+        if (evidence_is_bright(r, texel))
+            add_lambert(sum[segment].bright, lambert);
+    }
+    for (size_t i = 0; i < r->segments.count; i++) {
+        struct emitter_evidence *e = &r->evidence[i];
+        const double *from = sum[i].bright[3] > 0.0 ? sum[i].bright : sum[i].all;
+        rgb lambert = e->radiance; /* without evidence a segment counts as a reflector */
+        if (from[3] > 0.0)
+            lambert = rgb_make((float)(from[0] / from[3]), (float)(from[1] / from[3]), (float)(from[2] / from[3]));
+        evidence_set_lambert(e, lambert);
+    }
+    mem_free(sum);
+}
+
+struct decision {
+    const struct solve_emitters *emitters;
+    struct texels_by_segment texels;
+};
+
+static void decide(void *user, size_t segment, int thread) {
+    const struct decision *d = user;
+    struct reconstruction *r = d->emitters->r;
+    struct emitter_evidence *e = &r->evidence[segment];
+    size_t first = d->texels.first[segment], count = d->texels.first[segment + 1] - first;
+    float radiance = rgb_mean(e->radiance), lambert = rgb_mean(e->lambert);
+    float needed = e->only_mixed ? EMITTER_SHARE_MIXED : EMITTER_SHARE;
+    needed += EMITTER_SHARE_UNSEEN * (float)r->unseen_share;
+    bool doubts_sky = e->emitted_share > needed && !r->sky_is_fitted;
+    e->sky_lambert = doubts_sky ? sky_doubt(r, d->texels.texel + first, count) : 0.0f;
+    e->changing_share = changing_light(d->emitters->divide, d->texels.texel + first, count, thread);
+    bool emits = e->is_hidden || e->changing_share > EMITTER_CHANGES ||
+                 radiance - lambert - SKY_DOUBT * e->sky_lambert > needed * radiance;
+    r->is_emitter[segment] = settings_emitter(r->settings, (uint32_t)segment, emits);
+}
+
+void solve_emitters_decide(struct solve_emitters *s) {
+    struct reconstruction *r = s->r;
+    struct decision decision = {.emitters = s};
+    average_lambert(s);
+    by_segment_sort(&decision.texels, &r->segments, &r->inverse);
+    parallel_for(r->pool, r->segments.count, decide, &decision);
+    by_segment_release(&decision.texels);
+}
+
+void solve_emitters_finish(struct solve_emitters *s) {
+    struct reconstruction *r = s->r;
+    struct emitter_fit *emitter = mem_array(r->segments.count, sizeof *emitter);
+    find_patterns(s);
+    const struct emission_pattern_input input = inputs_of_pattern(r, s->views);
+    emission_pattern_separate(&input, &r->materials, r->evidence, emitter);
+    for (size_t i = 0; i < r->segments.count; i++)
+        r->materials.emission[i] = emitter[i].radiance;
+    for (size_t i = 0; i < r->inverse.valid_count; i++) {
+        uint32_t texel = r->inverse.valid[i], segment = reconstruction_segment(r, texel);
+        float *color = r->materials.base_color.texel[texel];
+        for (int c = 0; c < 3 && r->is_emitter[segment]; c++)
+            color[c] = emitter[segment].base_color;
+    }
+    mem_free(emitter);
+    world_update_lights(&r->world);
+}
