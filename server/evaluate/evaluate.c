@@ -2,7 +2,6 @@
 #include "server/evaluate/evaluate.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "common/file.h"
@@ -10,6 +9,7 @@
 #include "common/mem.h"
 #include "common/quantile.h"
 #include "server/capture/orient.h"
+#include "server/evaluate/pair_picture.h"
 #include "server/evaluate/recovered.h"
 #include "server/evaluate/seen.h"
 #include "server/ingest/bundle.h"
@@ -19,6 +19,7 @@
 #include "server/scene/scene.h"
 
 #define ROULETTE_DEPTH 5
+#define DISPLAY_MEDIAN 0.2 /* of the median radiance in pictures, white is 1; as reconstruct/report.c has it */
 #define OBJECTS_LIMIT ((size_t)1 << 26) /* bytes of objects.json */
 
 /* State shared by all views. */
@@ -152,48 +153,6 @@ static void make_pair(struct evaluator *e, const struct photograph *p, uint32_t 
     image_release(&film);
 }
 
-/* --- pictures to look at ------------------------------------------------------------------ */
-
-/* Files list channels by name: B comes before R. */
-struct rgb_columns {
-    int at[3];
-};
-
-static struct rgb_columns find_rgb(const struct image *image, const char *prefix) {
-    struct rgb_columns columns;
-    for (int c = 0; c < 3; c++) {
-        char name[64];
-        snprintf(name, sizeof name, "%s%c", prefix, "RGB"[c]);
-        columns.at[c] = image_channel(image, name);
-    }
-    return columns;
-}
-
-/* `a` beside `b`, of each the channels prefixR, prefixG and prefixB. */
-static enum status write_pair(const struct evaluator *e, const char *what, const char *stem, const struct image *a,
-                              const struct image *b, const char *prefix, float scale, struct error *err) {
-    enum { GAP = 4 };
-    struct image pair;
-    const struct image *side[2] = {a, b};
-    image_init_rgb(&pair, 2 * a->width + GAP, a->height);
-    for (int k = 0; k < 2; k++) {
-        struct rgb_columns columns = find_rgb(side[k], prefix);
-        for (uint32_t y = 0; y < a->height; y++) {
-            for (uint32_t x = 0; x < a->width; x++) {
-                size_t to = (size_t)y * pair.width + x + (k ? a->width + GAP : 0);
-                const float *from = side[k]->pixel + ((size_t)y * a->width + x) * side[k]->channel_count;
-                for (int c = 0; c < 3; c++)
-                    pair.pixel[3 * to + (size_t)c] = from[columns.at[c]];
-            }
-        }
-    }
-    char *path = mem_printf("%s/%s_%s.png", e->settings->pictures_dir, what, stem);
-    enum status status = image_write_png(path, &pair, scale, err);
-    mem_free(path);
-    image_release(&pair);
-    return status;
-}
-
 /* --- one test view ------------------------------------------------------------------------ */
 
 /* "images/004.exr" -> "004"; the caller's. */
@@ -220,7 +179,7 @@ static enum status read_truth(const struct evaluator *e, const struct photograph
 
 /* Clears the flags of pixels where the truth's own samples hit an emitter or nothing. */
 static void mark_by_truth(const struct image *truth, uint8_t *flags) {
-    struct rgb_columns emission = find_rgb(truth, "emission.");
+    struct rgb_columns emission = pair_picture_columns(truth, "emission.");
     int object = image_channel(truth, "object_id");
     for (size_t i = 0; i < (size_t)truth->width * truth->height; i++) {
         const float *t = truth->pixel + i * truth->channel_count;
@@ -230,6 +189,14 @@ static void mark_by_truth(const struct image *truth, uint8_t *flags) {
         if (emits || t[object] < 0.0f)
             flags[i] = 0;
     }
+}
+
+static enum status write_pair(const struct evaluator *e, const char *what, const char *stem, const struct image *a,
+                              const struct image *b, const char *prefix, float scale, struct error *err) {
+    char *path = mem_printf("%s/%s_%s.png", e->settings->pictures_dir, what, stem);
+    enum status status = pair_picture_write(path, a, b, prefix, scale, err);
+    mem_free(path);
+    return status;
 }
 
 static enum status score_photograph(struct evaluator *e, const struct photograph *p, uint32_t view, const char *stem,
@@ -243,7 +210,7 @@ static enum status score_photograph(struct evaluator *e, const struct photograph
     mem_free(path);
     if (status == STATUS_OK && e->settings->pictures_dir)
         status = write_pair(e, "view", stem, &photograph, &render, "",
-                            e->median > 0.0 ? (float)(0.2 / e->median) : 1.0f, err);
+                            e->median > 0.0 ? (float)(DISPLAY_MEDIAN / e->median) : 1.0f, err);
     image_release(&photograph);
     image_release(&render);
     return status;
