@@ -18,6 +18,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/error.h"
+
 /* Returns 0. */
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
@@ -56,6 +58,15 @@ char *fuzz_text(const uint8_t *data, size_t size);
     do {                                                                                                               \
         if (!(condition)) {                                                                                            \
             fprintf(stderr, "%s:%d: failed: %s\n", __FILE__, __LINE__, #condition);                                    \
+            abort();                                                                                                   \
+        }                                                                                                              \
+    } while (0)
+
+/* The same for a call that must return STATUS_OK; else it is told why it did not. */
+#define MUST_OK(call, err)                                                                                             \
+    do {                                                                                                               \
+        if ((call) != STATUS_OK) {                                                                                     \
+            fprintf(stderr, "%s:%d: failed: %s: %s\n", __FILE__, __LINE__, #call, (err)->message);                     \
             abort();                                                                                                   \
         }                                                                                                              \
     } while (0)

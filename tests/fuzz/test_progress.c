@@ -23,14 +23,15 @@ static struct store *store;
 static int job_count;
 
 static void start(void) {
+    struct error err;
     bool existed;
     log_set_level(LOG_ERROR);
     job_count = 0;
-    MUST(store_open(&store, fuzz_folder(), NULL) == STATUS_OK);
-    MUST(store_scene_add(store, SCENE, "room", 10, 0, &existed, NULL) == STATUS_OK);
-    MUST(store_scene_ready(store, SCENE, NULL, "{}", NULL) == STATUS_OK);
+    MUST_OK(store_open(&store, fuzz_folder(), &err), &err);
+    MUST_OK(store_scene_add(store, SCENE, "room", 10, 0, &existed, &err), &err);
+    MUST_OK(store_scene_ready(store, SCENE, NULL, "{}", &err), &err);
     char *out = file_join(fuzz_folder(), "out/preview"), *file = file_join(fuzz_folder(), "out/a.exr");
-    MUST(file_make_dirs(out, NULL) == STATUS_OK);
+    MUST_OK(file_make_dirs(out, &err), &err);
     fuzz_write(file, (const uint8_t *)"0123456789", 10);
     mem_free(file);
     mem_free(out);
@@ -56,25 +57,28 @@ static int pipe_of(const uint8_t *data, size_t size) {
 
 /* A scene that waits for its check, whatever became of it the last time. */
 static void start_check(void) {
+    struct error err;
     bool existed;
     store_scene_delete(store, CHECKED, -1, false, &existed, NULL);
-    MUST(store_scene_add(store, CHECKED, "room", 10, 0, &existed, NULL) == STATUS_OK);
+    MUST_OK(store_scene_add(store, CHECKED, "room", 10, 0, &existed, &err), &err);
 }
 
 static int64_t start_job(int *number) {
+    struct error err;
     struct job_new job = {.scene_id = SCENE, .name = "job", .labels = "{}", .settings = "{}", .max_attempts = 2};
     int64_t id;
     bool replayed;
-    MUST(store_job_add(store, &job, 100, &id, &replayed, NULL) == STATUS_OK);
-    MUST(store_job_start(store, id, number, NULL) == STATUS_OK);
+    MUST_OK(store_job_add(store, &job, 100, &id, &replayed, &err), &err);
+    MUST_OK(store_job_start(store, id, number, &err), &err);
     return id;
 }
 
 /* --- what came of it: it is shown to clients --------------------------------------------------- */
 
 static void check_json(const char *text) {
+    struct error err;
     cJSON *value;
-    MUST(json_parse(text, strlen(text), "what is kept", &value, NULL) == STATUS_OK);
+    MUST_OK(json_parse(text, strlen(text), "what is kept", &value, &err), &err);
     cJSON_Delete(value);
 }
 
@@ -84,9 +88,10 @@ static void check_event(void *user, int64_t id, int64_t at_ms, int attempt, cons
 }
 
 static void check_job(int64_t id) {
+    struct error err;
     struct job job;
-    MUST(store_event_list(store, id, 0, 1000, check_event, NULL, NULL) == STATUS_OK);
-    MUST(store_job_get(store, id, &job, NULL) == STATUS_OK);
+    MUST_OK(store_event_list(store, id, 0, 1000, check_event, NULL, &err), &err);
+    MUST_OK(store_job_get(store, id, &job, &err), &err);
     cJSON *view = view_job(&job, &(struct caller){.role = ROLE_ADMIN});
     char *text = json_text(view);
     check_json(text);
@@ -96,8 +101,9 @@ static void check_job(int64_t id) {
 }
 
 static void check_scene(void) {
+    struct error err;
     struct scene_row row;
-    MUST(store_scene_get(store, CHECKED, &row, NULL) == STATUS_OK);
+    MUST_OK(store_scene_get(store, CHECKED, &row, &err), &err);
     check_json(row.problems);
     check_json(row.facts);
     scene_row_release(&row);
@@ -133,9 +139,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     a.wait_status = (data[0] & 2 ? PROGRESS_EXIT_OK : data[0] & 4 ? PROGRESS_EXIT_INPUT : PROGRESS_EXIT_FAILED) << 8;
     struct error err;
     enum status status = outcome_settle(&a, store, NULL, &counters, &err);
-    if (status != STATUS_OK)
-        fprintf(stderr, "%s\n", err.message);
-    MUST(status == STATUS_OK && a.phase == ATTEMPT_EMPTY);
+    MUST_OK(status, &err);
+    MUST(a.phase == ATTEMPT_EMPTY);
     if (job_id)
         check_job(job_id);
     else

@@ -38,17 +38,11 @@ static struct {
 
 /* --- the daemon ------------------------------------------------------------------------------ */
 
-static void must(enum status status, const struct error *err) {
-    if (status != STATUS_OK)
-        fprintf(stderr, "%s\n", err->message);
-    MUST(status == STATUS_OK);
-}
-
 static void put_file(const char *name, const char *text) {
     char *path = file_join(lab.dir, name), *slash = strrchr(path, '/');
     struct error err;
     *slash = '\0';
-    must(file_make_dirs(path, &err), &err);
+    MUST_OK(file_make_dirs(path, &err), &err);
     *slash = '/';
     fuzz_write(path, (const uint8_t *)text, strlen(text));
     mem_free(path);
@@ -64,17 +58,18 @@ static void add_jobs(struct error *err) {
     struct job_new job = {
         .scene_id = SCENE, .name = "job", .labels = "{\"a\":\"b\"}", .settings = "{}", .max_attempts = 2};
     for (int i = 0; i < 4; i++)
-        must(store_job_add(lab.store, &job, 100, &id, &replayed, err), err);
-    must(store_job_start(lab.store, 1, &attempt, err), err);
+        MUST_OK(store_job_add(lab.store, &job, 100, &id, &replayed, err), err);
+    MUST_OK(store_job_start(lab.store, 1, &attempt, err), err);
     sha256_of(text, strlen(text), digest);
     put_file("jobs/1/out/preview/a.png", text);
     put_file("jobs/1/worker.log", "a line\nanother\n");
     put_file("jobs/1/checkpoint.db", "");
-    must(store_output_put(lab.store, 1, attempt, EVENT_OUTPUT, "preview/a.png", strlen(text), digest, "image/png", err),
-         err);
-    must(store_job_succeed(lab.store, 1, attempt, err), err);
-    must(store_job_start(lab.store, 2, &attempt, err), err);
-    must(store_job_pause(lab.store, 4, err), err);
+    MUST_OK(
+        store_output_put(lab.store, 1, attempt, EVENT_OUTPUT, "preview/a.png", strlen(text), digest, "image/png", err),
+        err);
+    MUST_OK(store_job_succeed(lab.store, 1, attempt, err), err);
+    MUST_OK(store_job_start(lab.store, 2, &attempt, err), err);
+    MUST_OK(store_job_pause(lab.store, 4, err), err);
 }
 
 static void add_upload(struct error *err) {
@@ -82,7 +77,7 @@ static void add_upload(struct error *err) {
     struct sha256 hash;
     sha256_init(&hash);
     memcpy(row.id, UPLOAD, sizeof UPLOAD);
-    must(store_upload_add(lab.store, &row, &hash, sizeof hash, &(struct count_limits){.all = 100}, err), err);
+    MUST_OK(store_upload_add(lab.store, &row, &hash, sizeof hash, &(struct count_limits){.all = 100}, err), err);
     put_file("uploads/" UPLOAD, "");
 }
 
@@ -93,21 +88,21 @@ static void start_daemon(void) {
     int64_t token_id;
     log_set_level(LOG_ERROR);
     snprintf(lab.dir, sizeof lab.dir, "%s/data", fuzz_folder());
-    must(file_make_dirs(lab.dir, &err), &err);
+    MUST_OK(file_make_dirs(lab.dir, &err), &err);
     put_file("reserve", ""); /* or 16 MiB would be put there each time */
-    must(store_open(&lab.store, lab.dir, &err), &err);
-    must(store_scene_add(lab.store, SCENE, "room", 10, 0, &existed, &err), &err);
-    must(store_scene_ready(lab.store, SCENE, NULL, "{\"triangle_count\":12}", &err), &err);
+    MUST_OK(store_open(&lab.store, lab.dir, &err), &err);
+    MUST_OK(store_scene_add(lab.store, SCENE, "room", 10, 0, &existed, &err), &err);
+    MUST_OK(store_scene_ready(lab.store, SCENE, NULL, "{\"triangle_count\":12}", &err), &err);
     put_file("scenes/" SCENE "/archive", "0123456789");
     add_jobs(&err);
     add_upload(&err);
-    must(store_token_add(lab.store, "ada", ROLE_USER, lab.token, &token_id, &err), &err);
+    MUST_OK(store_token_add(lab.store, "ada", ROLE_USER, lab.token, &token_id, &err), &err);
     struct scheduler_config work = {.data_dir = lab.dir,
                                     .worker_binary = "/bin/false",
                                     .max_running = 1,
                                     .checkpoint_interval_sec = 60,
                                     .stop_grace_sec = 1};
-    must(scheduler_new(&lab.scheduler, &work, lab.store, &err), &err);
+    MUST_OK(scheduler_new(&lab.scheduler, &work, lab.store, &err), &err);
     struct api_config config = {.data_dir = lab.dir,
                                 .max_attempts = 2,
                                 .queue_limit = 50,
@@ -119,7 +114,7 @@ static void start_daemon(void) {
                                 .server_names = "lab.example.org",
                                 .libraries = libraries,
                                 .library_count = 1};
-    must(service_new(&lab.api, &config, lab.store, lab.scheduler, &err), &err);
+    MUST_OK(service_new(&lab.api, &config, lab.store, lab.scheduler, &err), &err);
 }
 
 static void stop_daemon(void) {
