@@ -5,7 +5,7 @@
  * open (the file's mode, and the peer's user id). No secret lies on the disk, TLS and the limits
  * on connections do not matter, and it works whatever address the daemon listens on. Where no
  * daemon runs, the command takes the data folder's lock and does the work itself, through the
- * same function.
+ * same function (admin_request.h).
  *
  *      request  one line of JSON: {"command": ..., ...}
  *      reply    one line of JSON: {...}, or {"error", "status", "hint"}; a backup comes as an
@@ -27,9 +27,5 @@ void admin_stop(struct admin *admin); /* NULL is allowed */
 /* The command's side: asks the daemon of that folder or, if none runs, does the work. *reply is the caller's
  * (cJSON_Delete); *fd is a file that came with it, or -1. */
 enum status admin_call(const char *data_dir, const cJSON *request, cJSON **reply, int *fd, struct error *err);
-
-/* Does the work, for both sides. */
-enum status admin_do(const char *data_dir, struct store *store, const cJSON *request, cJSON *reply, int *fd,
-                     struct error *err);
 
 #endif

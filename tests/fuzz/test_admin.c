@@ -1,5 +1,5 @@
 /* test_admin.c -- what comes by the admin socket, and the names of users in it. */
-#include "server/admin/admin.h"
+#include "server/admin/admin_request.h"
 
 #include <unistd.h>
 
@@ -18,7 +18,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     if (json_parse((const char *)data, size, "the request", &request, NULL) != STATUS_OK)
         return 0;
     cJSON *reply = cJSON_CreateObject();
-    enum status status = admin_do(fuzz_folder(), store, request, reply, &fd, &err);
+    enum status status = admin_request_do(fuzz_folder(), store, request, reply, &fd, &err);
     MUST(status != STATUS_INTERNAL && status != STATUS_CORRUPT && status != STATUS_IO);
     MUST(status == STATUS_OK || err.message[0] != '\0');
     if (fd >= 0)

@@ -1,0 +1,19 @@
+/* admin_request.h -- what can be asked of a daemon's administration, and the work: tokens, backups. The daemon does it, or
+ * the command itself where none runs (admin.h).
+ *
+ *      {"command": "token-add", "name", "role"}   {"id", "token"}
+ *      {"command": "token-list"}                  {"items": [{"id", "user", "role", "created_ms"}, ...]}
+ *      {"command": "token-revoke", "which"}       {"count"}
+ *      {"command": "backup"}                      {}, and an open file: the copy of state.db */
+#ifndef UNBAKE_ADMIN_ADMIN_REQUEST_H
+#define UNBAKE_ADMIN_ADMIN_REQUEST_H
+
+#include "common/error.h"
+#include "common/json.h"
+#include "server/store/store.h"
+
+/* Adds members to *reply; *fd, if one is made, is the caller's. */
+enum status admin_request_do(const char *data_dir, struct store *store, const cJSON *request, cJSON *reply, int *fd,
+                             struct error *err);
+
+#endif
