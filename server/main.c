@@ -12,7 +12,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/statvfs.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -22,6 +21,7 @@
 #include "common/protocol.h"
 #include "server/admin/admin.h"
 #include "server/commands.h"
+#include "server/daemon_options.h"
 #include "server/data/collector.h"
 #include "server/data/folder.h"
 #include "server/events/hub.h"
@@ -92,104 +92,22 @@ static enum status check_access(const struct daemon *d, bool is_loopback, struct
     return STATUS_OK;
 }
 
-static enum api_access read_access(const char *word) {
-    return strcmp(word, "open") == 0     ? API_ACCESS_OPEN
-           : strcmp(word, "tokens") == 0 ? API_ACCESS_TOKENS
-                                         : API_ACCESS_AUTO;
-}
-
 static void on_revoked(void *user) {
     struct daemon *d = user;
     hub_recheck(d->api->hub);
 }
 
-/* The smaller of both limits; 0: none. A disk whose size is unknown sets none. */
-static uint64_t user_max_bytes(const struct config *c) {
-    struct statvfs disk;
-    uint64_t limit = (uint64_t)c->user_max_mib << 20, share = 0;
-    if (c->user_max_percent > 0 && statvfs(c->data_dir, &disk) == 0)
-        share = (uint64_t)disk.f_blocks * disk.f_frsize / 100 * (uint64_t)c->user_max_percent;
-    return limit == 0 || (share > 0 && share < limit) ? share : limit;
-}
-
-static struct scheduler_config scheduler_options(const struct config *c) {
-    return (struct scheduler_config){
-        .data_dir = c->data_dir,
-        .worker_binary = "/proc/self/exe",
-        .max_running = (int)c->max_running,
-        .user_max_running = (int)c->user_max_running,
-        .max_checks = (int)c->max_checks,
-        .thread_count = (int)c->threads,
-        .user_max_bytes = user_max_bytes(c),
-        .worker_memory_bytes = (uint64_t)c->worker_memory_mib << 20,
-        .photograph_memory_bytes = (uint64_t)c->photograph_memory_mib << 20,
-        .checkpoint_interval_sec = c->checkpoint_interval_sec,
-        .stop_grace_sec = c->stop_grace_sec,
-        .event_keep_sec = 3600.0 * c->event_keep_hours,
-        .checkpoint_keep_sec = 3600.0 * c->checkpoint_keep_hours,
-        .low_disk_bytes = (uint64_t)c->low_disk_mib << 20,
-        .webhook_private = c->webhook_private,
-        .sandbox = c->sandbox,
-    };
-}
-
-static struct api_config api_options(const struct config *c, const struct proxies *proxies,
-                                     const struct api_library *list) {
-    return (struct api_config){
-        .data_dir = c->data_dir,
-        .max_attempts = (int)c->max_attempts,
-        .queue_limit = (size_t)c->queue_limit,
-        .user_queue_limit = (size_t)c->user_queue_limit,
-        .user_max_jobs = (size_t)c->user_max_jobs,
-        .user_max_bytes = user_max_bytes(c),
-        .max_upload_bytes = (uint64_t)c->max_upload_mib << 20,
-        .admin_free_bytes = (uint64_t)c->admin_free_mib << 20,
-        .user_pledge_percent = (unsigned)c->user_pledge_percent,
-        .user_max_streams = (size_t)c->user_max_streams,
-        .user_max_uploads = (size_t)c->user_max_uploads,
-        .user_max_checks = (size_t)c->user_max_checks,
-        .empty_upload_ms = (int64_t)(fmin(60e3 * c->upload_start_minutes, 3.6e6 * c->upload_keep_hours)),
-        .min_free_bytes = (uint64_t)c->min_free_mib << 20,
-        .max_streams = (size_t)c->max_streams,
-        .upload_keep_ms = (int64_t)(c->upload_keep_hours * 3.6e6),
-        .job_keep_ms = (int64_t)(c->job_keep_days * 86.4e6),
-        .scene_keep_ms = (int64_t)(c->scene_keep_days * 86.4e6),
-        .keepalive_sec = c->keepalive_sec,
-        .access = read_access(c->access),
-        .is_tls = *c->tls_certificate != '\0',
-        .server_names = c->server_names,
-        .proxies = proxies,
-        .libraries = list,
-        .library_count = LIBRARY_COUNT,
-    };
-}
-
-/* *address lies in the caller's memory; *is_loopback: only this machine can reach it. */
-static void listener_options(const struct config *c, struct listener_config *network, char address[CONFIG_ADDRESS_SIZE],
-                             bool *is_loopback) {
-    *network = (struct listener_config){
-        .address = address,
-        .connection_max = (unsigned)c->max_connections,
-        .address_connection_max = (unsigned)c->address_max_connections,
-        .certificate_file = *c->tls_certificate ? c->tls_certificate : NULL,
-        .key_file = c->tls_key,
-        .limits = {c->head_timeout_sec, c->idle_timeout_sec, c->idle_timeout_sec, (double)c->body_min_bytes_per_sec},
-    };
-    config_address(c->listen, address, &network->port, is_loopback, NULL); /* was checked with the rest */
-}
-
 static enum status build(struct daemon *d, struct error *err) {
     const struct config *c = d->config;
     bool is_loopback;
-    struct listener_config network;
     struct library list[LIBRARY_COUNT];
     libraries_list(list);
     for (size_t i = 0; i < LIBRARY_COUNT; i++)
         d->libraries[i] = (struct api_library){list[i].name, list[i].version};
     proxies_parse(&d->proxies, c->trusted_proxies, c->proxy_field, NULL); /* was checked with the rest */
-    const struct scheduler_config work = scheduler_options(c);
-    const struct api_config limits = api_options(c, &d->proxies, d->libraries);
-    listener_options(c, &network, d->address, &is_loopback);
+    const struct scheduler_config work = daemon_options_scheduler(c);
+    const struct api_config limits = daemon_options_api(c, &d->proxies, d->libraries);
+    const struct listener_config network = daemon_options_listener(c, d->address, &is_loopback);
     enum status status = store_open(&d->store, c->data_dir, err);
     if (status == STATUS_OK)
         store_keep_events(d->store, (size_t)c->events_per_job);
