@@ -78,7 +78,7 @@ forbid "$(ls -d server/*/ | grep -vE 'demo|evaluate' | tr '\n' ' ')" 'server/(de
 own 'embree[34]/' server/render/accel.c
 own 'microhttpd\.h' server/transport/exchange.h
 own 'gnutls/' server/net/tls.c server/worker/deliver.c
-own 'sqlite3\.h' server/store/store.c server/store/sql.h server/worker/checkpoint.c server/main.c
+own 'sqlite3\.h' server/store/sql.h
 own 'curl/' client/request.c
 own 'openexr' common/exr_stream.h
 own 'png\.h' common/png_memory.h

@@ -27,8 +27,6 @@
 #include "common/error.h"
 #include "server/state/state_array.h"
 
-#define CHECKPOINT_TILE_BYTES ((size_t)1 << 20)
-
 struct checkpoint; /* opaque */
 
 /* Opens or creates the file. `fingerprint` identifies what the state depends on (scene, settings): a checkpoint with

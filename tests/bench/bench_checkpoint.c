@@ -10,6 +10,7 @@
 #include "common/file.h"
 #include "common/mem.h"
 #include "server/worker/checkpoint.h"
+#include "server/worker/checkpoint_file.h"
 #include "common/hash64.h"
 
 static void touch(const struct state_array *array, size_t count, size_t every, uint32_t value) {

@@ -2,6 +2,7 @@
  * again, damage is found, a full disk or a kill leaves the one before. UNBAKE_KILLS sets the
  * number of kills (15). */
 #include "server/worker/checkpoint.h"
+#include "server/worker/checkpoint_file.h"
 
 #include <fcntl.h>
 #include <signal.h>

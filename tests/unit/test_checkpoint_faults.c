@@ -1,6 +1,7 @@
 /* test_checkpoint_faults.c -- a call of SQLite or of the system fails a checkpoint while it is opened, saved, loaded or
  * cleared, or all from one on: what was saved last is what the next attempt finds, whole, or it is told why not. */
 #include "server/worker/checkpoint.h"
+#include "server/worker/checkpoint_file.h"
 
 #include "common/file.h"
 #include "common/mem.h"
