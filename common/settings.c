@@ -48,6 +48,10 @@ static const struct setting table[] = {
      "solve: directions from which light is gathered at each point where it is"},
     {"gloss_passes", SETTING_INT, "", 1, 2, NULL, "2", "solve",
      "solve: how many times roughness and specular are fitted, each in light that is better known"},
+    {"grey_card", SETTING_PIXEL, "", 1e-3, 1, NULL, "", NULL,
+     "a surface of known reflectance, which fixes the scale of light that no photograph shows: \"PHOTOGRAPH,x,y,reflectance\", "
+     "with the column and row of a pixel that shows it, from 0 at the upper left, and the reflectance from 0 to 1 (.18 "
+     "of a grey card); where all light is measured it is a check, in the report"},
     {"hold_out_every", SETTING_INT, "frames", 0, 1000000, NULL, "10", NULL,
      "where the capture holds out no frame, every how many-th is; 0: none"},
     {"iterations", SETTING_INT, "", 0, 1e9, NULL, "0", NULL,
@@ -154,7 +158,9 @@ static int choice_index(const char *choices, const char *word) {
 }
 
 /* Settings that are stored in `text`. */
-static bool is_text(const struct setting *t) { return t->type == SETTING_TEXT || t->type == SETTING_BOX; }
+static bool is_text(const struct setting *t) {
+    return t->type == SETTING_TEXT || t->type == SETTING_BOX || t->type == SETTING_PIXEL;
+}
 
 /* Default of a setting that is stored in `number`. */
 static double default_number(const struct setting *t) {
@@ -164,7 +170,8 @@ static double default_number(const struct setting *t) {
     case SETTING_INT:
     case SETTING_REAL:
     case SETTING_TEXT:
-    case SETTING_BOX: break;
+    case SETTING_BOX:
+    case SETTING_PIXEL: break;
     }
     return strtod(t->default_text, NULL);
 }
@@ -269,6 +276,41 @@ bool settings_box(const struct settings *s, const char *name, double lower[3], d
     return *s->text[i] && parse_box(s->text[i], lower, upper);
 }
 
+/* "NAME,x,y,value": the name may have commas in it. */
+static bool parse_pixel(const struct setting *t, const char *text, struct pixel_setting *pixel) {
+    const char *comma[3], *end = text + strlen(text);
+    char *after;
+    for (int i = 2; i >= 0; i--) {
+        for (end--; end > text && *end != ',';)
+            end--;
+        if (end <= text)
+            return false;
+        comma[i] = end;
+    }
+    size_t length = (size_t)(comma[0] - text);
+    double value[3];
+    for (int i = 0; i < 3; i++) {
+        value[i] = strtod(comma[i] + 1, &after);
+        after += strspn(after, " ");
+        if (after == comma[i] + 1 || after != (i < 2 ? comma[i + 1] : text + strlen(text)) || !isfinite(value[i]))
+            return false;
+    }
+    for (int i = 0; i < 2; i++)
+        if (value[i] < 0.0 || value[i] > UINT16_MAX || value[i] != floor(value[i]))
+            return false;
+    if (length >= sizeof pixel->photograph || !(value[2] >= t->minimum && value[2] <= t->maximum))
+        return false;
+    *pixel = (struct pixel_setting){.x = (uint32_t)value[0], .y = (uint32_t)value[1], .value = value[2]};
+    memcpy(pixel->photograph, text, length);
+    return true;
+}
+
+bool settings_pixel(const struct settings *s, const char *name, struct pixel_setting *pixel) {
+    int i = index_of(name);
+    assert(i >= 0 && table[i].type == SETTING_PIXEL);
+    return *s->text[i] && parse_pixel(&table[i], s->text[i], pixel);
+}
+
 bool settings_emitter(const struct settings *s, uint32_t segment, bool decided) {
     for (size_t i = 0; i < s->segment_count; i++)
         if (s->segment[i].segment == segment)
@@ -285,6 +327,7 @@ static void set_text(struct settings *s, size_t i, const char *text) {
 static bool apply_one(struct settings *s, size_t i, const cJSON *value, char *reason, size_t size) {
     const struct setting *t = &table[i];
     double number = value->valuedouble, lower[3], upper[3];
+    struct pixel_setting pixel;
     int choice;
     switch (t->type) {
     case SETTING_INT:
@@ -331,6 +374,16 @@ static bool apply_one(struct settings *s, size_t i, const cJSON *value, char *re
     case SETTING_BOX:
         if (!cJSON_IsString(value) || (*value->valuestring && !parse_box(value->valuestring, lower, upper))) {
             snprintf(reason, size, "must be six numbers, the lower corner and the upper, such as \"-1 -1 0 4 3 2.5\"");
+            return false;
+        }
+        set_text(s, i, value->valuestring);
+        return true;
+    case SETTING_PIXEL:
+        if (!cJSON_IsString(value) || (*value->valuestring && !parse_pixel(t, value->valuestring, &pixel))) {
+            snprintf(reason, size,
+                     "must be a photograph's name, the column and row of a pixel, and a value from %g to %g, such as "
+                     "\"IMG_0012.jpg,812,604,0.18\"",
+                     t->minimum, t->maximum);
             return false;
         }
         set_text(s, i, value->valuestring);
@@ -511,7 +564,7 @@ static void add_help(cJSON *entry, const struct setting *t) {
 }
 
 cJSON *settings_describe(void) {
-    static const char *const type_names[] = {"int", "real", "bool", "choice", "text", "box"};
+    static const char *const type_names[] = {"int", "real", "bool", "choice", "text", "box", "pixel"};
     struct settings defaults;
     settings_init(&defaults);
     cJSON *list = cJSON_CreateArray();

@@ -12,7 +12,7 @@
 #include "common/error.h"
 #include "common/json.h"
 
-enum setting_type { SETTING_INT, SETTING_REAL, SETTING_BOOL, SETTING_CHOICE, SETTING_TEXT, SETTING_BOX };
+enum setting_type { SETTING_INT, SETTING_REAL, SETTING_BOOL, SETTING_CHOICE, SETTING_TEXT, SETTING_BOX, SETTING_PIXEL };
 
 struct setting {
     const char *name;
@@ -20,7 +20,8 @@ struct setting {
     const char *unit;        /* "texels", "s", ...; "" where there is none */
     double minimum, maximum; /* inclusive, for numbers */
     const char *choices;     /* "a|b|c" for SETTING_CHOICE */
-    /* of a SETTING_BOX: text of six numbers, the lower corner and the upper; "": none */
+    /* of a SETTING_BOX: text of six numbers, the lower corner and the upper; of a SETTING_PIXEL: "photograph,x,y,value";
+     * "": none */
     const char *default_text;
     const char *method; /* the only one that uses it; NULL: every method does */
     const char *help;   /* one sentence */
@@ -42,9 +43,9 @@ struct segment_setting {
 /* A job's settings: one value per table entry. Values that are not given come from the setting `quality` where it
  * sets an amount of work, else from the default. */
 struct settings {
-    bool *is_given;                  /* [table count] settings_apply was given a value; owned */
-    double *number;                  /* [table count] numbers and booleans (0 or 1); choices by index; owned */
-    char **text;                     /* [table count] SETTING_TEXT and SETTING_BOX values, NULL for the others; owned */
+    bool *is_given; /* [table count] settings_apply was given a value; owned */
+    double *number; /* [table count] numbers and booleans (0 or 1); choices by index; owned */
+    char **text;    /* [table count] SETTING_TEXT, _BOX and _PIXEL values, NULL for the others; owned */
     struct segment_setting *segment; /* [segment_count] one of each segment at most; owned */
     size_t segment_count;
 };
@@ -61,6 +62,15 @@ const char *settings_text(const struct settings *s, const char *name); /* borrow
 
 /* The value of a SETTING_BOX; false where it is "". */
 bool settings_box(const struct settings *s, const char *name, double lower[3], double upper[3]);
+
+/* The value of a SETTING_PIXEL: something known of a pixel of a photograph. */
+struct pixel_setting {
+    char photograph[256]; /* its name */
+    uint32_t x, y;        /* column and row, from 0 at the upper left */
+    double value;
+};
+/* False where it is "". */
+bool settings_pixel(const struct settings *s, const char *name, struct pixel_setting *pixel);
 
 /* Whether a segment emits: what the user says of it, else `decided`. */
 bool settings_emitter(const struct settings *s, uint32_t segment, bool decided);

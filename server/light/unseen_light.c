@@ -15,6 +15,9 @@
 /* A point speaks of the unseen directions where they have this share of its rays; so many must. */
 #define SHARE_LEAST 0.1f
 #define LEAST_POINTS 64
+/* Part of the light at a grey card that the unseen one must be, as guessed: what is wrong with the rest is taken for its
+ * scale. By hand. */
+#define CARD_LEAST 0.2
 /* At this many radians from what is seen 1/e of what was filled in from there is kept. */
 #define NEAR 0.1f
 /* Nothing is so white. Light is missing, and not only known badly, if more than the rest of the points are. */
@@ -29,6 +32,7 @@ struct unseen {
     const struct survey *survey; /* while points are gathered */
     size_t count;
     struct unseen_point *point; /* [count] */
+    struct unseen_point card;   /* the grey card's, where there is one */
     double log_radiance[UNSEEN_CELLS];
     float *angle; /* [map height][map width] to what is seen; NULL where there is no map */
 };
@@ -38,13 +42,11 @@ static float kept_of_filled(const struct unseen *u, size_t cell) { return expf(-
 
 /* --- looking around ------------------------------------------------------------------------------- */
 
-static void look_around(void *user, size_t index, int thread) {
-    struct unseen *u = user;
+static void look_from(const struct unseen *u, uint32_t texel, int thread, struct unseen_point *p) {
     const struct reconstruction *r = u->r;
-    struct unseen_point *p = &u->point[index];
     const struct light_field *field = &u->survey->field;
     struct incident *in = &u->survey->scratch[thread];
-    uint32_t texel = u->survey->texel[index], key = sampler_key(KEY_UNSEEN, texel, 0);
+    uint32_t key = sampler_key(KEY_UNSEEN, texel, 0);
     struct surface_point at;
     *p = (struct unseen_point){.segment = reconstruction_segment(r, texel)};
     if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at))
@@ -70,6 +72,11 @@ static void look_around(void *user, size_t index, int thread) {
     irradiance_gather(&light, in, field, &at, key, RAYS_PER_POINT);
     p->known = fmaxf(rgb_mean(irradiance_diffuse(&light, at.shading, 1.0f, at.shading)) - p->filled, 0.0f);
     p->shown = rgb_mean(fused_radiance(&r->fused, texel));
+}
+
+static void look_around(void *user, size_t index, int thread) {
+    struct unseen *u = user;
+    look_from(u, u->survey->texel[index], thread, &u->point[index]);
 }
 
 static double unseen_share(const struct unseen *u) {
@@ -118,13 +125,33 @@ static void gather_points(struct unseen *u, const struct views *views) {
     u->count = survey.count;
     u->point = mem_array(u->count + 1, sizeof *u->point);
     parallel_for(u->r->pool, u->count, look_around, u);
+    if (u->r->grey_card.is_given)
+        look_from(u, u->r->grey_card.texel, 0, &u->card);
     survey_release(&survey);
     survey_lights_off(u->r);
+}
+
+/* Scales the map, whose level is a guess (nine tenths of base colours below that of white paint), so that base colour at
+ * the grey card is its reflectance. Not where too little of the light there is unseen, or the known light alone is too
+ * much for what the card shows. */
+static void scale_by_card(struct unseen *u) {
+    struct grey_card *card = &u->r->grey_card;
+    const struct unseen_point *p = &u->card;
+    double unseen = 0.0;
+    for (size_t k = 0; k < UNSEEN_CELLS; k++)
+        unseen += (double)p->share[k] * exp(u->log_radiance[k]);
+    double wanted = (double)p->shown / card->pixel.value - (double)p->known;
+    if (!card->is_given || !(unseen > 0.0) || unseen < CARD_LEAST * (unseen + (double)p->known) || !(wanted > 0.0))
+        return;
+    card->light_factor = wanted / unseen;
+    for (size_t k = 0; k < UNSEEN_CELLS; k++)
+        u->log_radiance[k] += log(card->light_factor);
 }
 
 static void relight(struct unseen *u) {
     struct reconstruction *r = u->r;
     unseen_fit(u->point, u->count, r->segments.count, u->log_radiance);
+    scale_by_card(u);
     if (!r->environment.map.pixel)
         environment_make_unseen(&r->environment);
     fill_in(u);

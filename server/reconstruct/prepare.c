@@ -209,6 +209,15 @@ static enum status check_segment_settings(const struct reconstruction *r, struct
     return STATUS_OK;
 }
 
+/* The point of known reflectance, if the settings name one. */
+static enum status find_grey_card(struct reconstruction *r, struct error *err) {
+    struct pixel_setting pixel;
+    if (!settings_pixel(r->settings, "grey_card", &pixel))
+        return STATUS_OK;
+    const struct surface surface = reconstruction_surface(r);
+    return grey_card_find(&r->grey_card, &pixel, r->scene, &surface, r->world.accel, err);
+}
+
 /* Ends a job that could measure next to nothing before it takes minutes. */
 static enum status require_seen_surface(struct prepare *p, struct error *err) {
     struct seen_share share = seen_share_measure(p->views, p->r->pool);
@@ -279,5 +288,7 @@ enum status prepare_run(struct reconstruction *r, struct views *views, const str
     add_prepare_figures(p);
     pace_measure_room(p->pace, r->scene, &r->inverse);
     advance(p, 1.0 - MAP_SHARE - VIEWS_SHARE - CALIBRATE_SHARE);
-    return status == STATUS_OK ? check_segment_settings(r, err) : status;
+    if (status == STATUS_OK)
+        status = check_segment_settings(r, err);
+    return status == STATUS_OK ? find_grey_card(r, err) : status;
 }

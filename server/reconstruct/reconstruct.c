@@ -137,6 +137,7 @@ static enum status run_resumable(struct stage_run *run, struct error *err) {
 static enum status report(struct stage_run *run, struct error *err) {
     world_update_lights(&run->r->world);
     report_emitters(run->r);
+    report_grey_card(run->r, run->hooks);
     enum status status = report_held_out(run->r, &run->views, &run->pace, err);
     plan_close(&run->r->plan, PLAN_REPORT);
     if (status == STATUS_OK)

@@ -17,6 +17,8 @@
 /* XORed with the seed: random numbers distinct from the optimiser's. */
 #define REPORT_SEED UINT64_C(0x7265706f7274)
 /* Least emitted share of a segment that is listed though it does not emit. */
+/* A card within this of its reflectance is right: noise and texture of one texel; by hand. */
+#define CARD_TOLERANCE 0.1
 #define MIN_REPORTED_SHARE 0.05f
 
 /* The photograph's radiance as an R G B picture; masked pixels become NaN. */
@@ -233,6 +235,37 @@ enum status report_held_out(struct reconstruction *r, const struct views *views,
         hooks->metric(hooks->user, "msre", 0, msre.sum / msre.count);
     }
     return STATUS_OK;
+}
+
+void report_grey_card(struct reconstruction *r, const struct reconstruct_hooks *hooks) {
+    const struct grey_card *card = &r->grey_card;
+    if (!card->is_given)
+        return;
+    const float *color = r->materials.base_color.texel[card->texel],
+                point[3] = {card->point.x, card->point.y, card->point.z};
+    double found = ((double)color[0] + (double)color[1] + (double)color[2]) / 3.0, place[3];
+    for (int i = 0; i < 3; i++)
+        place[i] = (double)point[i] + r->scene->mesh.offset[i];
+    double ratio = found / card->pixel.value;
+    cJSON *object = cJSON_AddObjectToObject(r->report, "grey_card");
+    json_add_string(object, "photograph", card->pixel.photograph);
+    json_add_int(object, "x", card->pixel.x);
+    json_add_int(object, "y", card->pixel.y);
+    json_add(object, "point", cJSON_CreateDoubleArray(place, 3));
+    json_add_int(object, "segment", r->segments.of_triangle[card->triangle]);
+    json_add_number(object, "reflectance", card->pixel.value);
+    json_add_number(object, "base_color", found);
+    json_add_number(object, "ratio", ratio);
+    if (card->light_factor > 0.0)
+        json_add_number(object, "unseen_light_scaled_by", card->light_factor);
+    if (fabs(ratio - 1.0) <= CARD_TOLERANCE)
+        return;
+    char *text =
+        mem_printf("grey card: base colour there came out as %.3g instead of %.3g; the light that is found there "
+                   "is %.3g times that by which the card is right",
+                   found, card->pixel.value, 1.0 / ratio);
+    hooks->warning(hooks->user, text);
+    mem_free(text);
 }
 
 void report_emitters(struct reconstruction *r) {

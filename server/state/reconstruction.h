@@ -11,6 +11,7 @@
 #include "common/settings.h"
 #include "server/capture/environment.h"
 #include "server/capture/fuse.h"
+#include "server/capture/grey_card.h"
 #include "server/gather/sun.h"
 #include "server/render/world.h"
 #include "server/scene/inverse_uv.h"
@@ -47,6 +48,7 @@ struct reconstruction {
     double unseen_share;                /* part of the rays from surfaces that meet nothing observed */
     bool exposures_drift, colors_drift; /* given exposures, white balance (calibrate.h) */
     bool sky_is_fitted;                 /* unobserved sky was fitted to surfaces (unseen_light.h), not filled in */
+    struct grey_card grey_card;         /* a point of known reflectance */
     struct noise noise;                 /* of the photographs' pixels */
     uint16_t (*radiance_preview)[3]; /* [height][width] a first picture of that (radiance_preview.h), or NULL; owned */
     struct fused fused;              /* observed radiance of each texel */

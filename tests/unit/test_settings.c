@@ -159,6 +159,16 @@ static void test_corrections(void) {
                                          "{\"crop\":\"1 2 3 4 5\"}",
                                          "{\"crop\":\"0 0 0 1 1 1 1\"}",
                                          "{\"crop\":\"0 0 0 1 0 1\"}",
+                                         "{\"grey_card\":\"a.jpg\"}",
+                                         "{\"grey_card\":\"a.jpg,1,0.5\"}",
+                                         "{\"grey_card\":\",1,2,0.5\"}",
+                                         "{\"grey_card\":\"a.jpg,1,2,0\"}",
+                                         "{\"grey_card\":\"a.jpg,1,2,1.1\"}",
+                                         "{\"grey_card\":\"a.jpg,1.5,2,.5\"}",
+                                         "{\"grey_card\":\"a.jpg,-1,2,.5\"}",
+                                         "{\"grey_card\":\"a.jpg,1,2,\"}",
+                                         "{\"grey_card\":\"a.jpg,1,2x,.5\"}",
+                                         "{\"grey_card\":[1,2]}",
                                          "{\"emitters.1\":\"on\",\"emitters\":\"any\","
                                          "\"method\":\"listing1\"}"};
     struct error err;
@@ -170,7 +180,8 @@ static void test_corrections(void) {
         settings_release(&s);
         cJSON_Delete(json);
     }
-    cJSON *json = cJSON_Parse("{\"emitters.27\":\"on\",\"emitters.3\":\"off\",\"crop\":\"-1,0 .5 2 3 4\"}");
+    cJSON *json = cJSON_Parse(
+        "{\"emitters.27\":\"on\",\"emitters.3\":\"off\",\"crop\":\"-1,0 .5 2 3 4\",\"grey_card\":\"a, b.jpg,12, 34,.18\"}");
     struct settings s, again;
     settings_init(&s);
     settings_init(&again);
@@ -181,10 +192,16 @@ static void test_corrections(void) {
     CHECK(settings_emitter(&again, 4, true) && !settings_emitter(&again, 4, false));
     double lower[3], upper[3];
     CHECK(settings_box(&again, "crop", lower, upper) && lower[0] == -1.0 && lower[2] == 0.5 && upper[2] == 4.0);
+    struct pixel_setting pixel;
+    CHECK(settings_pixel(&again, "grey_card", &pixel) && pixel.x == 12 && pixel.y == 34 && pixel.value == 0.18);
+    CHECK_STRING(pixel.photograph, "a, b.jpg");
     cJSON_Delete(all);
     cJSON_Delete(json);
     settings_release(&s);
     settings_release(&again);
+    settings_init(&s);
+    CHECK(!settings_pixel(&s, "grey_card", &pixel));
+    settings_release(&s);
 }
 
 int main(void) {
