@@ -6,16 +6,19 @@
 
 #include "common/mem.h"
 
-/* That show a track, to compare one with the median of the others; by hand; +25 %: no change. */
-#define MIN_PHOTOGRAPHS 4   /* +25 %: no change */
-#define MIN_OBSERVATIONS 60 /* of tracks, for a photograph to be judged; by hand; +25 %: no change */
+/* That show a track: the least number of which the median of the others is no single photograph. */
+#define MIN_PHOTOGRAPHS 4 /* +25 %: no change */
+/* Of tracks, for a photograph to be judged: a mean of 60 squares of about normal slopes is off by .18 (sqrt(2 /
+ * 60)), the ratio of two by a quarter. */
+#define MIN_OBSERVATIONS 60 /* +25 %: no change */
 /* Standard deviation of a sharp photograph's blur at level 0, pixels of that level: pixel area, lens and the pyramid's
  * binomial. */
 #define SHARP_PX 0.9 /* +25 %: no change */
 /* Blurred: the squared slopes are below this share of the neighbours'. Sharp photographs have 0.6 and more, single ones
  * of glossy places seen from afar 0.39 (room bathroom). */
 #define BLURRED_RATIO 0.38 /* +25 %: no change */
-#define RATIO_MAX 4.0f     /* of one observation to the median, bounds outliers; by hand; +25 %: no change */
+/* Bound of one observation's squared slope over the median: twice the slope. */
+#define RATIO_MAX 4.0f /* +25 %: no change */
 
 /* Sums over one photograph's observations, for each direction: its own squared slopes and the medians of the others. */
 struct sharpness {

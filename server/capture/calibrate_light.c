@@ -9,12 +9,13 @@
 #include "server/capture/overlap.h"
 #include "server/capture/validation.h"
 
-/* Surface points compared: their number a photograph, and bounds of all (time and memory); by hand. */
+/* Surface points compared: their number a photograph, twenty for each unknown (exposure and two of white balance);
+ * bounds of all, below for captures of few photographs, above for time and memory. */
 #define POINTS_PER_FRAME 60 /* +25 %: no change */
 #define POINTS_MIN 4000     /* +25 %: no change */
 #define POINTS_MAX 24000    /* +25 %: no change */
 
-#define COST_ROUNDS 6 /* of reweighting for the robust mean of a held-out point; by hand; to 7: no change */
+#define COST_ROUNDS 6 /* of reweighting for the robust mean of a held-out point, which has converged; to 7: no change */
 
 /* A fault is accepted when it lowers the robust cost of held-out points by this share, and the gain is this many
  * standard errors above 0. Drift must also have this rms (in logarithms): glossy surfaces look brighter in some

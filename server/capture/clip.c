@@ -5,10 +5,11 @@
 
 #include "common/image.h"
 
-#define WINDOW_RADIUS 2      /* pixels to either side; by hand; to 3: no change */
-#define WINDOW_MIN_PIXELS 9  /* pixels that must show the same surface; by hand; to 11: no change */
+/* Pixels to either side; of these 25, pixels that must show the same surface, for a share of .3 to be three of them. */
+#define WINDOW_RADIUS 2      /* to 3: no change */
+#define WINDOW_MIN_PIXELS 9  /* to 11: no change */
 #define SATURATED_SHARE 0.3f /* measured: with a tenth, bathroom loses .13 dB (8 bits); +25 %: no change */
-/* Standard deviations that noise reaches below the clip; by hand; +25 %: no change. */
+/* Standard deviations that noise reaches below the clip: in one of 740 normal values it reaches farther. */
 #define NOISE_DEVIATIONS 3.0f /* +25 %: no change */
 
 struct clip_job {

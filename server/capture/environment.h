@@ -18,7 +18,8 @@
 #include "common/json.h"
 #include "common/vec.h"
 
-/* Bounds of the map's width, pixels; by hand. */
+/* Bounds of the map's width, pixels: 5.6 degrees a pixel, ten suns across, as coarse as light through windows allows;
+ * .18 degrees, a third of the sun, beyond which memory grows and nothing is lit differently. */
 #define ENVIRONMENT_MIN_WIDTH 64   /* +25 %: no change */
 #define ENVIRONMENT_MAX_WIDTH 2048 /* +25 %: no change */
 

@@ -16,16 +16,18 @@
 
 /* Metres: distance of a point that every camera of a room sees in the same direction; +25 %: no change. */
 #define FAR_M 1e6f
-/* Sample points along each side of a pixel of the map, at most; by hand; +25 %: no change. */
-#define MAX_GRID 4
-/* Weight of a look-up within a pixel of the opening's rim, where slightly wrong poses mix light and frame. By hand. */
+/* Sample points along each side of a pixel of the map, at most. Photographs at most four times as fine as the map are
+ * averaged whole; the map is finer than half the median photograph, so few are finer. */
+#define MAX_GRID 4 /* +25 %: no change */
+/* Weight of a look-up within a pixel of the opening's rim, where slightly wrong poses mix light and frame: one off the
+ * rim outweighs ten on it. */
 #define RIM_WEIGHT 0.1f /* +25 %: no change */
-/* Standard deviations of normal values in their median absolute deviation; +25 %: no change. */
+/* Standard deviations of normal values in their median absolute deviation. */
 #define DEVIATIONS_PER_MAD 1.4826f
-/* Outliers: standard deviations from the median. By hand. */
+/* Outliers: standard deviations from the median. Normal errors are beyond in one of 370. */
 #define OUTLIER_DEVIATIONS 3.0f /* +25 %: no change */
-/* Least standard deviation, as a share of the median: when two photographs agree by chance, a third is no outlier. By
- * hand. */
+/* Least standard deviation, as a share of the median: when two photographs agree by chance, a third that differs by
+ * less than .15 is no outlier. */
 #define MIN_DEVIATION 0.05f /* +25 %: no change */
 
 /* A photograph with open pixels. */

@@ -8,11 +8,12 @@
 #include "common/vec.h"
 #include "server/scene/latlong.h"
 
-/* Luminance that is propagated is clamped to this many times the typical one; by hand. */
+/* Luminance that is propagated is clamped to this many times the typical one: sky and clouds differ by less, a lamp or
+ * a sun is not to be spread over what is unknown. */
 #define LUMINANCE_LIMIT 4.0 /* +25 %: no change */
-#define SWEEPS 32           /* of Gauss-Seidel after pull-push: removes its blockiness; by hand; +25 %: no change */
-/* Weight of a row for another: distance to the power of minus this; by hand. At 1.1 times the distance of the nearest
- * row, a tenth of its weight. */
+#define SWEEPS 32           /* of Gauss-Seidel after pull-push: smooths its blocks over 32 pixels; +25 %: no change */
+/* Weight of a row for another: distance to the power of minus this. Nearly the nearest row, without steps: at 1.1 times
+ * its distance a tenth of its weight. */
 #define ROW_FALLOFF 24.0 /* +25 %: no change */
 
 /* Solid angle of a pixel, by its index. */

@@ -6,9 +6,10 @@
 #include "common/rng.h"
 
 /* Samples less sharp than this share of the sharpest are left out of the halves, unless nothing else is there: their
- * lost texture would count as noise. By hand. */
+ * lost texture would count as noise. Sharpness is pixels by area: .3 is 1.8 times the distance. */
 #define SHARPNESS_SHARE 0.3f /* +25 %: -0.05 dB */
-/* Splits are tried until the lighter half has this share of the weight; by hand. */
+/* Splits are tried until the lighter half has this share of the weight: the difference of the halves then has at most
+ * 4/3 of the variance of an even split's. */
 #define BALANCED_SHARE 0.25f /* +25 %: +0.01 dB */
 
 /* A weighted mean and its expected variance. */

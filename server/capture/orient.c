@@ -9,7 +9,7 @@
 #include "server/render/accel.h"
 #include "server/scene/adjacency.h"
 
-#define PIXEL_STRIDE 2 /* along both axes, of the pixels traced; by hand */
+#define PIXEL_STRIDE 2 /* along both axes, of the pixels traced, for time: what is seen at all covers more */
 
 /* --- sides seen by photographs --------------------------------------------------------------------- */
 

@@ -7,9 +7,10 @@
 #include "common/mem.h"
 
 #define CHUNK 64 /* points a work item */
-/* Stored value of 8-bit photographs below which values are so noisy that selection by them would be biased; by hand. */
+/* Stored value of 8-bit photographs below which values are so noisy that selection by them would be biased: 200 of a
+ * full well of 10^4 electrons, 7 % of shot noise. */
 #define DARK_VALUE 0.02f
-/* Share of the clip above which a noisy surface may have clipped pixels; by hand. */
+/* Share of the clip above which a surface may have clipped pixels, by texture a quarter brighter than the mean. */
 #define BRIGHT_SHARE 0.8f
 
 struct overlap_gathering {

@@ -23,17 +23,19 @@
 #include "server/capture/validation.h"
 
 #define POSE_UNKNOWNS 6     /* of a pose: rotation and translation */
-#define POSE_CELL_COLUMNS 8 /* of the grid of offsets; by hand */
+#define POSE_CELL_COLUMNS 8 /* of the grid of offsets: as smooth as a vignette or a reflection; +25 %: no change */
 #define POSE_CELL_ROWS 6    /* as coarse as 8 columns in a picture of 4 : 3 */
 #define POSE_CELLS (POSE_CELL_COLUMNS * POSE_CELL_ROWS)
 #define POSE_OBSERVATIONS_MAX (TRACK_OTHERS + 1) /* of a track, with its own photograph */
-#define POSE_HELD_OUT_EVERY 3                    /* one track in three is held out; by hand */
-#define POSE_MIN_OBSERVATIONS 60                 /* finite ones, for a photograph to be moved: ten an unknown */
-#define POSE_ROUNDS 12                           /* Gauss-Newton steps at each level; by hand */
-#define POSE_STEP_PX 1.5                         /* pixels of a level: largest step; by hand */
-#define POSE_MIN_SHIFT_PX 0.15                   /* pixels, rms: smaller corrections are not applied; by hand */
-#define POSE_DAMPING 0.01   /* share of the diagonal that is added to it (Levenberg-Marquardt); by hand */
-#define POSE_MIN_SCALE 0.01 /* of log residuals: bounds weights where photographs agree perfectly; by hand */
+#define POSE_HELD_OUT_EVERY 3    /* one track in so many is held out: 50 of TRACKS_MIN judge a photograph */
+#define POSE_MIN_OBSERVATIONS 60 /* finite ones, for a photograph to be moved: ten an unknown */
+#define POSE_ROUNDS 12           /* Gauss-Newton steps at each level: 18 of its pixels at POSE_STEP_PX */
+#define POSE_STEP_PX 1.5 /* pixels of a level: largest step; slopes of the 1 2 1 smoothed level hold for as far */
+/* Pixels, rms: smaller corrections are not applied, as a look-up averages over a pixel. */
+#define POSE_MIN_SHIFT_PX 0.15
+#define POSE_DAMPING 0.01 /* share of the diagonal that is added to it (Levenberg-Marquardt): shortens steps by 1 % */
+/* Of log residuals: bounds weights where photographs agree; twice the rounding of 8-bit sRGB. */
+#define POSE_MIN_SCALE 0.01
 
 struct pose { /* camera_from_world */
     double r[3][3], t[3];

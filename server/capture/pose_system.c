@@ -11,10 +11,11 @@
 #include "common/mem.h"
 #include "server/capture/conjugate.h"
 
-#define OFFSET_SIGMA 0.3 /* standard deviation of the offsets' prior, in logarithms; by hand */
+/* Standard deviation of the offsets' prior, in logarithms: what is left of vignettes and reflections. */
+#define OFFSET_SIGMA 0.3
 /* pixels: scale of the prior, which is weak: redkitchen's drift is shared by neighbouring frames */
 #define PRIOR_PX 1.0
-#define PRIOR_LEAST_PX 0.2 /* pixels: the prior is quadratic below this; by hand */
+#define PRIOR_LEAST_PX 0.2 /* pixels: the prior is quadratic below this, about where corrections are not applied */
 #define CG_STEPS 40        /* of conjugate gradients, at most */
 #define CG_TOLERANCE 1e-3  /* of the residual's norm, over that of the right-hand side */
 

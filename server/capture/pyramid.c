@@ -6,7 +6,7 @@
 #include "common/mem.h"
 #include "server/capture/views.h"
 
-#define EDGE_DISTANCE 2 /* pixels around a depth edge that are masked, for wrong poses; by hand */
+#define EDGE_DISTANCE 2 /* pixels around a depth edge that are masked: a lens and a pose off by a pixel mix as far */
 
 static float gray_of(const struct photograph *photo, uint32_t x, uint32_t y, float floor) {
     struct photograph_sample s;

@@ -14,7 +14,8 @@
 
 #include "server/scene/photograph.h"
 
-#define PYRAMID_LEVELS 5 /* the coarsest has 1/16 of the width; by hand */
+/* The coarsest has 1/16 of the width. */
+#define PYRAMID_LEVELS 5
 
 struct pyramid {
     float scale; /* pixels of level 0 per pixel of the photograph: 1, 1/2, 1/4, ... */

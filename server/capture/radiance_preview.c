@@ -7,7 +7,8 @@
 #include "server/scene/surface.h"
 
 #define BLOCK 4 /* texels a side: a sixteenth of the work of fuse.c */
-/* Photographs used at most, evenly spaced: the first ones alone would show one end of the room. By hand. */
+/* Photographs used at most, evenly spaced: the first ones alone would show one end of the room. Time
+ * is proportional; fuse.c takes all. */
 #define MAX_PHOTOGRAPHS 64
 
 struct preview_job {

@@ -6,9 +6,9 @@
 
 #include "common/mem.h"
 
-#define PIXEL_STRIDE 2 /* along both axes, of the pixels traced; by hand */
-/* Linear texel density of unseen surfaces relative to seen ones: they emit indirect light, which needs no detail. By
- * hand. */
+#define PIXEL_STRIDE 2 /* along both axes, of the pixels traced, for time: what is seen at all covers more */
+/* Linear texel density of unseen surfaces relative to seen ones: they reflect light, which needs no detail, and take a
+ * sixteenth of the texels. */
 #define UNSEEN_DENSITY 0.25f
 
 struct density_job {

@@ -7,17 +7,19 @@
 #include "common/rng.h"
 #include "server/capture/choose.h"
 
-/* Tracks in all, and bounds for each photograph; by hand (time and memory). */
+/* Tracks in all, for time and memory; for each photograph at least 25 a pose's unknown, at most one in a square of 22
+ * pixels of PYRAMID_MAX. */
 #define TRACKS_TOTAL 50000
 #define TRACKS_MIN 150
 #define TRACKS_MAX 600
 #define PYRAMID_TOTAL ((size_t)64 << 20) /* pixels of all level 0, also of held-out photographs: 256 MiB */
-#define PYRAMID_MAX ((size_t)640 * 480)  /* pixels of level 0, at most; by hand */
-#define PLACES_PER_CELL 8                /* random positions of which the strongest gradient is taken; by hand */
-#define DISTANCE_RATIO 1.7f              /* of two cameras' distances, at most: texture of similar scale; by hand */
-/* Least gradient of a track, log luminance per pixel; by hand. */
+#define PYRAMID_MAX ((size_t)640 * 480)  /* pixels of level 0, at most: finer ones add time, and noise */
+/* Random positions of which the strongest gradient is taken: an order statistic, no maximum, for spread. */
+#define PLACES_PER_CELL 8
+#define DISTANCE_RATIO 1.7f /* of two cameras' distances, at most: within the pyramid's factor of 2 */
+/* Least gradient of a track, log luminance per pixel: the noise of a pixel of 1 % is then a pixel's shift. */
 #define MIN_SLOPE 0.01f
-/* Radiance added before logarithms, as a share of the median; by hand. */
+/* Radiance added before logarithms, as a share of the median: noise of dark pixels counts less. */
 #define FLOOR_SHARE 0.05f
 
 static void make_pyramid(void *user, size_t t, int thread) {

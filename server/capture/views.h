@@ -16,7 +16,8 @@
 #include "server/scene/segment.h"
 
 #define VIEWS_PICK_MAX 64 /* views that views_pick returns at most; bounds its stack */
-/* Stored value of 8-bit photographs below which a pixel is mostly noise; by hand. */
+/* Stored value of 8-bit photographs below which a pixel tells little: 50 of a full well of 10^4 electrons, 14 % of shot
+ * noise, and 2 % of rounding to 8-bit sRGB. */
 #define VIEWS_NOISE_VALUE 0.005f
 
 /* Class of a pixel: one surface; several with a depth edge; none (open); several that touch. */
@@ -45,7 +46,8 @@ struct view {
     float weight;   /* solid angle per area of surface (cosine over squared distance) x photograph_weight */
 };
 
-/* Tells the scene's spill that the classes of `count` pixels of a row, from number `at` on, are looked at or written next. */
+/* Tells the scene's spill that the classes of `count` pixels of a row, from number `at` on, are looked at or written
+ * next. */
 void views_use(const struct views *v, uint32_t train, size_t at, size_t count);
 
 void views_init(struct views *v, const struct scene *scene, const struct segments *segments, const struct accel *accel,

@@ -10,7 +10,8 @@
 
 #include "server/gather/incident.h"
 
-/* Levels evaluated at once, at most; every highlight costs time and memory for all. By hand. */
+/* Levels evaluated at once, at most; every highlight costs time and memory for all. Roughness in steps
+ * of a twelfth; specular as specular_fit.c has its levels. */
 #define HIGHLIGHT_ROUGHNESSES 12
 #define HIGHLIGHT_SPECULARS 5
 

@@ -17,11 +17,14 @@ enum {
     PAIR_REFLECTED_LIGHT = 48,
     PAIR_ROULETTE = 56
 };
-#define MAX_BOUNCES 4    /* continuations of a ray, from backs and from specular fronts; by hand */
-#define MIN_COSINE 1e-3f /* to a normal; more grazing rays are not continued by the lobe; by hand */
-/* Probability to continue by the lobe over the specular share of what is reflected; by hand */
+/* Continuations of a ray, from backs and specular fronts: after four of a dielectric .04^4 is left. */
+#define MAX_BOUNCES 4
+#define MIN_COSINE 1e-3f /* to a normal, 89.94 degrees; more grazing rays are not continued by the lobe */
+/* Probability to continue by the lobe over the specular share of what is reflected: above 1, since what a lobe meets
+ * (lamps, windows) varies more than the diffuse part, which is looked up. */
 #define ROULETTE_FACTOR 2.0f
-/* Least roughness of the lobe that reflects lights: narrower ones leave fireflies; by hand */
+/* Least roughness of the lobe that reflects lights: narrower ones leave fireflies. A lobe of .5 is 30 degrees wide,
+ * about what probes of irradiance resolve. */
 #define WIDE_ROUGHNESS 0.5f
 
 vec3 incident_cosine_direction(const vec3 frame[3], vec2 u) {

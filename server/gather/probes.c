@@ -7,10 +7,10 @@
 #include "common/mem.h"
 #include "server/render/sampler.h"
 
-/* Radius of the interpolation tent, in blocks: 1.5 blends four to nine probes smoothly. By hand. */
+/* Radius of the interpolation tent, in blocks: 1.5 blends four to nine probes, and is continuous. */
 #define FILTER_RADIUS 1.5f
 /* Weight factor of a probe that no photograph sees, for a texel that one does: such probes lie in hidden, dark places.
- * By hand. */
+ * One seen probe around outweighs all others. */
 #define UNSEEN_WEIGHT 0.01f
 #define LEAST_WEIGHT 1e-6f /* of any probe around, so that no texel is without light */
 #define CHUNK 16           /* probes a work item */

@@ -7,11 +7,13 @@
 #include "server/render/bsdf.h"
 #include "server/scene/latlong.h"
 
-/* Shadow rays to the disc: the second set is traced only where the first is partly occluded (penumbra). By hand. */
+/* Shadow rays to the disc: the second set is traced only where the first is partly occluded (penumbra): a part
+ * of the disc of less than a fifth may be missed, and is measured in steps of 5 % where it is not. */
 #define PROBE_RAYS 5
 #define PENUMBRA_RAYS 16
 #define GOLDEN_ANGLE 2.39996323f /* pi (3 - sqrt 5): Vogel's spiral covers the disc evenly */
-/* Subpixels along each side of a pixel of the map, to rasterise the disc; by hand. */
+/* Subpixels along each side of a pixel of the map, to rasterise the disc. Pixels are at most its radius wide
+ * (sun_draw), so it covers 200 of them or more. */
 #define SUBPIXELS 8
 
 /* Direction of a point in the disc; `part` is its distance from the middle over the radius. */

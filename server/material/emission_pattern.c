@@ -11,7 +11,8 @@
 #include "server/scene/surface.h"
 #include "server/state/evidence.h"
 
-/* Least texels, and least measured share of them, for a pattern. By hand. */
+/* Least texels, and least measured share of them, for a pattern: 8 x 8 texels; what was not measured is filled in and,
+ * of a picture, would be invented. */
 #define MIN_TEXELS 64    /* +25 %: no change */
 #define MIN_MEASURED 0.3 /* +25 %: no change */
 /* Standard deviation over mean from which an emitter has a pattern. Evenly bright lamps and windows have .001 to .017

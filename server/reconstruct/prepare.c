@@ -16,7 +16,7 @@
 #include "server/scene/mesh_denoise.h"
 #include "server/scene/normals.h"
 
-/* Initial material, with NEUTRAL_BASE_COLOR. By hand. */
+/* Initial material, with NEUTRAL_BASE_COLOR: the middle of each range. */
 #define NEUTRAL_ROUGHNESS 0.5f
 #define NEUTRAL_SPECULAR 0.5f
 

@@ -23,7 +23,7 @@ enum { PASS_LIGHT, PASS_SPECULAR, PASS_ALL, PASSES };
 /* Probe spacing, texels, in a texture of 2048 texels a side; in proportion in others, and at least LEAST_SPACING. */
 #define SPACING_AT_2048 8
 #define MIN_SPACING 4
-/* Part of gather_samples that passes before the last use. By hand. */
+/* Part of gather_samples that passes before the last use: twice the noise, in what is averaged over again. */
 #define EARLY_PASS_PART 0.25
 /* Factor of measure_stride in passes before the last, which only need outgoing radiance, and in the last where a time
  * limit is too short. */

@@ -3,7 +3,8 @@
 
 #include <math.h>
 
-/* Added to the expected radiance in denominators, part of the median radiance. By hand. */
+/* Added to the expected radiance in denominators, part of the median radiance: darker places show as much of
+ * a lens's stray light. */
 #define DIFFERENCE_FLOOR 0.003f
 
 /* Deviations of noise at which an observation has half its weight. Large: path-traced photographs are rarely much too

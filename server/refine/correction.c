@@ -9,15 +9,16 @@
 #include "server/scene/rgb_half.h"
 
 #define NONE UINT32_MAX
-/* Prior standard deviations of logarithms, by kind: of a cell's factor, and of its difference from a neighbour's. The
- * first are wide, since the cells of a chart share most of their error. By hand. */
+/* Prior standard deviations of logarithms, by kind: of a cell's factor, and of its difference from a neighbour's. Light
+ * may be off by 20 %, in tint by 3 %; along a line of cells the differences add up to that over 100 cells, in tint over
+ * 25. */
 static const double factor_deviation[CORRECTION_KINDS] = {0.2, 0.03};
 static const double difference_deviation[CORRECTION_KINDS] = {0.02, 0.006};
 /* Observations with the room's mean variance that are added to a cell's own, which are too few for a variance. */
 #define ROOM_OBSERVATIONS 64.0f
 #define MAX_LOG_FACTOR 0.1f /* bound of a logarithm */
-/* Conjugate gradients end at this part of the squared residual, or after MAX_STEPS steps. The wide prior on factors makes
- * the system ill-conditioned. */
+/* Conjugate gradients end at this part of the squared residual, or after MAX_STEPS steps. The wide prior on factors
+ * makes the system ill-conditioned. */
 #define RESIDUAL_PART 1e-8
 #define MAX_STEPS 2000
 #define MIXED_WEIGHT 0.01f /* weight in a cell's light of a texel observed only in mixed pixels */

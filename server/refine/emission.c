@@ -13,7 +13,9 @@
 #define LOG_RADIANCE_MIN (-20.0f)
 #define LOG_RADIANCE_MAX 20.0f
 
-#define EMITTER_SLOWDOWN 0.05f /* factor of an emitter's base colour steps; by hand */
+/* Factor of an emitter's base colour steps: it reflects a few hundredths of what it sends, so an error of its radiance
+ * would move its base colour twenty times as far. */
+#define EMITTER_SLOWDOWN 0.05f
 
 static float log_radiance(float radiance) {
     return radiance > 0.0f ? fmaxf(logf(radiance), LOG_RADIANCE_MIN) : LOG_RADIANCE_MIN;

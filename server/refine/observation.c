@@ -6,7 +6,8 @@
 #include "common/mem.h"
 #include "common/rng.h"
 
-/* Weight of a pixel that mixes surfaces: it matters only where there is no clean observation. By hand. */
+/* Weight of a pixel that mixes surfaces: it matters only where there is no clean observation, of which
+ * one outweighs fifty. */
 #define MIXED_WEIGHT 0.02f
 
 void observation_batch_init(struct observation_batch *b, const struct surface *surface, const struct world *world,

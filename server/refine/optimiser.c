@@ -8,10 +8,12 @@
 #include "common/hash64.h"
 #include "common/mem.h"
 
-/* Step sizes fall as 1 / (1 + RATE_FALL t), t in [0, 1]. By hand. */
+/* Step sizes fall as 1 / (1 + RATE_FALL t), t in [0, 1], to a sixteenth: steps that fall as 1 / t average the noise of
+ * gradients (Robbins & Monro 1951). */
 #define RATE_FALL 15.0
 
-/* Attempted observations per wanted one after which a run ends even if most of the surface is not observed. By hand. */
+/* Attempted observations per wanted one after which a run ends even if most of the surface is not observed:
+ * ten where a tenth of it is. */
 #define MAX_VISITS 10.0
 
 void optimiser_keep_since(struct optimiser *o, int format, const char *name, void *data, size_t bytes) {

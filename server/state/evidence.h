@@ -33,7 +33,8 @@ static inline void evidence_set_lambert(struct emitter_evidence *e, rgb lambert)
 }
 
 /* Whether a radiance is about that of the segment. */
-#define EVIDENCE_AS_BRIGHT 0.7f /* least part of the segment's radiance; by hand */
+/* Least part of the segment's radiance: half a stop below. */
+#define EVIDENCE_AS_BRIGHT 0.7f
 static inline bool evidence_is_as_bright(const struct emitter_evidence *e, rgb radiance) {
     return rgb_mean(radiance) > EVIDENCE_AS_BRIGHT * rgb_mean(e->radiance);
 }

@@ -30,7 +30,7 @@
 #define USUAL_PROBES 1.3
 
 #define WINDOWS_ACROSS 64 /* windows along the texture's side by which observations are counted; part of the settings */
-/* Parts that a time limit leaves of each before it cuts the next (plan.h). By hand. */
+/* Parts that a time limit leaves of each before it cuts the next (plan.h). Either has three times the noise then. */
 #define MODEST_OBSERVATIONS 0.1
 #define MODEST_REPORT 0.125
 #define MIN_MEASURE 0.25 /* one texel in 2 x 2 */
