@@ -8,7 +8,7 @@
 #include "server/http/auth.h"
 #include "server/http/handlers.h"
 #include "server/http/scene_body.h"
-#include "server/http/uploads.h"
+#include "server/http/upload_body.h"
 #include "server/net/field.h"
 #include "server/transport/problem.h"
 #include "server/uploads/upload.h"
@@ -207,7 +207,7 @@ static struct response *begin(struct api *api, struct request *r) {
         return refusal;
     enum route_body body = body_of(r);
     if (body == ROUTE_BODY_PATCH)
-        return uploads_begin(api, r); /* the upload's length is the limit */
+        return upload_body_begin(api, r); /* the upload's length is the limit */
     uint64_t limit = body == ROUTE_BODY_UPLOAD ? api->config.max_upload_bytes : ROUTES_BODY_MAX;
     if (r->content_length > 0 && (uint64_t)r->content_length > limit)
         return too_large(r, limit);
@@ -229,7 +229,7 @@ static struct response *take(struct api *api, struct request *r, const void *dat
         return scene_body_data(api, r, data, length);
     }
     if (r->patch)
-        return uploads_data(api, r, data, length);
+        return upload_body_data(api, r, data, length);
     return buf_append(&r->body, data, length) ? NULL : too_large(r, ROUTES_BODY_MAX);
 }
 
@@ -250,6 +250,6 @@ void routes_drop_body(struct request *r) {
     buf_release(&r->body);
     upload_free(r->upload);
     r->upload = NULL;
-    uploads_drop(r->patch);
+    upload_body_drop(r->patch);
     r->patch = NULL;
 }

@@ -1,19 +1,14 @@
 /* uploads.c -- /v1/uploads: bundles in parts, by the tus protocol 1.0.0 (tus.io) with its
  * extensions creation, termination, expiration and checksum. What is on disk is resumable.c's. A PATCH
  * whose body is JSON is not of the protocol: it changes how long the upload is kept. */
-#include "server/http/uploads.h"
-
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
-#include <strings.h>
 #include <time.h>
 
 #include "common/base64.h"
 #include "common/mem.h"
 #include "common/protocol.h"
-#include "common/sha1.h"
-#include "common/sha256.h"
 #include "common/utf8.h"
 #include "server/data/layout.h"
 #include "server/http/handlers.h"
@@ -21,89 +16,19 @@
 #include "server/http/retention.h"
 #include "server/http/scene_reading.h"
 #include "server/http/space.h"
+#include "server/http/tus.h"
+#include "server/http/upload_body.h"
 #include "server/http/views.h"
 #include "server/net/field.h"
 #include "server/transport/body.h"
 #include "server/transport/problem.h"
 #include "server/uploads/resumable.h"
-#include "server/uploads/upload_writer.h"
 
 #define METADATA_MAX 1000 /* bytes; it is sent back in a header field */
 #define METADATA_HINT "name has 1 to 200 bytes of UTF-8 without control characters, sha256 has 64 lower-case hex digits"
 
-enum checksum { CHECKSUM_NONE, CHECKSUM_SHA1, CHECKSUM_SHA256 };
-
-struct upload_patch {
-    struct upload_writer *writer;
-    enum checksum checksum;
-    uint8_t wanted[32];
-    struct sha1 sha1;
-    struct sha256 sha256;
-};
-
-/* --- shared --------------------------------------------------------------------------------- */
-
-/* Checks Tus-Resumable, which is required where `is_needed`. NULL when the version is ours. */
-static struct response *check_version(const struct request *r, bool is_needed) {
-    const char *version = request_field(r, "Tus-Resumable");
-    if (version ? strcmp(version, TUS_VERSION) == 0 : !is_needed)
-        return NULL;
-    struct response *reply =
-        problem_full(r, 412, version ? "Tus-Resumable names another version" : "the field Tus-Resumable is missing",
-                     "send Tus-Resumable: " TUS_VERSION, NULL);
-    response_field(reply, "Tus-Version", TUS_VERSION);
-    return reply;
-}
-
-static struct response *refuse(const struct request *r, const struct error *err) {
-    if (err->status == STATUS_LIMIT) /* longer than announced; a full queue has another message */
-        return problem_full(r, 413, err->message, err->hint, NULL);
-    return problem_from(r, err);
-}
-
-static bool is_upload_id(const char *id) {
-    return strlen(id) == UPLOAD_ID_SIZE - 1 && strspn(id, "0123456789abcdef") == UPLOAD_ID_SIZE - 1;
-}
-
-/* The id in the path, of an upload of the caller's; or *refusal. Others' uploads do not exist for the caller. */
-static const char *find_upload(struct api *api, const struct request *r, struct response **refusal) {
-    const char *id = r->target.segments[2];
-    struct upload_row row = {0};
-    struct error err;
-    enum status status = error_set(&err, STATUS_NOT_FOUND, "there is no upload %.80s", id);
-    if (is_upload_id(id))
-        status = store_upload_get(api->store, id, &row, NULL, 0, &err);
-    if (status == STATUS_OK && row.owner_id != r->caller.user_id && r->caller.role != ROLE_ADMIN)
-        status = error_set(&err, STATUS_NOT_FOUND, "there is no upload %.80s", id);
-    upload_row_release(&row);
-    if (status == STATUS_OK)
-        return id;
-    *refusal = refuse(r, &err);
-    return NULL;
-}
-
-static void add_expiry(struct response *reply, int64_t expires_ms) {
-    char text[64];
-    struct tm utc;
-    if (expires_ms <= 0) /* pinned */
-        return;
-    time_t seconds = (time_t)(expires_ms / 1000);
-    gmtime_r(&seconds, &utc);
-    strftime(text, sizeof text, "%a, %d %b %Y %H:%M:%S GMT", &utc); /* pinned */
-    response_field(reply, "Upload-Expires", "%s", text);
-}
-
-/* Adds Upload-Offset, Upload-Length and the like. */
-static void add_place(struct response *reply, const struct upload_row *row) {
-    response_field(reply, "Upload-Offset", "%" PRIu64, row->received);
-    if (*row->scene_id)
-        response_field(reply, "Link", "</v1/scenes/%s>; rel=\"related\"", row->scene_id);
-    else
-        add_expiry(reply, row->expires_ms);
-}
-
 struct response *uploads_options(struct api *api, struct request *r) {
-    if (r->target.segment_count > 2 && !is_upload_id(r->target.segments[2]))
+    if (r->target.segment_count > 2 && !tus_is_upload_id(r->target.segments[2]))
         return problem(r, 404, "\"%.80s\" is not an upload's id", r->target.segments[2]);
     struct response *reply = response_new(204);
     response_field(reply, "Tus-Version", TUS_VERSION);
@@ -168,7 +93,7 @@ static struct response *read_metadata(const struct request *r, struct upload_row
 static struct response *read_creation(struct api *api, const struct request *r, struct upload_row *row) {
     const char *text = request_field(r, "Upload-Length");
     int64_t length = 0;
-    struct response *refusal = check_version(r, true);
+    struct response *refusal = tus_check_version(r, true);
     if (refusal)
         return refusal;
     if (r->has_body)
@@ -216,7 +141,7 @@ struct response *uploads_add(struct api *api, struct request *r) {
         clock_gettime(CLOCK_REALTIME, &now);
         reply = response_new(201);
         response_field(reply, "Location", "/v1/uploads/%s", row.id);
-        add_expiry(reply, (int64_t)now.tv_sec * 1000 + api->config.empty_upload_ms);
+        tus_add_expiry(reply, (int64_t)now.tv_sec * 1000 + api->config.empty_upload_ms);
     }
     upload_row_release(&row);
     return reply;
@@ -225,20 +150,20 @@ struct response *uploads_add(struct api *api, struct request *r) {
 /* --- reading -------------------------------------------------------------------------------- */
 
 struct response *uploads_get(struct api *api, struct request *r) {
-    struct response *reply = check_version(r, r->is_head);
+    struct response *reply = tus_check_version(r, r->is_head);
     struct upload_row row;
     struct error err;
-    const char *id = reply ? NULL : find_upload(api, r, &reply);
+    const char *id = reply ? NULL : tus_find_upload(api, r, &reply);
     if (reply)
         return reply;
     if (resumable_status(api->resumables, id, &row, &err) != STATUS_OK)
-        return refuse(r, &err);
+        return tus_refuse(r, &err);
     reply = response_json(200, view_upload(&row));
     response_field(reply, "Cache-Control", "no-store");
     response_field(reply, "Upload-Length", "%" PRIu64, row.length);
     if (*row.metadata)
         response_field(reply, "Upload-Metadata", "%s", row.metadata);
-    add_place(reply, &row);
+    tus_add_place(reply, &row);
     upload_row_release(&row);
     return reply;
 }
@@ -270,98 +195,15 @@ struct response *uploads_list(struct api *api, struct request *r) {
 
 /* --- continuing ----------------------------------------------------------------------------- */
 
-static struct response *read_checksum(const struct request *r, struct upload_patch *p) {
-    const char *text = request_field(r, "Upload-Checksum");
-    if (!text)
-        return NULL;
-    size_t name = strcspn(text, " "), used, size = 0;
-    if (name == 4 && memcmp(text, "sha1", 4) == 0)
-        p->checksum = CHECKSUM_SHA1, size = SHA1_BYTES;
-    else if (name == 6 && memcmp(text, "sha256", 6) == 0)
-        p->checksum = CHECKSUM_SHA256, size = sizeof p->wanted;
-    else
-        return problem(r, 400, "Upload-Checksum must be of sha1 or sha256");
-    const char *value = text + name + strspn(text + name, " ");
-    if (!base64_decode(value, strlen(value), p->wanted, size, &used) || used != size)
-        return problem(r, 400, "Upload-Checksum is not the base64 of %zu bytes", size);
-    sha1_init(&p->sha1);
-    sha256_init(&p->sha256);
-    return NULL;
-}
-
-struct response *uploads_begin(struct api *api, struct request *r) {
-    struct response *refusal = check_version(r, true);
-    const char *text = request_field(r, "Upload-Offset");
-    const char *id = refusal ? NULL : find_upload(api, r, &refusal);
-    int64_t offset = 0;
-    struct error err;
-    if (!refusal && (!text || !field_number(text, 0, INT64_MAX, &offset)))
-        refusal = problem(r, 400, "Upload-Offset must be a number of bytes");
-    if (refusal)
-        return refusal;
-    struct upload_patch *p = r->patch = mem_calloc(1, sizeof *p);
-    refusal = read_checksum(r, p);
-    if (refusal)
-        return refusal;
-    if (upload_writer_take(api->resumables, id, (uint64_t)offset, p->checksum != CHECKSUM_NONE, &p->writer, &err) !=
-        STATUS_OK)
-        return refuse(r, &err);
-    if (r->content_length > 0 && (uint64_t)r->content_length > upload_writer_room(p->writer))
-        return problem(r, 413, "the upload needs %" PRIu64 " further bytes, not %lld", upload_writer_room(p->writer),
-                       (long long)r->content_length);
-    uint64_t unreserved = upload_writer_unreserved(p->writer);
-    return unreserved ? space_check_room(api, r, unreserved) : NULL;
-}
-
-struct response *uploads_data(struct api *api, struct request *r, const void *data, size_t length) {
-    struct upload_patch *p = r->patch;
-    struct error err;
-    if (upload_writer_write(p->writer, data, length, &err) != STATUS_OK)
-        return refuse(r, &err);
-    atomic_fetch_add(&api->uploaded_bytes, length);
-    if (p->checksum == CHECKSUM_SHA1)
-        sha1_update(&p->sha1, data, length);
-    else if (p->checksum == CHECKSUM_SHA256)
-        sha256_update(&p->sha256, data, length);
-    if (upload_writer_is_due(p->writer) && upload_writer_commit(p->writer, &err) != STATUS_OK)
-        return refuse(r, &err);
-    return NULL;
-}
-
-void uploads_drop(struct upload_patch *p) {
-    if (!p)
-        return;
-    upload_writer_release(p->writer);
-    mem_free(p);
-}
-
-static bool is_as_sent(struct upload_patch *p) {
-    uint8_t found[32] = {0};
-    if (p->checksum == CHECKSUM_NONE)
-        return true;
-    if (p->checksum == CHECKSUM_SHA1) {
-        sha1_bytes(&p->sha1, found);
-        return memcmp(found, p->wanted, SHA1_BYTES) == 0;
-    }
-    char hex[SHA256_HEX_SIZE];
-    sha256_hex(&p->sha256, hex);
-    for (size_t i = 0; i < sizeof found; i++) {
-        unsigned byte = 0;
-        sscanf(hex + 2 * i, "%2x", &byte);
-        found[i] = (uint8_t)byte;
-    }
-    return memcmp(found, p->wanted, sizeof found) == 0;
-}
-
 /* A PATCH with a JSON body. */
 static struct response *change(struct api *api, const struct request *r) {
     struct retention retention = {0};
     struct upload_row row;
     struct error err;
-    struct response *reply = check_version(r, false);
+    struct response *reply = tus_check_version(r, false);
     if (!reply && (request_field(r, "Upload-Offset") || request_field(r, "Upload-Checksum")))
         reply = problem(r, 400, "Upload-Offset and Upload-Checksum belong to bytes (" MIME_TUS "), not to JSON");
-    const char *id = reply ? NULL : find_upload(api, r, &reply);
+    const char *id = reply ? NULL : tus_find_upload(api, r, &reply);
     cJSON *body = reply ? NULL : body_object(r, &reply);
     if (reply)
         return reply;
@@ -382,33 +224,25 @@ static struct response *change(struct api *api, const struct request *r) {
 }
 
 struct response *uploads_patch(struct api *api, struct request *r) {
-    struct upload_patch *p = r->patch;
-    if (!p)
-        return change(api, r);
-    struct error err;
     struct upload_row row = {0};
-    enum status status = STATUS_OK;
-    if (!is_as_sent(p))
-        return problem(r, 460, "the checksum does not match the bytes that arrived; they were discarded");
-    if (p->checksum != CHECKSUM_NONE)
-        status = upload_writer_accept(p->writer, &err);
-    if (status == STATUS_OK)
-        status = upload_writer_finish(p->writer, &row, &err);
-    if (status != STATUS_OK)
-        return refuse(r, &err);
-    struct response *reply = response_new(204);
-    add_place(reply, &row);
+    if (!r->patch)
+        return change(api, r);
+    struct response *reply = upload_body_end(r, &row);
+    if (reply)
+        return reply;
+    reply = response_new(204);
+    tus_add_place(reply, &row);
     upload_row_release(&row);
     return reply;
 }
 
 struct response *uploads_delete(struct api *api, struct request *r) {
     bool dry_run = false;
-    struct response *reply = check_version(r, false);
+    struct response *reply = tus_check_version(r, false);
     struct error err;
     if (!reply)
         reply = retention_dry_run(r, &dry_run);
-    const char *id = reply ? NULL : find_upload(api, r, &reply);
+    const char *id = reply ? NULL : tus_find_upload(api, r, &reply);
     if (reply)
         return reply;
     if (dry_run) {
@@ -418,6 +252,6 @@ struct response *uploads_delete(struct api *api, struct request *r) {
         return reply;
     }
     if (resumable_remove(api->resumables, id, &err) != STATUS_OK)
-        return refuse(r, &err);
+        return tus_refuse(r, &err);
     return response_new(204);
 }
