@@ -103,3 +103,14 @@ bool arguments_numbers(const struct arguments *a, const struct number_flag *flag
     }
     return true;
 }
+
+int arguments_begin(struct arguments *a, int argc, char **argv, const struct flag *flags,
+                    const struct number_flag *numbers, size_t number_count, size_t word_count) {
+    if (!arguments_read(a, argc, argv, flags))
+        return EXIT_USAGE;
+    if (arguments_have(a, "--help"))
+        return COMMAND_HELP;
+    if (!arguments_numbers(a, numbers, number_count))
+        return EXIT_USAGE;
+    return a->word_count == word_count ? -1 : COMMAND_MISUSED;
+}

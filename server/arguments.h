@@ -56,4 +56,9 @@ struct number_flag {
 /* Stores the numbers of the flags that were given. False, with a message, where a value is no such number. */
 bool arguments_numbers(const struct arguments *a, const struct number_flag *flags, size_t count);
 
+/* How a command that takes word_count words begins: reads argv, then the numbers. -1: go on; else what the command
+ * returns: EXIT_USAGE, after a message, COMMAND_HELP or COMMAND_MISUSED. */
+int arguments_begin(struct arguments *a, int argc, char **argv, const struct flag *flags,
+                    const struct number_flag *numbers, size_t number_count, size_t word_count);
+
 #endif

@@ -8,10 +8,12 @@
 #include "common/buf.h"
 #include "common/image.h"
 #include "common/mem.h"
-#include "server/transport/listener.h"
 #include "server/ingest/mesh/gltf_meshopt.h"
+#include "server/ingest/source/xml.h"
+#include "server/net/tls.h"
 #include "server/render/accel.h"
 #include "server/store/store.h"
+#include "server/transport/listener.h"
 
 /* Some begin their version with their name. */
 static struct library named(const char *name, const char *prefix, const char *version) {
@@ -27,6 +29,8 @@ void libraries_list(struct library list[LIBRARY_COUNT]) {
     list[4] = named("cjson", "", cJSON_Version());
     list[5] = named("libheif", "", image_heif_version());
     list[6] = named("meshoptimizer", "", gltf_meshopt_version());
+    list[7] = named("libexpat", "expat_", xml_library_version());
+    list[8] = named("gnutls", "", tls_library_version());
 }
 
 char *libraries_text(void) {

@@ -2,7 +2,7 @@
 #ifndef UNBAKE_SERVER_LIBRARIES_H
 #define UNBAKE_SERVER_LIBRARIES_H
 
-#define LIBRARY_COUNT 7
+#define LIBRARY_COUNT 9
 
 struct library {
     const char *name, *version; /* static storage */

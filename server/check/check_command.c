@@ -134,14 +134,9 @@ int check_command(int argc, char **argv) {
     struct settings settings;
     cJSON *given = NULL, *wanted = NULL;
     bool fits = false;
-    if (!arguments_read(&a, argc, argv, check_flags))
-        return EXIT_USAGE;
-    if (arguments_have(&a, "--help"))
-        return COMMAND_HELP;
-    if (!arguments_numbers(&a, numbers, sizeof numbers / sizeof *numbers))
-        return EXIT_USAGE;
-    if (a.word_count != 1)
-        return COMMAND_MISUSED;
+    int code = arguments_begin(&a, argc, argv, check_flags, numbers, sizeof numbers / sizeof *numbers, 1);
+    if (code >= 0)
+        return code;
     enum status status = collect(&a, "--scene-set", reading_parse_assignment, &given, &err);
     if (status == STATUS_OK)
         status = collect(&a, "--set", settings_parse_assignment, &wanted, &err);

@@ -50,14 +50,9 @@ int demo_command(int argc, char **argv) {
     };
     struct arguments a;
     struct error err;
-    if (!arguments_read(&a, argc, argv, demo_flags))
-        return EXIT_USAGE;
-    if (arguments_have(&a, "--help"))
-        return COMMAND_HELP;
-    if (!arguments_numbers(&a, numbers, sizeof numbers / sizeof *numbers))
-        return EXIT_USAGE;
-    if (a.word_count != 1)
-        return COMMAND_MISUSED;
+    int code = arguments_begin(&a, argc, argv, demo_flags, numbers, sizeof numbers / sizeof *numbers, 1);
+    if (code >= 0)
+        return code;
     s.sdr = arguments_have(&a, "--sdr");
     struct parallel *pool = parallel_new((int)threads);
     enum status status = demo_generate(a.words[0], &s, pool, show_progress, NULL, &err);

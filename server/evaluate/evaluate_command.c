@@ -57,14 +57,9 @@ int evaluate_command(int argc, char **argv) {
     struct evaluation evaluation;
     struct arguments a;
     struct error err;
-    if (!arguments_read(&a, argc, argv, evaluate_flags))
-        return EXIT_USAGE;
-    if (arguments_have(&a, "--help"))
-        return COMMAND_HELP;
-    if (!arguments_numbers(&a, numbers, sizeof numbers / sizeof *numbers))
-        return EXIT_USAGE;
-    if (a.word_count != 2)
-        return COMMAND_MISUSED;
+    int code = arguments_begin(&a, argc, argv, evaluate_flags, numbers, sizeof numbers / sizeof *numbers, 2);
+    if (code >= 0)
+        return code;
     s.pictures_dir = arguments_value(&a, "--pictures", s.pictures_dir);
     struct parallel *pool = parallel_new((int)threads);
     enum status status = evaluate_outputs(a.words[0], a.words[1], &s, pool, &evaluation, &err);

@@ -64,19 +64,16 @@ int relight_command(int argc, char **argv) {
     struct arguments a;
     struct image image;
     struct error err;
-    if (!arguments_read(&a, argc, argv, relight_flags))
-        return EXIT_USAGE;
-    if (arguments_have(&a, "--help"))
-        return COMMAND_HELP;
-    if (!arguments_numbers(&a, numbers, sizeof numbers / sizeof *numbers) || !read_words(&a, &s))
+    int code = arguments_begin(&a, argc, argv, relight_flags, numbers, sizeof numbers / sizeof *numbers, 1);
+    if (code >= 0)
+        return code;
+    if (!read_words(&a, &s))
         return EXIT_USAGE;
     const char *out = arguments_value(&a, "--out", "relit.png");
     if (!has_ending(out, ".png") && !has_ending(out, ".exr")) {
         fprintf(stderr, "unbaked: --out must end in .png or .exr, not \"%s\"\n", out);
         return EXIT_USAGE;
     }
-    if (a.word_count != 1)
-        return COMMAND_MISUSED;
     struct parallel *pool = parallel_new((int)threads);
     enum status status = relight(a.words[0], &s, pool, &image, &err);
     parallel_free(pool);

@@ -175,3 +175,5 @@ enum status tls_days_left(const char *certificate_file, double *days, struct err
     buf_release(&text);
     return status;
 }
+
+const char *tls_library_version(void) { return gnutls_check_version(NULL); }

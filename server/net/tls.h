@@ -27,6 +27,8 @@ void *tls_certificate_callback(void);
 /* Writes into a connection's session, past libmicrohttpd; sends only what fits at once. */
 void tls_send(void *session, const void *data, size_t length);
 
+const char *tls_library_version(void); /* GnuTLS's */
+
 /* Days until the file's first certificate expires (negative: days since), for `unbaked doctor`. */
 enum status tls_days_left(const char *certificate_file, double *days, struct error *err);
 

@@ -59,6 +59,18 @@ enum status frame_list_add(struct frame_list *in, double m[3][4], const struct l
     return STATUS_OK;
 }
 
+enum status frame_list_settle(struct frame_list *in, const char *path, enum status status, const struct error *own,
+                              double m[3][4], const struct lens *lens, const char *file, const char *place,
+                              struct error *err) {
+    const char *list_name = in->name;
+    if (status != STATUS_OK)
+        return findings_settle(in->findings, path, status, own, err);
+    in->name = path;
+    status = frame_list_add(in, m, lens, file, place, NULL, err);
+    in->name = list_name;
+    return status;
+}
+
 void frame_list_finish(const struct frame_list *in) {
     if (in->lost_count > 0)
         findings_warning(in->findings, "%s: %zu poses are not finite and were left out", in->name, in->lost_count);

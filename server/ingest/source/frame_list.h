@@ -21,6 +21,12 @@ struct frame_list frame_list_make(struct frames *t, const char *name, enum matri
  * is a problem that names `place`; a lost pose is counted. The new frame, borrowed until the next call, or NULL. STATUS_INPUT: too many. */
 enum status frame_list_add(struct frame_list *in, double m[3][4], const struct lens *lens, const char *file,
                            const char *place, struct frame **frame, struct error *err);
+/* The end of reading a file `path` that holds one frame. `status` and `own` are those of the reading: after STATUS_OK the
+ * frame is added, with messages that name `path`; else m and lens are not looked at, and a fault of the file is a
+ * problem. */
+enum status frame_list_settle(struct frame_list *in, const char *path, enum status status, const struct error *own,
+                              double m[3][4], const struct lens *lens, const char *file, const char *place,
+                              struct error *err);
 /* Warns of what was counted. */
 void frame_list_finish(const struct frame_list *in);
 /* Sorts by the photographs' paths, for files that have them in no order. */

@@ -49,12 +49,7 @@ static enum status read_pose(const struct source_place *place, const char *path,
     enum status status = numbers_read(place->listing, path, 16, "a matrix", m[0], &own);
     if (status == STATUS_OK)
         status = read_lens(place, pano, camera, &lens, &own);
-    list->name = path;
-    if (status == STATUS_OK)
-        status = frame_list_add(list, m, &lens, file, "the matrix", NULL, err);
-    else
-        status = findings_settle(list->findings, path, status, &own, err);
-    list->name = place->found;
+    status = frame_list_settle(list, path, status, &own, m, &lens, file, "the matrix", err);
     mem_free(file);
     mem_free(pano);
     return status;

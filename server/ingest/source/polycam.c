@@ -69,12 +69,7 @@ static enum status read_frame(const struct source_place *place, const char *path
     struct lens lens = lens_pinhole(json_member(tree, "width"), json_member(tree, "height"), json_member(tree, "fx"),
                                     json_member(tree, "fy"), json_member(tree, "cx"), json_member(tree, "cy"));
     char *file = mem_printf("%.*s", (int)(path_extension(name) - name - 1), name);
-    list->name = path;
-    if (status == STATUS_OK)
-        status = frame_list_add(list, m, &lens, file, "t_00 to t_23", NULL, err);
-    else
-        status = findings_settle(list->findings, path, status, &own, err);
-    list->name = place->found;
+    status = frame_list_settle(list, path, status, &own, m, &lens, file, "t_00 to t_23", err);
     mem_free(file);
     cJSON_Delete(tree);
     return status;

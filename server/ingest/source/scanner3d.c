@@ -18,7 +18,7 @@ static char *recognise(const struct listing *l, const char *base) {
 
 static enum status read_frame(const struct source_place *place, const char *path, struct frame_list *list,
                               struct error *err) {
-    double m[4][4], k[9];
+    double m[4][4], k[9] = {0};
     cJSON *tree;
     struct error own;
     const char *name = path_base(path);
@@ -28,14 +28,8 @@ static enum status read_frame(const struct source_place *place, const char *path
                                 !json_numbers(cJSON_GetObjectItemCaseSensitive(tree, "intrinsics"), 9, k)))
         status = error_set(&own, STATUS_INPUT,
                            "%s: expected \"cameraPoseARFrame\" of 16 numbers and \"intrinsics\" of 9", path);
-    list->name = path;
-    if (status == STATUS_OK) {
-        struct lens lens = lens_pinhole(NAN, NAN, k[0], k[4], k[2], k[5]);
-        status = frame_list_add(list, m, &lens, file, "cameraPoseARFrame", NULL, err);
-    } else {
-        status = findings_settle(list->findings, path, status, &own, err);
-    }
-    list->name = place->found;
+    struct lens lens = lens_pinhole(NAN, NAN, k[0], k[4], k[2], k[5]);
+    status = frame_list_settle(list, path, status, &own, m, &lens, file, "cameraPoseARFrame", err);
     mem_free(file);
     cJSON_Delete(tree);
     return status;

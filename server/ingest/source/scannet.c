@@ -50,12 +50,7 @@ static enum status read_pose(const struct source_place *place, long number, cons
     struct error own;
     char *name = mem_printf("%s/%ld.txt", place->found, number), *file = mem_printf("color/%ld", number);
     enum status status = numbers_read(place->listing, name, 16, "a matrix", m[0], &own);
-    list->name = name;
-    if (status == STATUS_OK)
-        status = frame_list_add(list, m, lens, file, "the matrix", NULL, err);
-    else
-        status = findings_settle(list->findings, name, status, &own, err);
-    list->name = place->found;
+    status = frame_list_settle(list, name, status, &own, m, lens, file, "the matrix", err);
     mem_free(file);
     mem_free(name);
     return status;

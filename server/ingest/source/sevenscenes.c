@@ -31,12 +31,7 @@ static enum status read_pose(const struct source_place *place, const char *path,
     const char *inner = path + strlen(place->base);
     char *file = mem_printf("%.*s.color.png", (int)(strlen(inner) - strlen(POSE_END)), inner);
     enum status status = numbers_read(place->listing, path, 16, "a matrix", m[0], &own);
-    list->name = path;
-    if (status == STATUS_OK)
-        status = frame_list_add(list, m, lens, file, "the matrix", NULL, err);
-    else
-        status = findings_settle(list->findings, path, status, &own, err);
-    list->name = place->found;
+    status = frame_list_settle(list, path, status, &own, m, lens, file, "the matrix", err);
     mem_free(file);
     return status;
 }

@@ -100,6 +100,8 @@ enum status xml_parse(const char *text, size_t size, const char *name, struct xm
     return status;
 }
 
+const char *xml_library_version(void) { return XML_ExpatVersion(); }
+
 void xml_free(struct xml_node *node) {
     while (node) {
         struct xml_node *next = node->next;

@@ -22,6 +22,8 @@ struct xml_node {
 enum status xml_parse(const char *text, size_t size, const char *name, struct xml_node **root, struct error *err);
 void xml_free(struct xml_node *node); /* NULL is fine */
 
+const char *xml_library_version(void); /* "expat_2.5.0" */
+
 /* The first child of that name, or the next one after `after`; NULL: none. `node` may be NULL. */
 struct xml_node *xml_child(const struct xml_node *node, const char *name);
 struct xml_node *xml_next(const struct xml_node *after, const char *name);
