@@ -15,7 +15,7 @@
 #define CHUNK_MAX ((size_t)8 << 20)    /* bytes; no picture has a longer profile */
 #define PROFILE_MAX ((size_t)16 << 20) /* inflated */
 
-enum kind { CICP, ICCP, SRGB, CHRM, GAMA, KIND_COUNT };
+enum chunk_kind { CICP, ICCP, SRGB, CHRM, GAMA, KIND_COUNT };
 static const char kind_name[KIND_COUNT][5] = {"cICP", "iCCP", "sRGB", "cHRM", "gAMA"};
 static const size_t least_length[KIND_COUNT] = {4, 4, 1, 32, 4};
 
@@ -33,8 +33,8 @@ static void warn(struct color *color, const char *kind, const char *what) {
 }
 
 /* Reads the chunk at `at`, with its checksum; false, with a warning, where it is damaged. */
-static bool read_chunk(struct image_source *source, uint64_t at, size_t length, enum kind kind, struct chunk *chunk,
-                       struct color *color) {
+static bool read_chunk(struct image_source *source, uint64_t at, size_t length, enum chunk_kind kind,
+                       struct chunk *chunk, struct color *color) {
     if (length < least_length[kind] || length > CHUNK_MAX) {
         warn(color, kind_name[kind], "has an impossible length");
         return false;
@@ -61,7 +61,7 @@ static void find_chunks(struct image_source *source, struct chunk found[KIND_COU
         size_t length = big_endian(head);
         for (int k = 0; k < KIND_COUNT; k++)
             if (memcmp(head + 4, kind_name[k], 4) == 0 && !found[k].data)
-                read_chunk(source, at, length, (enum kind)k, &found[k], color);
+                read_chunk(source, at, length, (enum chunk_kind)k, &found[k], color);
         at += 12 + (uint64_t)length;
     }
 }

@@ -105,10 +105,13 @@ if ! circle=$(units | tsort 2>&1 >/dev/null); then
     printf 'these include each other:\n%s\n' "$circle"
     bad=1
 fi
-# A reader who searches for a struct finds one.
-tags=$(grep -rhoE '^(typedef |static )?(const )?struct [a-z_0-9]+ \{' common client server --include='*.[ch]' |
-    sed -E 's/.*struct ([a-z_0-9]+) \{/\1/' | sort | uniq -d)
-[ -z "$tags" ] || { printf 'structs of the same name: %s\n' "$tags"; bad=1; }
+# A reader who searches for a struct, an enum or a union (their tags share one name space), or for a constant of a header,
+# finds one. (test_deploy.sh: client and server share no global name.)
+tags=$(grep -rhoE '\b(struct|enum|union) [a-z_0-9]+ \{' common client server --include='*.[ch]' |
+    sed -E 's/.* ([a-z_0-9]+) \{/\1/' | sort | uniq -d | xargs)
+[ -z "$tags" ] || { printf 'tags of more than one struct, enum or union: %s\n' "$tags"; bad=1; }
+constants=$(grep -rhoE '^#define [A-Za-z_0-9]+' common client server --include='*.h' | sort | uniq -d | xargs)
+[ -z "$constants" ] || { printf 'defined in more than one header: %s\n' "$constants"; bad=1; }
 silent=$(grep -L 'check_result()' tests/{unit,gradient,render,api,chaos,soak}/test_*.c 2>/dev/null)
 [ -z "$silent" ] || { printf 'cannot fail, for want of check_result:\n%s\n' "$silent"; bad=1; }
 exit $bad

@@ -30,7 +30,7 @@
 
 const struct flag doctor_flags[] = {INVOCATION_FLAGS, {"--help", NULL, "print this help"}, {0}};
 
-enum verdict { GOOD, WARN, BAD };
+enum doctor_verdict { GOOD, WARN, BAD };
 
 struct doctor {
     const struct config *config;
@@ -38,7 +38,7 @@ struct doctor {
     int bad_count;
 };
 
-__attribute__((format(printf, 4, 5))) static void tell(struct doctor *d, enum verdict verdict, const char *what,
+__attribute__((format(printf, 4, 5))) static void tell(struct doctor *d, enum doctor_verdict verdict, const char *what,
                                                        const char *format, ...) {
     static const char *const words[] = {"ok", "warn", "FAIL"};
     char text[1200];
@@ -79,7 +79,7 @@ static void check_processors(struct doctor *d) {
     long count = sysconf(_SC_NPROCESSORS_ONLN), pages = sysconf(_SC_PHYS_PAGES);
     uint64_t memory = (uint64_t)pages * (uint64_t)sysconf(_SC_PAGESIZE) >> 20;
     uint64_t wanted = (uint64_t)c->worker_memory_mib * (uint64_t)c->max_running;
-    enum verdict verdict = wanted > memory || c->threads > count ? WARN : GOOD;
+    enum doctor_verdict verdict = wanted > memory || c->threads > count ? WARN : GOOD;
     tell(d, verdict, "machine", "%ld processors, %llu MiB of memory; jobs use %lld threads (0: all) and %s", count,
          (unsigned long long)memory, (long long)c->threads,
          wanted == 0       ? "as much memory as they ask for"

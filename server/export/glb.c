@@ -32,7 +32,7 @@
 #define NEAR_M 0.01
 
 /* Buffer views, in order. Without normals there is no NORMAL, without emission patterns no EMISSION. */
-enum view { VIEW_POSITION, VIEW_NORMAL, VIEW_UV, VIEW_INDEX, VIEW_BASE_COLOR, VIEW_EMISSION, VIEW_COUNT };
+enum buffer_view { VIEW_POSITION, VIEW_NORMAL, VIEW_UV, VIEW_INDEX, VIEW_BASE_COLOR, VIEW_EMISSION, VIEW_COUNT };
 
 struct glb {
     const struct export_input *in;
@@ -123,8 +123,8 @@ static void add_pictures(struct glb *g) {
 }
 
 /* Returns its index. */
-static int add_accessor(struct glb *g, enum view view, size_t first, size_t count, const char *type, int64_t stride,
-                        const struct part *bounds) {
+static int add_accessor(struct glb *g, enum buffer_view view, size_t first, size_t count, const char *type,
+                        int64_t stride, const struct part *bounds) {
     cJSON *accessor = append(g->accessors);
     json_add_int(accessor, "bufferView", g->view[view].number);
     json_add_int(accessor, "byteOffset", (int64_t)first * stride);
@@ -314,7 +314,7 @@ static char *describe(struct glb *g) {
 
 /* --- bytes ---------------------------------------------------------------------------------- */
 
-static void put_picture(const struct glb *g, struct sink *out, enum view view, const char *path) {
+static void put_picture(const struct glb *g, struct sink *out, enum buffer_view view, const char *path) {
     uint64_t length = g->view[view].length;
     sink_copy(out, path, length);
     sink_bytes(out, "\0\0\0", padded(length) - length);

@@ -22,8 +22,8 @@ struct route {
     enum route_access access;
     struct response *(*handle)(struct api *api, struct request *r);
     enum route_body body;
-    enum pace pace;    /* of the handler */
-    const char *query; /* names of the query's parameters, separated by spaces */
+    enum request_pace pace; /* of the handler */
+    const char *query;      /* names of the query's parameters, separated by spaces */
 };
 
 #endif

@@ -57,7 +57,7 @@ enum status path_clean(const char *name, char **clean, struct error *err) {
         bool skip = n == 0 || (n == 1 && part[0] == '.');
         if (n == 2 && part[0] == '.' && part[1] == '.')
             fault = "leads out of the bundle by \"..\"";
-        else if (n > 255 || (!skip && ++depth > PATH_MAX_DEPTH))
+        else if (n > 255 || (!skip && ++depth > PATH_FOLDERS_MAX))
             fault = n > 255 ? "is too long a name" : "is nested too deep";
         if (!fault && !skip) {
             if (used > 0)

@@ -20,7 +20,7 @@
 #define DECODE_PIXEL_BYTES 32
 
 /* Result of loading one frame; written by that frame's work item only. */
-struct outcome {
+struct photo_outcome {
     enum status status;
     struct error err;
     bool mask_failed; /* err is about the mask */
@@ -48,7 +48,7 @@ struct loading {
     uint64_t pixels;               /* of all pictures together */
     char **path;                   /* [frame_count] of the picture, below dir; NULL where absent; of the frames */
     struct photograph *photograph; /* [frame_count] */
-    struct outcome *outcome;       /* [frame_count] */
+    struct photo_outcome *outcome; /* [frame_count] */
     struct photo_color *color;     /* [frame_count] */
     struct photo_fit *fit;         /* [frame_count] */
     uint16_t *half_of_srgb;        /* [65536] linear half value of a 16-bit sRGB code value */
@@ -89,7 +89,7 @@ static void find_duplicates(const struct loading *l, const char *name, struct fi
 /* --- one photograph ---------------------------------------------------------------------- */
 
 static void set_exposure(const struct frame *frame, const struct image_info *info, struct photograph *photo,
-                         struct outcome *outcome) {
+                         struct photo_outcome *outcome) {
     double exposure = frame->exposure;
     outcome->source = frame->exposure_source;
     if (exposure <= 0.0 && photo->is_hdr) {
@@ -105,7 +105,8 @@ static void set_exposure(const struct frame *frame, const struct image_info *inf
 }
 
 /* Sets the camera, by the size of the picture. */
-static enum status check_size(const struct loading *l, size_t index, struct camera *camera, struct outcome *outcome) {
+static enum status check_size(const struct loading *l, size_t index, struct camera *camera,
+                              struct photo_outcome *outcome) {
     const struct photo_fit *fit = &l->fit[index];
     uint64_t pixels = (uint64_t)fit->width * fit->height;
     if (fit->status != STATUS_OK) {
@@ -130,7 +131,7 @@ static void set_clip(const struct loading *l, const struct image_info *info, str
 
 /* The arrays of a decoded picture. Only now is known whether it has others than its pixels. */
 static enum status keep_pixels(const struct loading *l, const struct image *image, const struct image_info *info,
-                               bool has_mask, struct photograph *photo, struct outcome *outcome) {
+                               bool has_mask, struct photograph *photo, struct photo_outcome *outcome) {
     size_t count = (size_t)image->width * image->height;
     bool is_masked = has_mask || image_channel(image, "A") >= 0;
     size_t others = (size_t)(image->clipped != NULL) + (size_t)is_masked;
@@ -155,7 +156,7 @@ static enum status keep_pixels(const struct loading *l, const struct image *imag
 static enum status load_photograph(const struct loading *l, size_t index) {
     const struct frame *frame = &l->transforms->frame[index];
     struct photograph *photo = &l->photograph[index];
-    struct outcome *outcome = &l->outcome[index];
+    struct photo_outcome *outcome = &l->outcome[index];
     char *path = file_join(l->dir, l->path[index]);
     struct image image;
     struct image_info info;
@@ -252,7 +253,7 @@ static void make_relative(struct error *err, const char *dir) {
 static void warn_about_pixels(const struct loading *l, struct findings *f) {
     size_t rotated = 0, sources[EXPOSURE_HDR + 1] = {0};
     for (size_t i = 0; i < l->transforms->frame_count; i++) {
-        const struct outcome *o = &l->outcome[i];
+        const struct photo_outcome *o = &l->outcome[i];
         const char *name = l->transforms->frame[i].file;
         if (!l->path[i])
             continue;
@@ -300,7 +301,7 @@ static enum status collect(struct loading *l, const char *name, struct findings 
     bool leaves_out = leaves_out_broken(l);
     for (size_t i = 0; i < l->transforms->frame_count; i++) {
         const struct frame *frame = &l->transforms->frame[i];
-        struct outcome *o = &l->outcome[i];
+        struct photo_outcome *o = &l->outcome[i];
         if (!l->path[i])
             findings_warning(f,
                              "%s: frames[%zu] names %s, which is not in the bundle; it was left "

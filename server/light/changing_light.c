@@ -33,11 +33,11 @@
 #define KEY_CHANGING 0x71e3u /* keeps these random numbers apart from others of the texel */
 #define SAMPLES 64           /* directions of a highlight; and half as many of lights */
 
-enum kind { TELLS_NOTHING, TELLS_BLACK, TELLS_LIT };
+enum light_kind { TELLS_NOTHING, TELLS_BLACK, TELLS_LIT };
 
 /* Classifies a photograph's observation of a place whose Lambert radiance at albedo 1 is `white`. */
-static enum kind kind_of(const struct divide *d, const struct view *view, uint32_t triangle, float white,
-                         float *shown) {
+static enum light_kind kind_of(const struct divide *d, const struct view *view, uint32_t triangle, float white,
+                               float *shown) {
     const struct photograph *photo = &d->r->scene->photograph[d->views->train[view->train]];
     struct photograph_sample s;
     if (views_edge(d->views, view, triangle) > 0 || !photograph_sample(photo, view->x, view->y, &s))
@@ -89,9 +89,9 @@ static bool changed(const struct divide *d, uint32_t texel, int thread) {
     for (uint32_t t = 0; t < d->views->train_count; t++) {
         struct view view;
         float shown = 0.0f;
-        enum kind kind = views_sees(d->views, t, at.position, at.normal, &view)
-                             ? kind_of(d, &view, at.triangle, rgb_mean(white), &shown)
-                             : TELLS_NOTHING;
+        enum light_kind kind = views_sees(d->views, t, at.position, at.normal, &view)
+                                   ? kind_of(d, &view, at.triangle, rgb_mean(white), &shown)
+                                   : TELLS_NOTHING;
         black_count += kind == TELLS_BLACK;
         size_t slot = kind == TELLS_LIT ? best_put(&drawn, drawn_weight(texel, t), t) : BEST_NONE;
         if (slot != BEST_NONE)

@@ -14,10 +14,10 @@
 /* Parts below this are rounding of sums. */
 #define NOTHING 1e-9
 
-enum target { MODEST, LEAST };
+enum plan_target { MODEST, LEAST };
 static const struct {
     enum plan_part part;
-    enum target to;
+    enum plan_target to;
     bool whole; /* cut entirely or not at all */
 } cuts[] = {
     {PLAN_REFINE, MODEST, false}, {PLAN_REPORT, MODEST, false}, {PLAN_DETAIL, LEAST, true},

@@ -7,7 +7,7 @@
  *
  * 1. libmicrohttpd's own few threads never wait for a disk, nor for a mutex that somebody holds who does. They see to
  *    sockets, heads and what is in memory; the connection is suspended while a thread of a pool does the rest: `quick`
- *    what asks the store or opens a file, `slow` what syncs, or moves bodies from and to the disk (enum pace,
+ *    what asks the store or opens a file, `slow` what syncs, or moves bodies from and to the disk (enum request_pace,
  *    exchange.h). So /healthz is answered whatever the disk does. tests/api/test_http_threads.c holds it.
  * 2. A stream with nothing to say is suspended, never asked again until it is woken.
  * 3. Stopping: accept nothing more, end the streams, let the pools finish, resume all, then stop the library, which

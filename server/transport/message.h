@@ -22,7 +22,7 @@
 enum method { METHOD_GET, METHOD_POST, METHOD_PATCH, METHOD_DELETE, METHOD_OPTIONS, METHOD_COUNT };
 
 /* Which threads work on a request; see listener.h. */
-enum pace {
+enum request_pace {
     PACE_AT_ONCE, /* uses neither store, disk nor caller */
     PACE_QUICK,   /* uses the store, opens a file */
     PACE_SLOW     /* syncs, hashes, or reads files whose size users choose */
@@ -47,7 +47,7 @@ struct request {
     struct address address;     /* the client's address (address.h) */
     bool is_throttled;          /* refused after too many invalid tokens */
     const struct route *route;  /* what follows is set by the application's `find`; static storage */
-    enum pace pace;             /* which threads run begin and finish */
+    enum request_pace pace;     /* which threads run begin and finish */
     bool is_body_stored;        /* its body is written to disk as it arrives */
     struct caller caller;       /* set by the application's `begin` */
     struct buf body;            /* the part collected in memory, for routes that take JSON */

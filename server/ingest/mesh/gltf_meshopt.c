@@ -20,14 +20,14 @@
     "write it as EXT_meshopt_compression or without compression: gltfpack -noq -i IN.glb -o OUT.glb"
 
 enum packing { PACKED_ATTRIBUTES, PACKED_TRIANGLES, PACKED_INDICES, PACKING_COUNT };
-enum filter { FILTER_NONE, FILTER_OCTAHEDRAL, FILTER_QUATERNION, FILTER_EXPONENTIAL, FILTER_COUNT };
+enum meshopt_filter { FILTER_NONE, FILTER_OCTAHEDRAL, FILTER_QUATERNION, FILTER_EXPONENTIAL, FILTER_COUNT };
 
 struct meshopt_packed {
     const uint8_t *data;
     size_t size;
     uint64_t count, stride;
     enum packing mode;
-    enum filter filter;
+    enum meshopt_filter filter;
 };
 
 /* The member's place among `count` words; `fallback` when it is absent, `count` when it is none of them. */
@@ -68,7 +68,7 @@ static enum status read_packed(const struct gltf_file *g, size_t view, const cJS
         return error_set(err, STATUS_INPUT, "%s: %s does not lie within the %zu bytes of buffers[%zu]", g->name, where,
                          g->buffer[b].size, b);
     p->mode = (enum packing)word_of(extension, "mode", mode, PACKING_COUNT, PACKING_COUNT);
-    p->filter = (enum filter)word_of(extension, "filter", filter, FILTER_COUNT, FILTER_NONE);
+    p->filter = (enum meshopt_filter)word_of(extension, "filter", filter, FILTER_COUNT, FILTER_NONE);
     p->data = g->buffer[b].data + offset;
     p->size = (size_t)length;
     return STATUS_OK;
