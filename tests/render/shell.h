@@ -121,16 +121,25 @@ static inline struct settings shell_settings(const char *json) {
     return s;
 }
 
-#define SHELL_SMALL                                                                                                    \
-    "{\"texture_size\":128,\"iterations\":2,\"report_samples\":1,\"gather_samples\":64,\"texels_per_iteration\":64}"
+/* Hardly anything is refined. The time of the whole goes with the number of texels. */
+#define SHELL_SETTINGS(texture_size)                                                                                   \
+    "{\"texture_size\":" texture_size ",\"iterations\":2,\"report_samples\":1,\"gather_samples\":64,"                  \
+    "\"texels_per_iteration\":64}"
+#define SHELL_SMALL SHELL_SETTINGS("64")
+/* For what is found from few texels: one of several lamps, light in the shade of a small part of the floor. */
+#define SHELL_FINE SHELL_SETTINGS("128")
 
-/* A small run from beginning to end, in which hardly anything is refined. */
-static inline void shell_solve(struct scene *scene, int threads, struct reconstruction *r) {
-    struct settings s = shell_settings(SHELL_SMALL);
+/* A run from beginning to end with one of the settings above. */
+static inline void shell_solve_with(const char *json, struct scene *scene, int threads, struct reconstruction *r) {
+    struct settings s = shell_settings(json);
     struct shell shell = {.polls_until_stop = -1};
     CHECK(shell_run(scene, &s, threads, &shell, r) == STATUS_OK);
     shell_release(&shell);
     settings_release(&s);
+}
+
+static inline void shell_solve(struct scene *scene, int threads, struct reconstruction *r) {
+    shell_solve_with(SHELL_SMALL, scene, threads, r);
 }
 
 /* Mean base colour that was found of an object. */

@@ -23,6 +23,8 @@ static rgb wall_color[OBJECTS] = {{0.6f, 0.5f, 0.4f}, {0.8f, 0.8f, 0.8f}, {0.7f,
 /* A test may make walls glossy before they are photographed. */
 static float wall_roughness[OBJECTS] = {1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f};
 static float wall_specular[OBJECTS];
+/* Of each pixel. A test for whose outcome noise matters little may take fewer: a set takes .024 s for each. */
+static uint32_t photograph_samples = 64;
 static const rgb lamp_radiance = {9.0f, 8.0f, 6.0f};
 /* A test may have another object shine as the lamp does. */
 static size_t other_lamp = LAMP;
@@ -189,7 +191,7 @@ static inline void photograph_mesh(struct scene *scene, rgb lamp, const struct i
         photo->name = mem_printf("frame %d", f);
         photo->camera = look(spread(f, 0.4f), target(f));
         struct image image;
-        film_render(&truth.world, &photo->camera, 64, &path, (uint32_t)f, pool, &image);
+        film_render(&truth.world, &photo->camera, photograph_samples, &path, (uint32_t)f, pool, &image);
         photo->pixel = mem_array(WIDTH * HEIGHT, sizeof *photo->pixel);
         for (size_t i = 0; i < WIDTH * HEIGHT; i++) {
             for (size_t c = 0; c < 3; c++)

@@ -37,13 +37,19 @@ static void add_picture(struct photograph *photo) {
     }
 }
 
-static void make_screen(struct scene *scene, enum paint paint, struct parallel *pool) {
+static void make_room(struct scene *scene, bool is_glossy, struct parallel *pool) {
     *scene = (struct scene){0};
     make_mesh(&scene->mesh);
     wall_color[SCREEN] = rgb_gray(0.03f);
-    wall_roughness[SCREEN] = paint == GLOSSY ? 0.2f : 1.0f;
-    wall_specular[SCREEN] = paint == GLOSSY ? 1.0f : 0.0f;
+    wall_roughness[SCREEN] = is_glossy ? 0.2f : 1.0f;
+    wall_specular[SCREEN] = is_glossy ? 1.0f : 0.0f;
     photograph_mesh(scene, lamp_radiance, NULL, look_at_screen, pool);
+}
+
+/* Puts paint on the photographs of the room, whose pixels are `plain`. */
+static void paint_screen(struct scene *scene, uint16_t (*const plain[FRAMES])[3], enum paint paint) {
+    for (size_t f = 0; f < FRAMES; f++)
+        memcpy(scene->photograph[f].pixel, plain[f], WIDTH * HEIGHT * sizeof *plain[f]);
     for (size_t f = 0; f < scene->photograph_count; f++) {
         if (paint == STILL || paint == CLIPPED || (paint == CHANGING && f % 4 != 0))
             add_picture(&scene->photograph[f]);
@@ -71,11 +77,9 @@ static void check_picture(const struct reconstruction *r) {
     CHECK(inside > 0.2 * (double)PICTURE && beside < 0.1 * inside);
 }
 
-static void test(enum paint paint, int threads, struct parallel *pool) {
-    struct scene scene;
+static void test(struct scene *scene, enum paint paint, int threads) {
     struct reconstruction r;
-    make_screen(&scene, paint, pool);
-    shell_solve(&scene, threads, &r);
+    shell_solve(scene, threads, &r);
     for (size_t s = 0; s < r.segments.count; s++) {
         int64_t id = r.segments.id[s];
         bool changes = id == SCREEN && paint == CHANGING;
@@ -88,17 +92,40 @@ static void test(enum paint paint, int threads, struct parallel *pool) {
     if (paint == CHANGING)
         check_picture(&r);
     reconstruct_release(&r);
+}
+
+/* Paints that change no light are put on one set of photographs. The one that saturates is the last. */
+static void test_diffuse(struct parallel *pool) {
+    const enum paint paint[] = {CHANGING, STILL, CLIPPED};
+    struct scene scene;
+    uint16_t(*plain[FRAMES])[3];
+    make_room(&scene, false, pool);
+    for (size_t f = 0; f < FRAMES; f++) {
+        plain[f] = mem_array(WIDTH * HEIGHT, sizeof *plain[f]);
+        memcpy(plain[f], scene.photograph[f].pixel, WIDTH * HEIGHT * sizeof *plain[f]);
+    }
+    for (int i = 0; i < (IS_BRIEF ? 1 : 3); i++) {
+        paint_screen(&scene, plain, paint[i]);
+        test(&scene, paint[i], i == 0 ? 2 : 0);
+    }
+    for (size_t f = 0; f < FRAMES; f++)
+        mem_free(plain[f]);
+    scene_release(&scene);
+}
+
+static void test_glossy(struct parallel *pool) {
+    struct scene scene;
+    make_room(&scene, true, pool);
+    test(&scene, GLOSSY, 0);
     scene_release(&scene);
 }
 
 int main(void) {
     struct parallel *pool = parallel_new(0);
-    test(CHANGING, 2, pool);
-    if (!IS_BRIEF) {
-        test(STILL, 0, pool);
-        test(GLOSSY, 0, pool);
-        test(CLIPPED, 0, pool);
-    }
+    photograph_samples = 32;
+    test_diffuse(pool);
+    if (!IS_BRIEF)
+        test_glossy(pool);
     parallel_free(pool);
     return check_result();
 }

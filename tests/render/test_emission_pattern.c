@@ -196,7 +196,7 @@ static void test_found(struct parallel *pool) {
     struct found found[2];
     for (int i = IS_BRIEF; i < 2; i++) {
         struct reconstruction r;
-        shell_solve(&scene, threads[i], &r);
+        shell_solve_with(SHELL_FINE, &scene, threads[i], &r);
         for (size_t s = 0; s < r.segments.count; s++)
             CHECK_THAT(r.is_emitter[s] == (r.segments.id[s] == LAMP), "segment %zu", s);
         found[i] = find(&r);
@@ -219,7 +219,7 @@ static void test_plain(struct parallel *pool) {
     struct scene scene = {0};
     struct reconstruction r;
     make_scene(&scene, pool);
-    shell_solve(&scene, 0, &r);
+    shell_solve_with(SHELL_FINE, &scene, 0, &r);
     struct found found = find(&r);
     CHECK(!found.any);
     CHECK_RGB(found.dark, lamp_radiance, 0.06f);
@@ -269,7 +269,7 @@ static void test_exposures(struct parallel *pool) {
         if (f % 3 > 0)
             hide_half(photo);
     }
-    shell_solve(&scene, 0, &r);
+    shell_solve_with(SHELL_FINE, &scene, 0, &r);
     struct found found = find(&r);
     CHECK(!found.any);
     CHECK_RGB(found.dark, lamp_radiance, 0.06f);

@@ -76,6 +76,7 @@ static void test_thin(struct parallel *pool) {
 
 int main(void) {
     struct parallel *pool = parallel_new(0);
+    photograph_samples = 32;
     test_hidden(pool);
     if (!IS_BRIEF) {
         test_none_hidden(pool);

@@ -45,7 +45,7 @@ int main(void) {
     make_mesh_with_sill(&scene.mesh);
     make_sky(&sky);
     photograph_mesh(&scene, lamp_radiance, &sky, look_at_sill, pool);
-    shell_solve(&scene, 0, &r);
+    shell_solve_with(SHELL_FINE, &scene, 0, &r);
     for (size_t s = 0; s < r.segments.count; s++) {
         const struct emitter_evidence *e = &r.evidence[s];
         CHECK_THAT(r.is_emitter[s] == (r.segments.id[s] == LAMP), "object %d shows %g of which %g is beyond white",

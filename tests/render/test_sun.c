@@ -132,7 +132,7 @@ static void test_polished_floor(struct parallel *pool) {
     wall_specular[FLOOR] = 1.0f;
     photograph_mesh(&scene, rgb_scale(lamp_radiance, 0.2f), &sky, look_anywhere, pool);
     struct reconstruction r;
-    shell_solve(&scene, 0, &r);
+    shell_solve_with(SHELL_FINE, &scene, 0, &r);
     float expected = sun_irradiance();
     printf("sun on a polished floor: %.3g %.3g %.3g of %.3g\n", (double)r.sun.irradiance.r, (double)r.sun.irradiance.g,
            (double)r.sun.irradiance.b, (double)expected);
