@@ -201,15 +201,14 @@ static void expose(struct image *image) {
     mem_free(sorted);
 }
 
+/* In grey: the edges' colours stand out, and the file has half the size. */
 static void draw_photograph(struct drawing *drawing, const struct photograph *photo) {
     struct image *image = &drawing->image;
     for (uint32_t y = 0; y < image->height; y++)
         for (uint32_t x = 0; x < image->width; x++) {
             rgb value = mean_pixel(photo, x, y, image->width, image->height);
             float *out = image->pixel + 3 * ((size_t)y * image->width + x);
-            out[0] = value.r;
-            out[1] = value.g;
-            out[2] = value.b;
+            out[0] = out[1] = out[2] = rgb_luminance(value);
         }
     expose(image);
     for (size_t i = 0; i < 3 * (size_t)image->width * image->height; i++) /* colours over it stay visible */

@@ -9,10 +9,10 @@
 #include "server/render/accel.h"
 #include "server/scene/photograph.h"
 
-#define OVERLAY_SIZE 800    /* pixels of the longer side, at most */
+#define OVERLAY_SIZE 640    /* pixels of the longer side, at most */
 #define OVERLAY_ENLARGED 10 /* times the photograph's, at most */
 
-/* Draws the photograph, the edges in colour, and a tint where rays meet no surface. `camera` is the photograph's, or
+/* Draws the photograph in grey, the edges in colour, and a tint where rays meet no surface. `camera` is the photograph's, or
  * another one of the same size. *drawing is the caller's (drawing_release). */
 void overlay_draw(struct drawing *drawing, const struct photograph *photo, const struct camera *camera,
                   const struct accel *accel);
