@@ -184,6 +184,12 @@ static enum status settle_coordinates(struct frames *t, const char *name, const 
     struct error own;
     enum status status =
         frames_settle_coordinates(t, given, scene->mesh.triangle_count > 0 ? &scene->mesh : NULL, &own);
+    if (status == STATUS_OK && t->stands_apart)
+        findings_warning(
+            f,
+            "%s: the cameras are georeferenced and stand far from the mesh in all coordinates that the file "
+            "knows, as for a model in a projected system: export it in local or geocentric (EPSG:4978) ones",
+            name);
     memcpy(scene->other, t->other, sizeof scene->other);
     scene->other_count = t->other_count;
     return findings_settle(f, name, status, &own, err);

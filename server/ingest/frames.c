@@ -80,6 +80,7 @@ static void move_to_mesh(struct frames *t, const struct mesh *mesh) {
         best = count > most ? i : best;
         most = count > most ? count : most;
     }
+    t->stands_apart = most == 0;
     if (best < t->other_count)
         move(t, best);
 }

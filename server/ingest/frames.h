@@ -56,6 +56,7 @@ struct frames {
     struct coordinates other[COORDINATES_MAX];
     size_t other_count;
     bool is_placed_by_mesh; /* nothing tells which the mesh is in: where the cameras stand about it decides */
+    bool stands_apart;      /* they stand about it in none */
     size_t named_count;     /* frames in the file */
     size_t frame_count;     /* usable frames: faulty ones are left out */
     struct frame *frame;

@@ -327,6 +327,9 @@ static void test_geocentric(struct frames *t) {
     memcpy(mesh.offset, origin, sizeof origin);
     CHECK(frames_settle_coordinates(t, NULL, &mesh, NULL) == STATUS_OK);
     CHECK_STRING(t->coordinates, "file");
+    CHECK(!t->stands_apart);
+    mesh.offset[0] += 1e5; /* a projected system, say */
+    CHECK(frames_settle_coordinates(t, NULL, &mesh, NULL) == STATUS_OK && t->stands_apart);
 }
 
 static void test_metashape(void) {
