@@ -20,10 +20,10 @@ static uint64_t user_max_bytes(const struct config *c) {
     return limit == 0 || (share > 0 && share < limit) ? share : limit;
 }
 
-struct scheduler_config daemon_options_scheduler(const struct config *c) {
+struct scheduler_config daemon_options_scheduler(const struct config *c, const struct executor *executor) {
     return (struct scheduler_config){
         .data_dir = c->data_dir,
-        .worker_binary = "/proc/self/exe",
+        .executor = executor,
         .max_running = (int)c->max_running,
         .user_max_running = (int)c->user_max_running,
         .max_checks = (int)c->max_checks,

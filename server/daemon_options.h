@@ -9,7 +9,7 @@
 #include "server/libraries.h"
 #include "server/transport/listener.h"
 
-struct scheduler_config daemon_options_scheduler(const struct config *c);
+struct scheduler_config daemon_options_scheduler(const struct config *c, const struct executor *executor);
 /* Borrows proxies and list. */
 struct api_config daemon_options_api(const struct config *c, const struct proxies *proxies,
                                      const struct api_library list[LIBRARY_COUNT]);

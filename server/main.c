@@ -22,10 +22,12 @@
 #include "server/admin/admin.h"
 #include "server/commands.h"
 #include "server/daemon_options.h"
+#include "server/data/attempt_folder.h"
 #include "server/data/collector.h"
 #include "server/data/folder.h"
 #include "server/events/hub.h"
 #include "server/http/service.h"
+#include "server/job/process.h"
 #include "server/job/scheduler.h"
 #include "server/libraries.h"
 #include "server/net/address.h"
@@ -57,6 +59,7 @@ struct daemon {
     struct config *config;
     int lock_fd;
     struct store *store;
+    struct process_executor executor;
     struct scheduler *scheduler;
     struct api *api;
     struct listener *listener;
@@ -105,10 +108,13 @@ static enum status build(struct daemon *d, struct error *err) {
     for (size_t i = 0; i < LIBRARY_COUNT; i++)
         d->libraries[i] = (struct api_library){list[i].name, list[i].version};
     proxies_parse(&d->proxies, c->trusted_proxies, c->proxy_field, NULL); /* was checked with the rest */
-    const struct scheduler_config work = daemon_options_scheduler(c);
+    const struct scheduler_config work =
+        daemon_options_scheduler(c, process_executor_init(&d->executor, "/proc/self/exe", c->data_dir));
     const struct api_config limits = daemon_options_api(c, &d->proxies, d->libraries);
     const struct listener_config network = daemon_options_listener(c, d->address, &is_loopback);
     enum status status = store_open(&d->store, c->data_dir, err);
+    if (status == STATUS_OK)
+        status = attempt_folder_adopt(c->data_dir, d->store, err);
     if (status == STATUS_OK)
         store_keep_events(d->store, (size_t)c->events_per_job);
     if (status == STATUS_OK)

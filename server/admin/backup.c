@@ -22,6 +22,7 @@
 #include "server/admin/admin.h"
 #include "server/admin/commands.h"
 #include "server/admin/copy.h"
+#include "server/data/attempt_folder.h"
 #include "server/data/layout.h"
 #include "server/store/contents.h"
 
@@ -146,7 +147,8 @@ static void tell_damage(struct making *m, const char *path, const char *what) {
 /* An output of a job that has ended must be as announced; one of another job may be newer. */
 static enum status copy_output(struct making *m, const struct contents_job *job, const struct contents_output *output,
                                struct error *err) {
-    char *folder = layout_job(NULL, job->id), *path = layout_output(folder, output->name), *copy = NULL;
+    char *folder = layout_attempt(NULL, job->id, output->attempt), *path = layout_output(folder, output->name);
+    char *copy = NULL;
     char hex[SHA256_HEX_SIZE] = "";
     bool exists = false;
     enum status status = STATUS_OK;
@@ -167,19 +169,26 @@ static enum status copy_output(struct making *m, const struct contents_job *job,
 }
 
 static enum status copy_job(struct making *m, const struct contents_job *job, struct error *err) {
-    char *folder = layout_job(NULL, job->id);
-    char *others[] = {layout_log(folder), layout_checkpoint(folder), layout_checkpoint_journal(folder)};
+    char *folder = layout_job(NULL, job->id), *log = layout_log(folder), *holder = NULL;
     enum status status = STATUS_OK;
     bool exists;
     for (size_t i = 0; status == STATUS_OK && i < job->count; i++)
         status = copy_output(m, job, &m->contents.outputs[job->first + i], err);
     m->copy.may_link = false;
-    for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
-        if (status == STATUS_OK && !job->is_running)
-            status = copy_file(&m->copy, others[i], &exists, err);
-        mem_free(others[i]);
+    if (status == STATUS_OK && !job->is_running)
+        status = copy_file(&m->copy, log, &exists, err);
+    if (status == STATUS_OK && !job->is_running)
+        status = attempt_folder_with_checkpoint(m->data_dir, job->id, &holder, err);
+    if (status == STATUS_OK) /* that of an earlier round, if another attempt has it now */
+        status = attempt_folder_drop_checkpoint(m->folder, job->id, err);
+    if (status == STATUS_OK && holder) {
+        char *checkpoint = layout_checkpoint_folder(holder);
+        status = copy_tree(&m->copy, checkpoint, err);
+        mem_free(checkpoint);
     }
     m->copy.may_link = true;
+    mem_free(holder);
+    mem_free(log);
     mem_free(folder);
     return status;
 }
@@ -235,14 +244,8 @@ static enum status leave_out(const struct making *m, struct error *err) {
         mem_free(inner);
     }
     for (size_t i = 0; status == STATUS_OK && i < m->contents.job_count; i++) {
-        char *folder = layout_job(m->folder, m->contents.jobs[i].id);
-        char *path = layout_checkpoint(folder), *journal = layout_checkpoint_journal(folder);
-        if (m->contents.jobs[i].is_running &&
-            ((unlink(path) != 0 && errno != ENOENT) || (unlink(journal) != 0 && errno != ENOENT)))
-            status = error_set_errno(err, errno, "cannot remove %s", path);
-        mem_free(journal);
-        mem_free(path);
-        mem_free(folder);
+        if (m->contents.jobs[i].is_running)
+            status = attempt_folder_drop_checkpoint(m->folder, m->contents.jobs[i].id, err);
     }
     return status;
 }

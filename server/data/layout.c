@@ -1,6 +1,9 @@
 /* layout.c -- see layout.h. */
 #include "server/data/layout.h"
 
+#include <stdlib.h>
+#include <string.h>
+
 #include "common/file.h"
 #include "common/mem.h"
 
@@ -36,6 +39,21 @@ char *layout_job(const char *data_dir, int64_t job_id) {
     return in_folder(data_dir, "jobs", mem_printf("%lld", (long long)job_id));
 }
 
+#define ATTEMPT "attempt-"
+
+char *layout_attempt(const char *data_dir, int64_t job_id, int number) {
+    return in_folder(data_dir, "jobs", mem_printf("%lld/" ATTEMPT "%d", (long long)job_id, number));
+}
+
+int layout_attempt_number(const char *name) {
+    static const char prefix[] = ATTEMPT;
+    const char *digits = name + (sizeof prefix - 1);
+    if (strncmp(name, prefix, sizeof prefix - 1) != 0 || *digits < '1' || *digits > '9' || strlen(digits) > 9 ||
+        strspn(digits, "0123456789") != strlen(digits))
+        return 0;
+    return (int)strtol(digits, NULL, 10);
+}
+
 char *layout_uploads(const char *data_dir) { return in(data_dir, "uploads"); }
 
 char *layout_upload(const char *data_dir, const char *upload_id) {
@@ -54,7 +72,7 @@ char *layout_message(const char *data_dir, int64_t message_id) {
 
 char *layout_order(const char *work_dir) { return in(work_dir, "job.json"); }
 
-char *layout_log(const char *work_dir) { return in(work_dir, "worker.log"); }
+char *layout_log(const char *dir) { return in(dir, "worker.log"); }
 
 char *layout_archive(const char *work_dir) { return in(work_dir, "archive"); }
 
@@ -66,9 +84,20 @@ char *layout_preview(const char *work_dir, const char *name) {
     return in_folder(work_dir, "previews", mem_strdup(name));
 }
 
-char *layout_checkpoint(const char *work_dir) { return in(work_dir, "checkpoint.db"); }
+#define CHECKPOINT "checkpoint.db"
+#define CHECKPOINT_JOURNAL CHECKPOINT "-journal" /* as SQLite names it */
 
-char *layout_checkpoint_journal(const char *work_dir) { return in(work_dir, "checkpoint.db-journal"); }
+char *layout_checkpoint_folder(const char *work_dir) { return in(work_dir, "checkpoint"); }
+
+char *layout_checkpoint(const char *work_dir) { return in(work_dir, "checkpoint/" CHECKPOINT); }
+
+char *layout_checkpoint_journal(const char *work_dir) { return in(work_dir, "checkpoint/" CHECKPOINT_JOURNAL); }
+
+char *layout_former_checkpoint(const char *job_dir) { return in(job_dir, CHECKPOINT); }
+
+char *layout_former_journal(const char *job_dir) { return in(job_dir, CHECKPOINT_JOURNAL); }
+
+char *layout_checkpoint_unready(const char *work_dir) { return in(work_dir, "checkpoint.unready"); }
 
 char *layout_out(const char *work_dir) { return in(work_dir, "out"); }
 

@@ -37,8 +37,9 @@ static enum status open_in(char *root, const char *path, int *out, struct error 
     return fd >= 0 ? STATUS_OK : error_set_errno(err, errno, "cannot open %s", path);
 }
 
-enum status work_file_open_output(const char *data_dir, int64_t job_id, const char *name, int *fd, struct error *err) {
-    char *folder = layout_job(NULL, job_id), *path = layout_output(folder, name);
+enum status work_file_open_output(const char *data_dir, int64_t job_id, int attempt, const char *name, int *fd,
+                                  struct error *err) {
+    char *folder = layout_attempt(NULL, job_id, attempt), *path = layout_output(folder, name);
     enum status status = open_in(layout_jobs(data_dir), path, fd, err);
     mem_free(path);
     mem_free(folder);

@@ -7,9 +7,10 @@
 
 #include "common/error.h"
 
-/* Open a job's output, its worker's log or a picture of a scene for reading, component by component; *fd is the
- * caller's, -1 on errors. Opening a FIFO does not block. */
-enum status work_file_open_output(const char *data_dir, int64_t job_id, const char *name, int *fd, struct error *err);
+/* Open the output that an attempt wrote, a job's log or a picture of a scene for reading, component by component; *fd
+ * is the caller's, -1 on errors. Opening a FIFO does not block. */
+enum status work_file_open_output(const char *data_dir, int64_t job_id, int attempt, const char *name, int *fd,
+                                  struct error *err);
 enum status work_file_open_log(const char *data_dir, int64_t job_id, int *fd, struct error *err);
 enum status work_file_open_preview(const char *data_dir, const char *scene_id, const char *name, int *fd,
                                    struct error *err);

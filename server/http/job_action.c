@@ -1,8 +1,6 @@
 /* job_action.c -- POST to /v1/jobs/{job}/...: cancel, pause, resume, retry, redeliver, extend. */
-#include <unistd.h>
-
 #include "common/mem.h"
-#include "server/data/layout.h"
+#include "server/data/attempt_folder.h"
 #include "server/http/auth.h"
 #include "server/http/extension.h"
 #include "server/http/handlers.h"
@@ -88,14 +86,15 @@ struct response *job_action_extend(struct api *api, struct request *r) {
     if (store_job_get(api->store, id, &job, &err) != STATUS_OK)
         return problem_from(r, &err);
     char *settings = extension_settings(r, &job, &refusal);
-    char *folder = layout_job(api->config.data_dir, id), *checkpoint = layout_checkpoint(folder);
-    if (!refusal && job_is_terminal(job.state) && access(checkpoint, F_OK) != 0)
+    char *holder = NULL;
+    if (!refusal && attempt_folder_with_checkpoint(api->config.data_dir, id, &holder, &err) != STATUS_OK)
+        refusal = problem_from(r, &err);
+    if (!refusal && job_is_terminal(job.state) && !holder)
         refusal = problem_full(r, 409, "the job's checkpoint is gone, so it cannot be continued",
                                "submit the room again, with more iterations or time", NULL);
     if (!refusal && store_job_extend(api->store, id, api->config.max_attempts, settings, &limits, &err) != STATUS_OK)
         refusal = problem_from(r, &err);
-    mem_free(checkpoint);
-    mem_free(folder);
+    mem_free(holder);
     mem_free(settings);
     job_release(&job);
     if (refusal)

@@ -53,8 +53,8 @@ static void store_metrics(struct buf *b, const struct store_counts *counts) {
 
 static void work_metrics(struct buf *b, const struct counters *f) {
     static const char *const ends[END_COUNT] = {
-        [END_SUCCEEDED] = "succeeded", [END_INPUT] = "input",     [END_CRASHED] = "crashed",
-        [END_MEMORY] = "memory",       [END_STOPPED] = "stopped", [END_DISK] = "disk"};
+        [END_SUCCEEDED] = "succeeded", [END_INPUT] = "input", [END_CRASHED] = "crashed", [END_MEMORY] = "memory",
+        [END_STOPPED] = "stopped",     [END_DISK] = "disk",   [END_LOST] = "lost",       [END_REFUSED] = "refused"};
     metric_head(b, "attempts_ended_total", "counter", "Attempts of jobs that have ended, by how.");
     for (int i = 0; i < END_COUNT; i++)
         buf_printf(b, "unbaked_attempts_ended_total{reason=\"%s\"} %llu\n", ends[i],

@@ -69,6 +69,25 @@ static struct response *send_file(struct api *api, const struct request *r, int6
     return file_reply(r, fd, &file, row->content_type);
 }
 
+/* Opens the file that the row names. Another attempt may have replaced it since the row was read, which removes it:
+ * then the row is read again. *row needs output_row_release in any case. */
+static enum status open_output(struct api *api, int64_t job_id, const char *name, struct output_row *row, int *fd,
+                               struct error *err) {
+    int before;
+    enum status status = store_output_get(api->store, job_id, name, row, err);
+    do {
+        if (status != STATUS_OK)
+            return status;
+        before = row->attempt;
+        status = work_file_open_output(api->config.data_dir, job_id, row->attempt, row->name, fd, err);
+        if (status != STATUS_NOT_FOUND)
+            return status;
+        output_row_release(row);
+        status = store_output_get(api->store, job_id, name, row, err);
+    } while (status != STATUS_OK || row->attempt != before);
+    return error_set(err, STATUS_NOT_FOUND, "the file of output %.200s is gone", name);
+}
+
 struct response *outputs_get(struct api *api, struct request *r) {
     struct response *reply = NULL;
     int64_t id = auth_job_id(api, r, ACCESS_READ, &reply);
@@ -78,11 +97,8 @@ struct response *outputs_get(struct api *api, struct request *r) {
     struct output_row row;
     struct error err;
     int fd = -1;
-    enum status status = store_output_get(api->store, id, name, &row, &err);
+    enum status status = open_output(api, id, name, &row, &fd, &err);
     mem_free(name);
-    if (status != STATUS_OK)
-        return problem_from(r, &err);
-    status = work_file_open_output(api->config.data_dir, id, row.name, &fd, &err);
     if (status == STATUS_OK)
         reply = send_file(api, r, id, fd, &row);
     else

@@ -8,22 +8,14 @@
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
+#include "server/data/attempt_folder.h"
 #include "server/data/layout.h"
 #include "server/job/fit.h"
 #include "server/job/housekeeping.h"
 #include "server/job/memory.h"
-#include "server/job/oom.h"
 
 #define EVENTS_MAX 500000      /* of one attempt: three days at 2 a second, which is a lot */
 #define CHECK_LIMIT_SEC 3600.0 /* a scene's check that takes longer is considered stuck */
-
-static enum status write_order(const char *dir, cJSON *order, struct error *err) {
-    char *text = json_text(order), *path = layout_order(dir);
-    enum status status = file_replace(path, text, strlen(text), err);
-    mem_free(text);
-    mem_free(path);
-    return status;
-}
 
 /* The members that orders for jobs and for checks share. */
 static cJSON *new_order(const char *kind, const struct scheduler_config *config, int thread_count) {
@@ -50,8 +42,10 @@ static enum status disk_left(const struct scheduler_config *config, struct store
     return status;
 }
 
-static enum status order_job(struct attempt *a, const struct scheduler_config *config, struct store *store,
-                             const struct job *job, const struct scene_row *row, int thread_count, struct error *err) {
+/* The order of an attempt; *order is the caller's. */
+static enum status order_job(const struct attempt *a, const struct scheduler_config *config, struct store *store,
+                             const struct job *job, const struct scene_row *row, int thread_count, cJSON **out,
+                             struct error *err) {
     cJSON *settings;
     uint64_t disk_bytes;
     enum status status = disk_left(config, store, job, &disk_bytes, err);
@@ -59,14 +53,11 @@ static enum status order_job(struct attempt *a, const struct scheduler_config *c
         status = json_parse(job->settings, strlen(job->settings), "the job's settings", &settings, err);
     if (status != STATUS_OK)
         return status;
-    char *out = layout_out(a->dir), *scene = layout_scene(config->data_dir, job->scene_id);
-    char *files = layout_files(scene);
     struct buf reduced;
     buf_init(&reduced, 4096);
     cJSON *smaller = memory_reduce(settings, job->memory_step, &thread_count, &reduced);
     cJSON *order = new_order("reconstruct", config, thread_count);
     json_add_string(order, "scene_id", job->scene_id);
-    json_add_string(order, "scene", files);
     json_add(order, "reading", fit_reading(row));
     json_add_string(order, "name", job->name);
     json_add_int(order, "job_id", job->id);
@@ -77,21 +68,34 @@ static enum status order_job(struct attempt *a, const struct scheduler_config *c
     json_add(order, "settings", smaller);
     if (reduced.length > 0)
         json_add_string(order, "reduced", buf_text(&reduced));
-    status = file_make_dirs(out, err);
-    if (status == STATUS_OK)
-        status = write_order(a->dir, order, err);
-    cJSON_Delete(order);
     cJSON_Delete(settings);
     buf_release(&reduced);
-    mem_free(files);
-    mem_free(scene);
-    mem_free(out);
+    *out = order;
+    return STATUS_OK;
+}
+
+/* Prepares the attempt's folder and starts its run. */
+static enum status run_job(struct attempt *a, const struct scheduler_config *config, struct store *store,
+                           const struct job *job, const struct scene_row *row, struct error *err) {
+    cJSON *order = NULL;
+    enum status status = order_job(a, config, store, job, row, a->thread_count, &order, err);
+    if (status == STATUS_OK)
+        status = attempt_folder_begin(config->data_dir, job->id, a->number, err);
+    char *folder = layout_attempt(NULL, job->id, a->number), *home = layout_job(NULL, job->id), *log = layout_log(home);
+    const struct run_work work = {.folder = folder, .log = log, .scene_id = job->scene_id, .order = order};
+    if (status == STATUS_OK)
+        status = config->executor->start(config->executor, &work, &a->run, err);
+    cJSON_Delete(order);
+    mem_free(log);
+    mem_free(home);
+    mem_free(folder);
     return status;
 }
 
 void attempt_empty(struct attempt *a) {
-    supervisor_release(&a->worker);
+    run_free(a->run);
     mem_free(a->dir);
+    mem_free(a->whole_dir);
     mem_free(a->end_message);
     mem_free(a->end_hint);
     mem_free(a->settings);
@@ -100,7 +104,7 @@ void attempt_empty(struct attempt *a) {
     cJSON_Delete(a->facts);
     cJSON_Delete(a->untaken);
     cJSON_Delete(a->late_progress);
-    *a = (struct attempt){.worker = {.pid_fd = -1, .pipe_fd = -1}};
+    *a = (struct attempt){0};
 }
 
 /* Whether the job accepts a scene whose mesh and photographs do not fit. */
@@ -133,13 +137,14 @@ static enum status check_scene(struct store *store, const struct job *job, struc
 }
 
 /* Carries out a retry from a stage, before the process starts and therefore once. */
-static enum status restart(struct attempt *a, struct store *store, const struct job *job, struct error *err) {
+static enum status restart(const struct attempt *a, const struct scheduler_config *config, struct store *store,
+                           const struct job *job, struct error *err) {
     bool keeps_checkpoint;
     if (!job->restart_from[0])
         return STATUS_OK;
     enum status status = STATUS_OK;
     if (job_stage_parse(job->restart_from, &keeps_checkpoint) && !keeps_checkpoint)
-        status = housekeeping_drop_checkpoint(a->dir, err);
+        status = attempt_folder_drop_checkpoint(config->data_dir, job->id, err);
     return status == STATUS_OK ? store_job_restarted(store, job->id, a->number, err) : status;
 }
 
@@ -169,7 +174,7 @@ enum status attempt_start_job(struct attempt *a, const struct scheduler_config *
     struct scene_row scene = {0};
     struct error why = {0};
     int number;
-    enum status status = store_job_start(store, job_id, &number, err);
+    enum status status = store_job_start(store, job_id, config->executor->name, &number, err);
     if (status == STATUS_CONFLICT || status == STATUS_NOT_FOUND)
         return STATUS_OK; /* meanwhile a user has paused, cancelled or deleted it */
     if (status != STATUS_OK)
@@ -178,8 +183,9 @@ enum status attempt_start_job(struct attempt *a, const struct scheduler_config *
                           .number = number,
                           .iteration = -1.0,
                           .event_max = config->attempt_events_max > 0 ? config->attempt_events_max : EVENTS_MAX,
-                          .worker = {.pid_fd = -1, .pipe_fd = -1},
-                          .dir = layout_job(config->data_dir, job_id)};
+                          .data_dir = config->data_dir,
+                          .dir = layout_attempt(config->data_dir, job_id, number),
+                          .whole_dir = layout_job(config->data_dir, job_id)};
     status = store_job_get(store, job_id, &job, &why);
     if (status == STATUS_OK) {
         memcpy(a->scene_id, job.scene_id, sizeof a->scene_id);
@@ -190,23 +196,20 @@ enum status attempt_start_job(struct attempt *a, const struct scheduler_config *
         a->settings = mem_strdup(job.settings);
         a->thread_count = thread_count;
         a->memory_step = job.memory_step;
-        a->oom_kills = oom_kills("");
         status = check_scene(store, &job, &scene, &why);
     }
     if (status == STATUS_OK) /* a full disk does not stop a job whose own files fill it */
         status = store_share_check(store, &(struct share){config->user_max_bytes, job.owner_id, NULL, job_id}, 0, &why);
     if (status == STATUS_OK)
-        status = restart(a, store, &job, &why);
+        status = restart(a, config, store, &job, &why);
     if (status == STATUS_OK)
-        status = order_job(a, config, store, &job, &scene, thread_count, &why);
-    if (status == STATUS_OK)
-        status = supervisor_start(&a->worker, config->worker_binary, a->dir, &why);
+        status = run_job(a, config, store, &job, &scene, &why);
     scene_row_release(&scene);
     job_release(&job);
     if (status == STATUS_OK) {
         a->phase = ATTEMPT_ALIVE;
-        log_info("job %lld: attempt %d runs as process %d with %d threads", (long long)job_id, number,
-                 (int)a->worker.pid, thread_count);
+        log_info("job %lld: attempt %d runs as %s with %d threads", (long long)job_id, number, a->run->place,
+                 thread_count);
         return STATUS_OK;
     }
     log_warning("job %lld: attempt %d could not begin: %s", (long long)job_id, number, why.message);
@@ -220,8 +223,9 @@ enum status attempt_start_check(struct attempt *a, const struct scheduler_config
     struct scene_row row;
     const char *scene_id = scene->id;
     *a = (struct attempt){.owner_id = scene->owner_id,
-                          .worker = {.pid_fd = -1, .pipe_fd = -1},
+                          .data_dir = config->data_dir,
                           .dir = layout_scene(config->data_dir, scene_id),
+                          .whole_dir = layout_scene(config->data_dir, scene_id),
                           .user_max_bytes = config->user_max_bytes,
                           .problems = cJSON_CreateArray()};
     snprintf(a->scene_id, sizeof a->scene_id, "%s", scene_id);
@@ -235,15 +239,17 @@ enum status attempt_start_check(struct attempt *a, const struct scheduler_config
     }
     scene_row_release(&row);
     housekeeping_drop_temporary(a->dir); /* the daemon may have been killed during an earlier check */
+    char *folder = layout_scene(NULL, scene_id), *log = layout_log(folder);
+    const struct run_work work = {.folder = folder, .log = log, .order = order};
     if (status == STATUS_OK)
-        status = write_order(a->dir, order, &why);
-    if (status == STATUS_OK)
-        status = supervisor_start(&a->worker, config->worker_binary, a->dir, &why);
+        status = config->executor->start(config->executor, &work, &a->run, &why);
+    mem_free(log);
+    mem_free(folder);
     cJSON_Delete(order);
     if (status == STATUS_OK) {
         a->kill_at_sec = clock_sec() + CHECK_LIMIT_SEC;
         a->phase = ATTEMPT_ALIVE;
-        log_info("scene %.12s: checked by process %d", scene_id, (int)a->worker.pid);
+        log_info("scene %.12s: checked by %s", scene_id, a->run->place);
         return STATUS_OK;
     }
     /* The scene stays in `checking`; the scheduler retries later. */
@@ -254,7 +260,7 @@ enum status attempt_start_check(struct attempt *a, const struct scheduler_config
 }
 
 void attempt_charge(struct attempt *a, struct store *store, struct counters *counters) {
-    double used = supervisor_cpu_sec(&a->worker), more = used - a->charged_sec;
+    double used = run_cpu_sec(a->run), more = used - a->charged_sec;
     if (!a->job_id || !(more > 0.0))
         return;
     (void)store_usage_add(store, a->owner_id, more, NULL); /* a failed charge is kept for later */

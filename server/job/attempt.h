@@ -1,10 +1,11 @@
-/* attempt.h -- one worker's work, from its folder to the entry of its outcome in the store: what is known of
- * it, and its start. What it says is heard by worker_messages.h, how it ends is judged by outcome.h.
+/* attempt.h -- one attempt of a job or check of a scene, from its folder to the entry of its outcome in the store: what
+ * is known of it, and its start. Where it runs, an executor knows (run.h). What it says is heard by worker_messages.h,
+ * how it ends is judged by outcome.h.
  *
- *      empty ──start──> alive ──(process ends)──> ended ──settle──> empty
+ *      empty ──start──> alive ──(its run ends)──> ended ──settle──> empty
  *
- * 1. A job's attempt is in the store before its process exists, and its outcome is entered after
- *    the process is reaped: of one job there is never more than one process.
+ * 1. A job's attempt is in the store (store/attempts.h) before its run begins, and its outcome is entered after the run
+ *    has ended: of one job there is never more than one run.
  * 2. What a worker says is checked where it can be: it has read a stranger's files.
  * 3. settle can fail (the disk of state.db is full): the attempt stays ended and is settled
  *    again later; nothing of the outcome is lost. */
@@ -14,7 +15,7 @@
 #include "common/json.h"
 #include "server/job/counters.h"
 #include "server/job/scheduler_config.h"
-#include "server/job/supervisor.h"
+#include "server/job/run.h"
 #include "server/store/store.h"
 
 enum attempt_phase { ATTEMPT_EMPTY, ATTEMPT_ALIVE, ATTEMPT_ENDED };
@@ -26,17 +27,18 @@ struct attempt {
     double charged_sec; /* CPU time that was charged to that user */
     int number;         /* fences what is written for the job */
     char scene_id[SCENE_ID_SIZE];
-    char *reading;           /* with which a scene is checked, JSON; owned; NULL for a job */
-    uint64_t user_max_bytes; /* as in scheduler_config, for the check of a scene */
-    char *dir;
-    struct worker worker;
-    int wait_status;                /* when ended */
+    char *reading;                  /* with which a scene is checked, JSON; owned; NULL for a job */
+    uint64_t user_max_bytes;        /* as in scheduler_config, for the check of a scene */
+    const char *data_dir;           /* borrowed */
+    char *dir;                      /* that its worker writes to: the attempt's, or the scene's */
+    char *whole_dir;                /* what counts as its owner's: the job's with all attempts, or the scene's */
+    struct run *run;                /* owned; NULL before its start */
+    struct run_end end;             /* when ended */
     bool stopping;                  /* it was asked to stop */
-    bool killed;                    /* by this daemon */
+    bool killed;                    /* as this daemon asked */
     double kill_at_sec;             /* as clock_sec; 0: never */
     char *settings;                 /* the job's, as submitted; owned; NULL for a check */
     int thread_count, memory_step;  /* as ordered, and how often that was reduced */
-    uint64_t oom_kills;             /* the machine's count before the attempt started */
     long event_count, event_max;    /* reports so far; above event_max they are thinned */
     double thinned_at;              /* when the last thinned report was entered, as clock_sec */
     bool said_thinned, said_unread; /* an event, and a line of the log, say so */

@@ -2,10 +2,8 @@
 #include "server/job/delivery.h"
 
 #include <poll.h>
-#include <signal.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/wait.h>
 
 #include "common/clock.h"
 #include "common/file.h"
@@ -22,14 +20,15 @@
 /* Cleans up after the process: its pipe and its order. */
 static void clear_away(struct delivery *d) {
     struct error err;
-    supervisor_release(&d->worker);
+    run_free(d->run);
+    d->run = NULL;
     if (file_remove_tree(d->dir, &err) != STATUS_OK)
         log_warning("%s", err.message);
     mem_free(d->dir);
     d->dir = NULL;
 }
 
-static void forget(struct delivery *d) { *d = (struct delivery){.worker = {.pid_fd = -1, .pipe_fd = -1}}; }
+static void forget(struct delivery *d) { *d = (struct delivery){0}; }
 
 enum status delivery_start(struct delivery *d, const struct scheduler_config *config, const struct outbox_row *row,
                            struct error *err) {
@@ -37,7 +36,6 @@ enum status delivery_start(struct delivery *d, const struct scheduler_config *co
     *d = (struct delivery){.id = row->id,
                            .job_id = row->job_id,
                            .owner_id = row->owner_id,
-                           .worker = {.pid_fd = -1, .pipe_fd = -1},
                            .kill_at_sec = clock_sec() + (row->tries > 0 ? LIMIT_AGAIN_SEC : LIMIT_SEC),
                            .dir = layout_message(config->data_dir, row->id)};
     cJSON *order = cJSON_CreateObject();
@@ -49,14 +47,13 @@ enum status delivery_start(struct delivery *d, const struct scheduler_config *co
     snprintf(number, sizeof number, "msg_%lld", (long long)row->id);
     json_add_string(order, "message_id", number);
     json_add_bool(order, "allow_private", config->webhook_private);
-    char *text = json_text(order), *path = layout_order(d->dir);
+    char *folder = layout_message(NULL, row->id), *log = layout_log(folder);
+    const struct run_work work = {.folder = folder, .log = log, .order = order};
     enum status status = file_make_dirs(d->dir, err);
     if (status == STATUS_OK)
-        status = file_replace(path, text, strlen(text), err);
-    if (status == STATUS_OK)
-        status = supervisor_start(&d->worker, config->worker_binary, d->dir, err);
-    mem_free(path);
-    mem_free(text);
+        status = config->executor->start(config->executor, &work, &d->run, err);
+    mem_free(log);
+    mem_free(folder);
     cJSON_Delete(order);
     if (status != STATUS_OK) {
         clear_away(d);
@@ -108,24 +105,24 @@ static bool settle(struct delivery *d, struct store *store) {
 }
 
 bool delivery_listen(struct delivery *d, struct store *store) {
-    int wait_status;
+    struct run_end end;
     if (d->id == 0)
         return true;
     if (!d->has_ended) {
-        supervisor_read(&d->worker, take_line, d);
+        run_read(d->run, take_line, d);
         if (clock_sec() >= d->kill_at_sec)
-            supervisor_signal(&d->worker, SIGKILL);
-        if (!supervisor_reap(&d->worker, &wait_status, take_line, d))
+            run_ask(d->run, RUN_KILL);
+        if (!run_ended(d->run, &end, take_line, d))
             return false;
         d->has_ended = true;
-        d->delivered = WIFEXITED(wait_status) && WEXITSTATUS(wait_status) == PROGRESS_EXIT_OK;
+        d->delivered = end.way == RUN_EXIT && end.code == PROGRESS_EXIT_OK;
         clear_away(d);
     }
     return settle(d, store);
 }
 
 void delivery_stop(struct delivery *d, struct store *store) {
-    supervisor_signal(&d->worker, SIGKILL);
+    run_ask(d->run, RUN_KILL);
     while (!delivery_listen(d, store) && !d->has_ended)
         poll(NULL, 0, 5);
     forget(d);

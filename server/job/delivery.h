@@ -8,15 +8,15 @@
 #ifndef UNBAKE_JOB_DELIVERY_H
 #define UNBAKE_JOB_DELIVERY_H
 
+#include "server/job/run.h"
 #include "server/job/scheduler_config.h"
-#include "server/job/supervisor.h"
 #include "server/store/store.h"
 
 struct delivery {
     int64_t id; /* of the message; 0: empty */
     int64_t job_id;
     double kill_at_sec;
-    struct worker worker;
+    struct run *run; /* owned */
     char *dir;
     char reason[256];          /* why it failed, as the process reports */
     int64_t owner_id;          /* of the job */

@@ -11,19 +11,9 @@
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
+#include "server/data/attempt_folder.h"
 #include "server/data/layout.h"
 #include "server/job/measure.h"
-
-enum status housekeeping_drop_checkpoint(const char *dir, struct error *err) {
-    /* The journal first: files are found by the database's name, and a journal must never meet another database. */
-    char *journal = layout_checkpoint_journal(dir), *checkpoint = layout_checkpoint(dir);
-    enum status status = file_remove_tree(journal, err);
-    if (status == STATUS_OK)
-        status = file_remove_tree(checkpoint, err);
-    mem_free(checkpoint);
-    mem_free(journal);
-    return status;
-}
 
 /* Temporary names as file_replace and file_put_in_place make them. */
 static bool is_temporary(const char *name) {
@@ -60,6 +50,12 @@ void housekeeping_drop_temporary(const char *dir) {
     mem_free(out);
 }
 
+void housekeeping_tidy_job(const char *data_dir, struct store *store, int64_t job_id) {
+    struct error err;
+    if (attempt_folder_tidy(data_dir, store, job_id, &err) != STATUS_OK)
+        log_warning("job %lld: what its attempts have left over stays: %s", (long long)job_id, err.message);
+}
+
 void housekeeping_after_kill(const struct scheduler_config *config, struct store *store) {
     struct job jobs[16];
     struct error err;
@@ -71,8 +67,9 @@ void housekeeping_after_kill(const struct scheduler_config *config, struct store
             return;
         }
         for (size_t i = 0; i < count; i++) {
-            char *dir = layout_job(config->data_dir, jobs[i].id);
+            char *dir = layout_attempt(config->data_dir, jobs[i].id, jobs[i].attempt);
             housekeeping_drop_temporary(dir);
+            housekeeping_tidy_job(config->data_dir, store, jobs[i].id);
             before = jobs[i].id;
             mem_free(dir);
             job_release(&jobs[i]);
@@ -82,12 +79,17 @@ void housekeeping_after_kill(const struct scheduler_config *config, struct store
 
 /* If this is interrupted, the next start measures what is left. The checkpoint goes even where that cannot be
  * entered: the disk may be full. */
-static enum status drop_checkpoint(struct store *store, int64_t id, const char *folder, struct error *err) {
+static enum status drop_checkpoint(const char *data_dir, struct store *store, int64_t id, struct error *err) {
     const struct disk_use unknown = {.job_id = id, .bytes = -1};
+    char *dir = layout_job(data_dir, id);
     if (store_disk_enter(store, &unknown, 1, err) != STATUS_OK)
         log_warning("job %lld: %s", (long long)id, err->message);
-    enum status status = housekeeping_drop_checkpoint(folder, err);
-    return status == STATUS_OK ? measure_job(store, id, folder, err) : status;
+    enum status status = attempt_folder_drop_checkpoint(data_dir, id, err);
+    if (status == STATUS_OK)
+        housekeeping_tidy_job(data_dir, store, id);
+    status = status == STATUS_OK ? measure_job(store, id, dir, err) : status;
+    mem_free(dir);
+    return status;
 }
 
 /* When in doubt, a job keeps its checkpoint. */
@@ -110,12 +112,15 @@ static void drop_old_checkpoints(const struct scheduler_config *config, struct s
         log_warning("old checkpoints cannot be found: %s", err.message);
     for (size_t i = 0; i < count; i++) {
         int64_t id = strtoll(names[i], NULL, 10);
-        char *folder = file_join(jobs, names[i]), *file = layout_checkpoint(folder);
-        if (id > 0 && access(file, F_OK) == 0 && is_old(store, id, before_ms) &&
-            drop_checkpoint(store, id, folder, &err) != STATUS_OK)
+        char *holder = NULL;
+        if (id <= 0)
+            continue;
+        enum status status = attempt_folder_with_checkpoint(config->data_dir, id, &holder, &err);
+        if (status == STATUS_OK && holder && is_old(store, id, before_ms))
+            status = drop_checkpoint(config->data_dir, store, id, &err);
+        if (status != STATUS_OK)
             log_warning("job %lld: %s", (long long)id, err.message);
-        mem_free(file);
-        mem_free(folder);
+        mem_free(holder);
     }
     file_free_names(names, count);
     mem_free(jobs);

@@ -10,13 +10,14 @@
  * continues from them) and the events of jobs that ended more than event_keep_sec ago. Failures are logged. */
 void housekeeping_run(const struct scheduler_config *config, struct store *store);
 
-/* Removes unfinished files (common/file.h) of a killed process from the folder of a job or scene, and from its
+/* Removes unfinished files (common/file.h) of a killed process from the folder of an attempt or scene, and from its
  * outputs. No process may be working there. Failures are logged. */
 void housekeeping_drop_temporary(const char *dir);
-/* The same for all jobs that the store has as running while none is: after the daemon was killed. */
+/* Tidies all jobs that the store has as running while none is: after the daemon was killed. */
 void housekeeping_after_kill(const struct scheduler_config *config, struct store *store);
 
-/* Removes DIR's checkpoint. */
-enum status housekeeping_drop_checkpoint(const char *dir, struct error *err);
+/* Removes files of a job that no output names, and folders of attempts that have nothing left (data/attempt_folder.h).
+ * No attempt of it may run. Failures are logged. */
+void housekeeping_tidy_job(const char *data_dir, struct store *store, int64_t job_id);
 
 #endif

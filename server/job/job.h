@@ -29,6 +29,17 @@ enum job_state { JOB_QUEUED, JOB_RUNNING, JOB_PAUSED, JOB_SUCCEEDED, JOB_FAILED,
 enum job_wanted { JOB_WANT_RUN, JOB_WANT_PAUSE, JOB_WANT_CANCEL };
 enum scene_state { SCENE_RECEIVING, SCENE_CHECKING, SCENE_READY, SCENE_REJECTED };
 
+/* Of an attempt; store/attempts.h draws how it goes through them. */
+enum attempt_row_phase { ATTEMPT_ROW_FORMER, ATTEMPT_ROW_RUNNING, ATTEMPT_ROW_ENDED };
+
+#define ENDING_SUCCEEDED "succeeded"
+#define ENDING_FAILED "failed"       /* the input is at fault */
+#define ENDING_CRASHED "crashed"     /* counts against the job's attempts */
+#define ENDING_STOPPED "stopped"     /* by a request, or with the daemon */
+#define ENDING_BLOCKED "blocked"     /* it cannot go on until somebody acts */
+#define ENDING_LOST "lost"           /* nothing is heard of it: where it ran is at fault */
+#define ENDING_RESTARTED "restarted" /* the daemon, or the machine, died */
+
 #define JOB_STATE_COUNT 6
 #define SCENE_STATE_COUNT 4
 

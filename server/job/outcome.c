@@ -4,18 +4,17 @@
 #include <signal.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/wait.h>
 
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
+#include "server/data/attempt_folder.h"
 #include "server/data/layout.h"
 #include "server/data/trash.h"
 #include "server/job/worker_messages.h"
 #include "server/job/housekeeping.h"
 #include "server/job/measure.h"
 #include "server/job/memory.h"
-#include "server/job/oom.h"
 #include "server/worker/progress.h"
 
 #define LAST_WORDS_MAX 400 /* bytes */
@@ -26,7 +25,9 @@ enum outcome {
     OUTCOME_CRASH,
     OUTCOME_MEMORY, /* a crash that a smaller working set may avoid */
     OUTCOME_STOPPED,
-    OUTCOME_BLOCKED
+    OUTCOME_BLOCKED,
+    OUTCOME_LOST,   /* where it ran is at fault, or the way there */
+    OUTCOME_REFUSED /* where it was to run, it was not taken */
 };
 
 struct verdict {
@@ -43,22 +44,17 @@ static void say(struct verdict *v, enum outcome outcome, const char *reason, con
 }
 
 static void judge_signal(const struct attempt *a, struct verdict *v) {
-    int number = WTERMSIG(a->wait_status);
     char text[256];
-    if (number == SIGKILL) {
-        bool by_kernel = oom_kills("") > a->oom_kills;
-        say(v, by_kernel ? OUTCOME_MEMORY : OUTCOME_CRASH,
-            by_kernel ? "killed by the kernel, which ran out of memory"
-                      : "killed from outside, or by a limit of memory that does not say so",
-            HINT_MEMORY);
+    if (a->end.code == SIGKILL) {
+        say(v, OUTCOME_CRASH, "killed from outside, or by a limit of memory that does not say so", HINT_MEMORY);
         return;
     }
-    snprintf(text, sizeof text, "the worker crashed (%s)", strsignal(number));
+    snprintf(text, sizeof text, "the worker crashed (%s)", strsignal(a->end.code));
     say(v, OUTCOME_CRASH, text, "");
 }
 
 static void judge_exit(const struct attempt *a, struct verdict *v) {
-    int code = WEXITSTATUS(a->wait_status);
+    int code = a->end.code;
     const char *message = a->end_message ? a->end_message : "", *hint = a->end_hint;
     char text[1024];
     switch (code) {
@@ -94,18 +90,21 @@ static void judge_exit(const struct attempt *a, struct verdict *v) {
 
 static void judge(const struct attempt *a, struct verdict *v) {
     *v = (struct verdict){0};
-    if (WIFEXITED(a->wait_status))
-        judge_exit(a, v);
-    else
-        judge_signal(a, v);
-    /* The process was asked to stop: how it ended does not matter. */
-    if ((v->outcome == OUTCOME_CRASH || v->outcome == OUTCOME_MEMORY) && a->stopping)
+    switch (a->end.way) {
+    case RUN_EXIT: judge_exit(a, v); break;
+    case RUN_SIGNAL: judge_signal(a, v); break;
+    case RUN_MEMORY: say(v, OUTCOME_MEMORY, "killed by the kernel, which ran out of memory", HINT_MEMORY); break;
+    case RUN_LOST: say(v, OUTCOME_LOST, a->end.reason, ""); break;
+    case RUN_REFUSED: say(v, OUTCOME_REFUSED, a->end.reason, "Resume the job once that is put right."); break;
+    }
+    /* It was asked to stop: how it ended does not matter. */
+    if ((v->outcome == OUTCOME_CRASH || v->outcome == OUTCOME_MEMORY || v->outcome == OUTCOME_LOST) && a->stopping)
         say(v, OUTCOME_STOPPED, "", "");
     if (v->outcome != OUTCOME_CRASH && v->outcome != OUTCOME_MEMORY)
         return;
     if (a->has_end && a->end_status != STATUS_OK) /* the worker reported its own end */
         return;
-    char *words = supervisor_last_words(&a->worker, LAST_WORDS_MAX);
+    char *words = run_last_words(a->run, LAST_WORDS_MAX);
     size_t used = strlen(v->reason);
     if (words[0])
         snprintf(v->reason + used, sizeof v->reason - used, "; the end of its log: %s", words);
@@ -137,9 +136,11 @@ static enum status settle_job(const struct attempt *a, struct store *store, cons
     switch (v->outcome) {
     case OUTCOME_OK: return store_job_succeed_but(store, a->job_id, a->number, v->reason, err);
     case OUTCOME_INPUT: return store_job_fail(store, a->job_id, a->number, v->reason, v->hint, err);
+    case OUTCOME_REFUSED:
     case OUTCOME_BLOCKED: return store_job_block(store, a->job_id, a->number, v->reason, v->hint, err);
     case OUTCOME_STOPPED: return store_job_stop(store, a->job_id, a->number, "", err);
     case OUTCOME_MEMORY: return settle_memory(a, store, v, err);
+    case OUTCOME_LOST: return store_job_lose(store, a->job_id, a->number, v->reason, err);
     case OUTCOME_CRASH: break;
     }
     return store_job_crash(store, a->job_id, a->number, v->reason, v->hint, a->memory_step, err);
@@ -213,7 +214,7 @@ static bool is_good(const struct attempt *a, const struct verdict *v) {
 
 static enum status settle_check(struct attempt *a, struct store *store, struct trash *trash, const struct verdict *v,
                                 struct error *err) {
-    if (v->outcome == OUTCOME_STOPPED) /* The scene is still in `checking` and is checked again. */
+    if (v->outcome == OUTCOME_STOPPED || v->outcome == OUTCOME_LOST) /* it is in `checking`, and is checked again */
         return STATUS_OK;
     enum status status = is_good(a, v) ? settle_size(a, store, err) : STATUS_OK;
     if (status != STATUS_OK)
@@ -244,8 +245,7 @@ static enum status settle_check(struct attempt *a, struct store *store, struct t
 }
 
 bool outcome_lacks_room(const struct attempt *a) {
-    return a->phase == ATTEMPT_ENDED && WIFEXITED(a->wait_status) &&
-           WEXITSTATUS(a->wait_status) == PROGRESS_EXIT_NO_SPACE;
+    return a->phase == ATTEMPT_ENDED && a->end.way == RUN_EXIT && a->end.code == PROGRESS_EXIT_NO_SPACE;
 }
 
 /* Announced files must be entered before a job ends. A full disk does not delay a stop, though: the next attempt
@@ -269,8 +269,10 @@ enum status outcome_settle(struct attempt *a, struct store *store, struct trash 
     housekeeping_drop_temporary(a->dir);
     judge(a, &verdict);
     enum status status = make_up(a, store, err);
-    if (status == STATUS_OK && a->job_id)
-        status = measure_job(store, a->job_id, a->dir, err);
+    if (status == STATUS_OK && a->job_id) {
+        housekeeping_tidy_job(a->data_dir, store, a->job_id);
+        status = measure_job(store, a->job_id, a->whole_dir, err);
+    }
     if (status == STATUS_OK)
         status = a->job_id ? settle_job(a, store, &verdict, err) : settle_check(a, store, trash, &verdict, err);
     /* Fenced, or deleted meanwhile: nothing is left to enter. */
@@ -278,12 +280,14 @@ enum status outcome_settle(struct attempt *a, struct store *store, struct trash 
         return status;
     static const enum attempt_end ends[] = {
         [OUTCOME_OK] = END_SUCCEEDED,  [OUTCOME_INPUT] = END_INPUT,     [OUTCOME_CRASH] = END_CRASHED,
-        [OUTCOME_MEMORY] = END_MEMORY, [OUTCOME_STOPPED] = END_STOPPED, [OUTCOME_BLOCKED] = END_DISK};
+        [OUTCOME_MEMORY] = END_MEMORY, [OUTCOME_STOPPED] = END_STOPPED, [OUTCOME_BLOCKED] = END_DISK,
+        [OUTCOME_LOST] = END_LOST,     [OUTCOME_REFUSED] = END_REFUSED};
     if (a->job_id)
         atomic_fetch_add(&counters->ends[ends[verdict.outcome]], 1);
     static const char *const words[] = {
         [OUTCOME_OK] = "is done",       [OUTCOME_INPUT] = "is refused",    [OUTCOME_CRASH] = "broke off",
-        [OUTCOME_MEMORY] = "broke off", [OUTCOME_STOPPED] = "was stopped", [OUTCOME_BLOCKED] = "cannot go on"};
+        [OUTCOME_MEMORY] = "broke off", [OUTCOME_STOPPED] = "was stopped", [OUTCOME_BLOCKED] = "cannot go on",
+        [OUTCOME_LOST] = "is lost",     [OUTCOME_REFUSED] = "was refused"};
     if (a->job_id)
         log_info("job %lld: attempt %d %s%s%s", (long long)a->job_id, a->number, words[verdict.outcome],
                  verdict.reason[0] ? ": " : "", verdict.reason);

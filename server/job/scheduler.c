@@ -12,7 +12,6 @@
 #include <math.h>
 #include <poll.h>
 #include <sched.h>
-#include <signal.h>
 #include <stdatomic.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
@@ -23,7 +22,7 @@
 #include "common/mem.h"
 #include "server/job/attempt.h"
 #include "server/job/checks.h"
-#include "server/job/delivery.h"
+#include "server/job/deliveries.h"
 #include "server/job/disk.h"
 #include "server/job/worker_messages.h"
 #include "server/job/housekeeping.h"
@@ -31,10 +30,7 @@
 #include "server/job/outcome.h"
 
 #define HOUSEKEEPING_SEC 600.0
-#define DELIVERIES 8          /* webhooks called at the same time */
-#define USER_DELIVERIES 2     /* of them, of one user: a receiver that hangs delays no other user's messages */
-#define RETRY_SEC 5.0         /* after a failure of the store or of a start */
-#define NO_PIDFD_POLL_SEC 0.2 /* where the kernel has no pidfd to report that a process has ended */
+#define RETRY_SEC 5.0 /* after a failure of the store or of a start */
 
 struct scheduler {
     struct scheduler_config config;
@@ -53,9 +49,8 @@ struct scheduler {
     struct disk_watch disk;
     atomic_bool waits_for_disk; /* disk.is_low, for other threads */
     uint64_t check_room;        /* free bytes above which scenes that had too little are checked again; 0: none waits */
-    struct delivery delivery[DELIVERIES];
-    double outbox_at;    /* when the next message is due, as clock_sec */
-    struct pollfd *poll; /* [1 + 2 * slot_count + DELIVERIES] */
+    struct deliveries deliveries;
+    struct pollfd *poll; /* [1 + RUN_FDS * (slot_count + DELIVERIES_AT_ONCE)] */
 };
 
 enum status scheduler_new(struct scheduler **out, const struct scheduler_config *config, struct store *store,
@@ -76,9 +71,7 @@ enum status scheduler_new(struct scheduler **out, const struct scheduler_config 
     s->job_slots = (size_t)(config->max_running > 0 ? config->max_running : 1);
     s->slot_count = s->job_slots + (size_t)(config->max_checks > 0 ? config->max_checks : CHECKS_AT_ONCE);
     s->slot = mem_calloc(s->slot_count, sizeof *s->slot);
-    for (size_t i = 0; i < DELIVERIES; i++)
-        s->delivery[i].worker = (struct worker){.pid_fd = -1, .pipe_fd = -1};
-    s->poll = mem_calloc(1 + 2 * s->slot_count + DELIVERIES, sizeof *s->poll);
+    s->poll = mem_calloc(1 + RUN_FDS * (s->slot_count + DELIVERIES_AT_ONCE), sizeof *s->poll);
     *out = s;
     return STATUS_OK;
 }
@@ -203,19 +196,19 @@ static void start_checks(struct scheduler *s) {
         retry_later(s, "cannot check a scene", &err);
 }
 
-/* SIGTERM now, SIGKILL after the grace period. */
+/* The request now, force after the grace period. */
 static void ask_to_stop(struct scheduler *s, struct attempt *a) {
     if (a->phase != ATTEMPT_ALIVE || a->stopping)
         return;
     a->stopping = true;
     a->kill_at_sec = clock_sec() + s->config.stop_grace_sec;
-    supervisor_signal(&a->worker, SIGTERM);
+    run_ask(a->run, RUN_STOP);
 }
 
 static void kill_now(struct attempt *a) {
     a->killed = true;
     a->kill_at_sec = 0.0;
-    supervisor_signal(&a->worker, SIGKILL);
+    run_ask(a->run, RUN_KILL);
 }
 
 static void follow_wish(struct scheduler *s, struct attempt *a, enum job_wanted wanted) {
@@ -278,20 +271,20 @@ static void watch_disk(struct scheduler *s) {
         return;
     for (size_t i = 0; s->disk.is_low && i < s->job_slots; i++)
         ask_to_stop(s, &s->slot[i]);
-    if (store_job_explain(s->store, s->disk.is_low ? s->disk.reason : "", DISK_REASON, s->disk.is_low ? DISK_HINT : "",
-                          &err) != STATUS_OK)
+    if (store_job_explain(s->store, 0, s->disk.is_low ? s->disk.reason : "", DISK_REASON,
+                          s->disk.is_low ? DISK_HINT : "", &err) != STATUS_OK)
         retry_later(s, "cannot say why jobs wait", &err);
 }
 
-/* Kills workers whose time is up; returns poll's timeout, in ms. */
-static int keep_deadlines(struct scheduler *s) {
+/* Kills workers whose time is up; returns how long the loop may sleep. */
+static double keep_deadlines(struct scheduler *s) {
     double now = clock_sec(), sleep = s->must_retry ? RETRY_SEC : (double)INFINITY;
     if (any_alive(s) || s->disk.is_low)
         sleep = fmin(sleep, fmax(s->disk.looked_at + DISK_LOOK_SEC - now, 0.01));
     if (s->check_room)
         sleep = fmin(sleep, DISK_LOOK_SEC);
     if (!atomic_load(&s->stopping))
-        sleep = fmin(sleep, fmax(s->housekeeping_at - now, 0.0));
+        sleep = fmin(sleep, fmax(fmin(s->housekeeping_at, s->deliveries.due_at) - now, 0.0));
     for (size_t i = 0; i < s->slot_count; i++) {
         struct attempt *a = &s->slot[i];
         if (a->phase != ATTEMPT_ALIVE)
@@ -300,38 +293,31 @@ static int keep_deadlines(struct scheduler *s) {
             kill_now(a);
         if (a->kill_at_sec > 0.0)
             sleep = fmin(sleep, a->kill_at_sec - now);
-        if (a->worker.pid_fd < 0)
-            sleep = fmin(sleep, NO_PIDFD_POLL_SEC);
     }
-    for (size_t i = 0; i < DELIVERIES; i++) {
-        const struct delivery *d = &s->delivery[i];
-        if (d->has_ended) /* its outcome could not be entered */
-            sleep = fmin(sleep, RETRY_SEC);
-        else if (d->id)
-            sleep = fmin(sleep, d->worker.pid_fd < 0 ? NO_PIDFD_POLL_SEC : fmax(d->kill_at_sec - now, 0.05));
-    }
-    if (!atomic_load(&s->stopping))
-        sleep = fmin(sleep, fmax(s->outbox_at - now, 0.0));
-    return isinf(sleep) ? -1 : (int)ceil(sleep * 1000.0); /* rounded up: rounded down, the loop would spin */
+    return sleep;
 }
 
 unsigned long scheduler_rounds(const struct scheduler *s) { return atomic_load(&s->rounds); }
 
-static void wait_for_something(struct scheduler *s, int timeout_ms) {
-    atomic_fetch_add(&s->rounds, 1);
+/* Sleeps until somebody calls, something is heard of a run, or that time is over. */
+static void wait_for_something(struct scheduler *s, double sleep) {
+    double look;
     nfds_t count = 0;
+    atomic_fetch_add(&s->rounds, 1);
     s->poll[count++] = (struct pollfd){.fd = s->wake_fd, .events = POLLIN};
     for (size_t i = 0; i < s->slot_count; i++) {
         const struct attempt *a = &s->slot[i];
         if (a->phase != ATTEMPT_ALIVE)
             continue;
-        s->poll[count++] = (struct pollfd){.fd = a->worker.pid_fd, .events = POLLIN};
-        s->poll[count++] = (struct pollfd){.fd = a->worker.pipe_fd, .events = POLLIN};
+        count += run_poll(a->run, s->poll + count, &look);
+        sleep = fmin(sleep, look);
     }
-    for (size_t i = 0; i < DELIVERIES; i++)
-        if (s->delivery[i].id)
-            s->poll[count++] = (struct pollfd){.fd = s->delivery[i].worker.pid_fd, .events = POLLIN};
-    poll(s->poll, count, timeout_ms); /* a signal ends it early, which is harmless */
+    if (!atomic_load(&s->stopping)) { /* else nobody listens to them */
+        count += deliveries_poll(&s->deliveries, s->poll + count, &look);
+        sleep = fmin(sleep, look);
+    }
+    /* Rounded up: rounded down, the loop would spin. A signal ends it early, which is harmless. */
+    poll(s->poll, count, isinf(sleep) ? -1 : (int)ceil(sleep * 1000.0));
     uint64_t calls;
     if (s->poll[0].revents && read(s->wake_fd, &calls, sizeof calls) < 0)
         return;
@@ -351,55 +337,6 @@ static void listen_and_settle(struct scheduler *s) {
         running += a->phase == ATTEMPT_ALIVE;
     }
     atomic_store(&s->running, running);
-}
-
-/* Lists the users that have as many deliveries under way as one may have; returns their number. */
-static size_t busy_users(const struct scheduler *s, int64_t users[DELIVERIES]) {
-    size_t count = 0;
-    for (size_t i = 0; i < DELIVERIES; i++) {
-        size_t same = 0;
-        for (size_t k = 0; k <= i; k++)
-            same +=
-                s->delivery[i].id != 0 && s->delivery[k].id != 0 && s->delivery[k].owner_id == s->delivery[i].owner_id;
-        if (same == USER_DELIVERIES)
-            users[count++] = s->delivery[i].owner_id;
-    }
-    return count;
-}
-
-/* Starts deliveries of due messages while there are free slots. */
-static void deliver(struct scheduler *s) {
-    struct error err;
-    int64_t after = 0, skip[DELIVERIES];
-    size_t skip_count;
-    double wait = (double)INFINITY;
-    bool is_free = false;
-    for (size_t i = 0; i < DELIVERIES; i++)
-        is_free = delivery_listen(&s->delivery[i], s->store) || is_free;
-    /* Asked before the due messages are read, so that none becomes due in between. */
-    if (store_outbox_wait(s->store, &wait, &err) != STATUS_OK)
-        wait = RETRY_SEC;
-    for (size_t i = 0; i < DELIVERIES && is_free; i++) {
-        struct outbox_row row;
-        enum status status = STATUS_OK;
-        while (s->delivery[i].id == 0 && status == STATUS_OK) {
-            skip_count = busy_users(s, skip);
-            status = store_outbox_next(s->store, after, skip, skip_count, &row, &err);
-            if (status != STATUS_OK)
-                break;
-            after = row.id;
-            bool is_under_way = false;
-            for (size_t k = 0; k < DELIVERIES; k++)
-                is_under_way = is_under_way || s->delivery[k].id == row.id;
-            if (!is_under_way)
-                status = delivery_start(&s->delivery[i], &s->config, &row, &err);
-            outbox_row_release(&row);
-        }
-        if (status != STATUS_OK && status != STATUS_NOT_FOUND)
-            retry_later(s, "cannot call a webhook", &err);
-    }
-    /* Messages that are due while all slots are busy go out when a delivery ends, which wakes the loop. */
-    s->outbox_at = clock_sec() + wait;
 }
 
 static void keep_house(struct scheduler *s) {
@@ -434,15 +371,15 @@ enum status scheduler_run(struct scheduler *s, struct error *err) {
             start_checks(s);
             start_jobs(s);
             keep_house(s);
-            deliver(s);
+            struct error why;
+            if (deliveries_run(&s->deliveries, &s->config, s->store, &why) != STATUS_OK)
+                retry_later(s, "cannot call a webhook", &why);
         }
         follow_wishes(s);
         wait_for_something(s, keep_deadlines(s));
     }
     (void)store_usage_pay(s->store, NULL);
-    /* Deliveries under way are repeated after the next start. */
-    for (size_t i = 0; i < DELIVERIES; i++)
-        delivery_stop(&s->delivery[i], s->store);
+    deliveries_stop(&s->deliveries, s->store);
     /* Attempts that could not be entered are "running" in the store; the next start queues them again. */
     return STATUS_OK;
 }

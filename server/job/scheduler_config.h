@@ -5,9 +5,11 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+struct executor; /* run.h */
+
 struct scheduler_config {
     const char *data_dir;             /* borrowed; holds scenes/ID/, jobs/ID/ */
-    const char *worker_binary;        /* /proc/self/exe */
+    const struct executor *executor;  /* borrowed; runs jobs, checks of scenes and what calls webhooks (run.h) */
     int max_running;                  /* jobs at once */
     int user_max_running;             /* jobs of one user at once; 0: no limit */
     int max_checks;                   /* checks of scenes at once; 0: CHECKS_AT_ONCE */
@@ -16,9 +18,9 @@ struct scheduler_config {
     uint64_t worker_memory_bytes;     /* 0: no limit */
     uint64_t photograph_memory_bytes; /* of it for pixels of photographs; 0: half of what there is */
     double checkpoint_interval_sec;
-    double stop_grace_sec;      /* SIGTERM to SIGKILL */
-    double checkpoint_keep_sec; /* from SIGTERM to SIGKILL */
-    double event_keep_sec;      /* checkpoints, after the job has succeeded */
+    double stop_grace_sec;      /* from the request to stop to the end by force */
+    double checkpoint_keep_sec; /* after the job has succeeded */
+    double event_keep_sec;      /* after the job has ended */
     long attempt_events_max;    /* reports of one attempt before they are thinned; 0: 500,000 */
     uint64_t low_disk_bytes;    /* work waits while less is free; 0: never */
     bool webhook_private;       /* webhooks may go to private addresses */

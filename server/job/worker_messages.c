@@ -238,7 +238,7 @@ static void note_space(const struct message_listener *l, const cJSON *line) {
     struct attempt *a = l->attempt;
     struct error err;
     double bytes;
-    struct disk_use use = {.job_id = a->job_id, .bytes = a->job_id ? measure_folder(a->dir) : -1};
+    struct disk_use use = {.job_id = a->job_id, .bytes = a->job_id ? measure_folder(a->whole_dir) : -1};
     if (json_number(line, "bytes", "space", -1.0, &bytes, NULL) != STATUS_OK || !(bytes >= 0.0 && bytes < 1e15) ||
         use.bytes < 0)
         return;
@@ -332,11 +332,11 @@ void worker_messages_read(struct attempt *a, struct store *store, struct counter
     struct message_listener listener = {.attempt = a, .store = store, .counters = counters};
     if (a->phase != ATTEMPT_ALIVE)
         return;
-    supervisor_read(&a->worker, take_line, &listener);
-    if (supervisor_reap(&a->worker, &a->wait_status, take_line, &listener))
+    run_read(a->run, take_line, &listener);
+    if (run_ended(a->run, &a->end, take_line, &listener))
         a->phase = ATTEMPT_ENDED;
     else
         enter_late(a, store);
-    if (a->worker.long_lines > 0)
+    if (a->run->long_lines > 0)
         say_unread(a, "is longer than a line may be");
 }

@@ -41,8 +41,8 @@ static enum status read_outputs(struct contents *c, struct sql *sql, struct erro
     sqlite3_stmt *stmt;
     bool row = true;
     size_t job = 0;
-    enum status status =
-        sql_query(sql, &stmt, err, "SELECT job_id, name, bytes, sha256 FROM outputs ORDER BY job_id, name", "");
+    enum status status = sql_query(
+        sql, &stmt, err, "SELECT job_id, name, bytes, sha256, attempt FROM outputs ORDER BY job_id, name", "");
     while (status == STATUS_OK && (status = sql_step(sql, stmt, &row, err)) == STATUS_OK && row) {
         int64_t id = sqlite3_column_int64(stmt, 0);
         while (job < c->job_count && c->jobs[job].id < id)
@@ -55,6 +55,7 @@ static enum status read_outputs(struct contents *c, struct sql *sql, struct erro
         struct contents_output *output = &c->outputs[c->output_count++];
         output->name = sql_dup(stmt, 1);
         output->bytes = (uint64_t)sqlite3_column_int64(stmt, 2);
+        output->attempt = sqlite3_column_int(stmt, 4);
         snprintf(output->sha256, sizeof output->sha256, "%s", sql_text(stmt, 3));
     }
     return status;

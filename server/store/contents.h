@@ -21,7 +21,8 @@ struct contents_job {
 };
 
 struct contents_output {
-    char *name; /* owned */
+    char *name;  /* owned */
+    int attempt; /* in whose folder it lies */
     uint64_t bytes;
     char sha256[65]; /* as the worker announced it */
 };

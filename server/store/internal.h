@@ -98,7 +98,7 @@ enum status store_webhook_set(struct store *store, int64_t job_id, const char *u
                               struct error *err);
 enum status store_webhook_post(struct store *store, int64_t job_id, int attempt, const char *state, const char *reason,
                                const char *hint, struct error *err);
-struct count_limits; /* store.h */
+struct count_limits; /* limits.h */
 /* Inside a transaction: STATUS_LIMIT unless this owner (0: nobody) may queue one more job. */
 enum status store_queue_check(struct store *store, int64_t owner_id, const struct count_limits *limits,
                               struct error *err);

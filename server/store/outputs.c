@@ -2,6 +2,8 @@
  *
  * Names come from a worker, which has read what a stranger uploaded, and end in paths: only plain
  * relative ones are taken. */
+#include "server/store/outputs.h"
+
 #include <ctype.h>
 #include <stdio.h>
 #include <string.h>
@@ -9,7 +11,6 @@
 #include "common/json.h"
 #include "common/mem.h"
 #include "server/store/internal.h"
-#include "server/store/store.h"
 
 #define COLUMNS                                                                                                        \
     "name, bytes, sha256, content_type, updated_ms, attempt, digest, digest_inode, digest_bytes, digest_modified_ns,"  \

@@ -209,6 +209,22 @@ static const char step_15[] =
 static const char step_16[] = "ALTER TABLE scenes ADD COLUMN reading TEXT NOT NULL DEFAULT '{}';"
                               "ALTER TABLE uploads ADD COLUMN reading TEXT NOT NULL DEFAULT '';";
 
-const char *const schema_steps[] = {step_1, step_2,  step_3,  step_4,  step_5,  step_6,  step_7,  step_8,
-                                    step_9, step_10, step_11, step_12, step_13, step_14, step_15, step_16};
+/* Attempts, the durable part of them (attempts.h). `part` is for jobs that split; none do. All files of a job of an
+ * earlier version lie in one folder, which becomes that of its last attempt. */
+static const char step_17[] = "CREATE TABLE attempts ("
+                              "  job_id INTEGER NOT NULL REFERENCES jobs (id) ON DELETE CASCADE,"
+                              "  part INTEGER NOT NULL DEFAULT 0,"
+                              "  number INTEGER NOT NULL CHECK (number > 0),"
+                              "  executor TEXT NOT NULL,"
+                              "  phase INTEGER NOT NULL CHECK (phase BETWEEN 0 AND 2),"
+                              "  ending TEXT NOT NULL DEFAULT '',"
+                              "  PRIMARY KEY (job_id, part, number)"
+                              ") STRICT, WITHOUT ROWID;"
+                              "CREATE INDEX attempts_by_phase ON attempts (phase) WHERE phase < 2;"
+                              "INSERT INTO attempts (job_id, number, executor, phase)"
+                              " SELECT id, attempt, 'process', 0 FROM jobs WHERE attempt > 0;"
+                              "UPDATE outputs SET attempt = (SELECT attempt FROM jobs WHERE id = job_id);";
+
+const char *const schema_steps[] = {step_1,  step_2,  step_3,  step_4,  step_5,  step_6,  step_7,  step_8, step_9,
+                                    step_10, step_11, step_12, step_13, step_14, step_15, step_16, step_17};
 const int schema_version = (int)(sizeof schema_steps / sizeof schema_steps[0]);

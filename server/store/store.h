@@ -1,4 +1,4 @@
-/* store.h -- state.db: scenes, jobs, events, outputs.
+/* store.h -- state.db: scenes, jobs, events, and what the headers that it includes are about.
  *
  * 1. One process, one connection, one mutex around it: SQLite before 3.51.3 can lose
  *    acknowledged writes when two connections' checkpoint and commit overlap. The connection
@@ -23,7 +23,12 @@
 #include "common/buf.h"
 #include "common/error.h"
 #include "server/job/job.h"
+#include "server/store/attempts.h"
+#include "server/store/limits.h"
+#include "server/store/outbox.h"
+#include "server/store/outputs.h"
 #include "server/store/retention.h"
+#include "server/store/uploads.h"
 #include "server/store/users.h"
 
 struct store; /* opaque */
@@ -51,11 +56,6 @@ void store_reserve_renew(struct store *store);
 /* `changed` is called, outside the store's mutex, after a transaction that appended events to `job_id` (0: a scene
  * changed). One subscriber; set before threads start. */
 void store_on_change(struct store *store, void (*changed)(void *user, int64_t job_id), void *user);
-
-/* Limits on a number of things: in all, and of one user (0: no limit; nobody has none). One more is STATUS_LIMIT. */
-struct count_limits {
-    size_t all, one_user;
-};
 
 /* --- scenes ------------------------------------------------------------------------------ */
 
@@ -168,19 +168,10 @@ struct job_patch {
 enum status store_job_patch(struct store *store, int64_t id, int64_t expected_revision, const struct job_patch *patch,
                             struct error *err);
 enum status store_job_delete(struct store *store, int64_t id, struct error *err); /* not a running one */
-/* The queued job to start next, among those whose scene has been checked (ready, or rejected: such a job is started
- * only to fail); STATUS_NOT_FOUND if none. Among the users with fewer than user_max_running running jobs (0: no
- * limit), the one with the least recent CPU time; of that user's jobs the one of highest priority, then the first in
- * turn. */
-enum status store_job_next(struct store *store, int user_max_running, int64_t *id, struct error *err);
 /* Charges CPU time to a user. Where that fails, the charge is kept in memory; store_usage_pay and the next charge
  * enter it. */
 enum status store_usage_add(struct store *store, int64_t owner_id, double cpu_sec, struct error *err);
 enum status store_usage_pay(struct store *store, struct error *err);
-/* Running jobs and the requests to them, for the scheduler. Fills ids[limit], wanted[limit]. */
-enum status store_job_running(struct store *store, size_t limit, int64_t *ids, enum job_wanted *wanted, size_t *count,
-                              struct error *err);
-
 /* Users' requests. For a running job the request is only recorded; the scheduler fulfils it (wake it). A request for
  * the state that the job already has is STATUS_OK and changes nothing. Resume withdraws a request to pause. Retry is
  * for failed and cancelled jobs; with `from`, a stage that job_stage_parse knows (else NULL), also for succeeded
@@ -192,35 +183,6 @@ enum status store_job_retry(struct store *store, int64_t id, int max_attempts, c
                             const struct count_limits *limits, struct error *err);
 enum status store_job_extend(struct store *store, int64_t id, int max_attempts, const char *settings,
                              const struct count_limits *limits, struct error *err);
-
-/* The scheduler's transitions, fenced by `attempt`: STATUS_CONFLICT when another attempt is current. A job whose scene
- * is being checked does not start. A recorded request to cancel overrides every end; one to pause overrides a return to
- * the queue. */
-enum status store_job_start(struct store *store, int64_t id, int *attempt, struct error *err);
-enum status store_job_succeed(struct store *store, int64_t id, int attempt, struct error *err);
-/* The same, with a remark for the user: what a time limit left out. */
-enum status store_job_succeed_but(struct store *store, int64_t id, int attempt, const char *reason, struct error *err);
-/* The input is at fault: a retry would not help. */
-enum status store_job_fail(struct store *store, int64_t id, int attempt, const char *reason, const char *hint,
-                           struct error *err);
-/* Clears restart_from: the restart has been carried out. */
-enum status store_job_restarted(struct store *store, int64_t id, int attempt, struct error *err);
-/* The attempt crashed: back to the queue, or failed if it was the last one. memory_step is for the next attempt. */
-enum status store_job_crash(struct store *store, int64_t id, int attempt, const char *reason, const char *hint,
-                            int memory_step, struct error *err);
-/* The daemon stopped the attempt (a request, shutdown): back to the queue, or as requested. */
-enum status store_job_stop(struct store *store, int64_t id, int attempt, const char *reason, struct error *err);
-/* The attempt cannot continue until somebody acts (disk full): paused. */
-enum status store_job_block(struct store *store, int64_t id, int attempt, const char *reason, const char *hint,
-                            struct error *err);
-/* Sets the reason of every queued job that has another one. `reason` "": clears reasons that begin with `prefix`.
- * Each change is a state event. */
-enum status store_job_explain(struct store *store, const char *reason, const char *prefix, const char *hint,
-                              struct error *err);
-/* At start: every running job is queued again (or paused, cancelled, as requested). It does not count as a failed
- * attempt: the job is not at fault when the daemon or the machine dies. The disk usage of such a job becomes
- * unknown. */
-enum status store_reconcile(struct store *store, size_t *requeued, struct error *err);
 
 /* --- disk usage --------------------------------------------------------------------------- */
 
@@ -260,7 +222,7 @@ enum status store_disk_enter(struct store *store, const struct disk_use *list, s
 enum status store_disk_unknown(struct store *store, size_t skip, size_t limit, struct disk_use *list, size_t *count,
                                struct error *err);
 
-/* --- events, outputs --------------------------------------------------------------------- */
+/* --- events ----------------------------------------------------------------------------- */
 
 /* Appends an event; `type` and `data` (JSON object text) as in common/protocol.h. STATUS_CONFLICT when `attempt` is
  * not the current one. A progress event also updates the job's row (its members stage, done, total, eta_sec) and
@@ -301,115 +263,6 @@ enum status store_event_prune(struct store *store, int64_t before_ms, bool *more
 enum status store_event_last(struct store *store, int64_t job_id, int64_t *id, struct error *err);
 /* The largest event id ever used, including removed events. */
 enum status store_event_newest(struct store *store, int64_t *id, struct error *err);
-
-/* A message to a webhook; every change of its job's state makes one. */
-struct outbox_row {
-    int64_t id, job_id;
-    int64_t owner_id;          /* the job's owner; 0: nobody */
-    char *url, *secret, *body; /* owned */
-    int tries;
-};
-void outbox_row_release(struct outbox_row *row);
-/* The first due message with id > after, except of the users skip[skip_count]; STATUS_NOT_FOUND when there is none. */
-enum status store_outbox_next(struct store *store, int64_t after, const int64_t *skip, size_t skip_count,
-                              struct outbox_row *row, struct error *err);
-/* Time until the next message that is not yet due; infinite when there is none. */
-enum status store_outbox_wait(struct store *store, double *seconds, struct error *err);
-struct outbox_outcome {
-    bool delivered;
-    bool is_final;      /* another try would fail the same way */
-    int status;         /* HTTP status; 0: none */
-    const char *reason; /* why it was not delivered; NULL: it was */
-};
-/* Removes a delivered message, or postpones it: longer each time, and in the end gives up. The job shows the
- * outcome. */
-enum status store_outbox_settle(struct store *store, int64_t id, const struct outbox_outcome *outcome, bool *gave_up,
-                                struct error *err);
-/* Makes the job's messages due now, with all their tries again; if there are none, queues one about its current
- * state. STATUS_CONFLICT: the job has no webhook. */
-enum status store_webhook_again(struct store *store, int64_t job_id, struct error *err);
-
-/* Identifies a version of a file by fields of its stat. */
-struct file_version {
-    uint64_t inode, bytes;
-    int64_t modified_ns, changed_ns; /* Unix time */
-};
-
-struct output_row {
-    char *name;
-    uint64_t bytes;
-    char sha256[65]; /* as reported by the worker */
-    char *content_type;
-    int64_t updated_ms;
-    int attempt;
-    char digest[65]; /* as computed by the daemon ("": not yet) from this version of the file: */
-    struct file_version version;
-};
-void output_row_release(struct output_row *row);
-/* Records a complete file of the job's out/ folder and appends its event (`type` is EVENT_OUTPUT or EVENT_PREVIEW).
- * STATUS_INPUT when the name is not a plain relative path. Requests its digest. */
-enum status store_output_put(struct store *store, int64_t job_id, int attempt, const char *type, const char *name,
-                             uint64_t bytes, const char *sha256, const char *content_type, struct error *err);
-enum status store_output_get(struct store *store, int64_t job_id, const char *name, struct output_row *row,
-                             struct error *err);
-/* `wanted` is called, outside the store's mutex, when a digest has been requested. One subscriber; set before threads
- * start. */
-void store_on_digest_wanted(struct store *store, void (*wanted)(void *user), void *user);
-/* Requests the digest of the output's current version. */
-enum status store_output_want_digest(struct store *store, int64_t job_id, const char *name, struct error *err);
-/* The smallest output with a requested digest; STATUS_NOT_FOUND when there is none. */
-enum status store_output_next_digest(struct store *store, int64_t *job_id, struct output_row *row, struct error *err);
-/* Enters the digest of a version of the file that `row` announced; NULL: it cannot be computed. Nothing changes where
- * the output was announced again, or is gone. */
-enum status store_output_enter_digest(struct store *store, int64_t job_id, const struct output_row *row,
-                                      const struct file_version *version, const char *digest, struct error *err);
-/* All outputs, ordered by name; *rows is the caller's: release each, then mem_free. */
-enum status store_output_list(struct store *store, int64_t job_id, struct output_row **rows, size_t *count,
-                              struct error *err);
-
-/* --- resumable uploads ---------------------------------------------------------------------- */
-
-#define UPLOAD_ID_SIZE 33   /* 32 hex digits and the NUL */
-#define UPLOAD_BOOT_SIZE 40 /* see boot.h */
-
-struct upload_row {
-    char id[UPLOAD_ID_SIZE];
-    int64_t owner_id;
-    char *owner;                  /* a user's name; "" for nobody */
-    char *name;                   /* for the scene */
-    char *metadata;               /* Upload-Metadata as sent by the client */
-    char *reading;                /* for the scene, as in scene_row; "" or NULL: none */
-    char sha256[SCENE_ID_SIZE];   /* of the whole, as announced by the client; "" if it was not */
-    uint64_t length, received;    /* bytes; `received` are on disk */
-    char boot[UPLOAD_BOOT_SIZE];  /* see store_upload_begin */
-    char scene_id[SCENE_ID_SIZE]; /* the scene that it became; "" before */
-    bool is_pinned;
-    int64_t created_ms, updated_ms, expires_ms; /* expires_ms 0: never */
-};
-void upload_row_release(struct upload_row *row);
-
-/* Adds an upload with nothing received. Uses id, owner_id, name, metadata, reading, sha256, length and boot of *row.
- * `hash`: the state of an empty hash. The limits count unfinished uploads. */
-enum status store_upload_add(struct store *store, const struct upload_row *row, const void *hash, size_t hash_size,
-                             const struct count_limits *limits, struct error *err);
-/* *hash (may be NULL) becomes the stored state; STATUS_CORRUPT when its size differs. */
-enum status store_upload_get(struct store *store, const char *id, struct upload_row *row, void *hash, size_t hash_size,
-                             struct error *err);
-/* Uploads of `who` (NULL or an admin: all), newest first; sha256 "": any; cursor as in store_scene_list. */
-enum status store_upload_list(struct store *store, const struct caller *who, const char *sha256, const char *cursor,
-                              size_t limit, struct upload_row *rows, size_t *count, char next_cursor[128],
-                              struct error *err);
-/* The file may now hold bytes beyond `received` that are valid until the machine restarts (`boot` is its boot id), or
- * ("") that are not to be used. */
-enum status store_upload_begin(struct store *store, const char *id, const char *boot, struct error *err);
-/* `received` bytes are on disk; `hash` is the state of their hash. A smaller number than before is no error and
- * changes nothing. */
-enum status store_upload_advance(struct store *store, const char *id, uint64_t received, const void *hash,
-                                 size_t hash_size, struct error *err);
-enum status store_upload_finish(struct store *store, const char *id, const char *scene_id, struct error *err);
-enum status store_upload_keep(struct store *store, const char *id, const struct retention *retention,
-                              struct error *err);
-enum status store_upload_delete(struct store *store, const char *id, struct error *err);
 
 /* --- counts ------------------------------------------------------------------------------ */
 

@@ -1,11 +1,12 @@
 /* uploads.c -- the rows of resumable uploads; see store.h. The bytes are in files; a row says how many of them are
  * reliable. */
+#include "server/store/uploads.h"
+
 #include <stdio.h>
 #include <string.h>
 
 #include "common/mem.h"
 #include "server/store/internal.h"
-#include "server/store/store.h"
 
 #define COLUMNS                                                                                                        \
     "id, name, metadata, sha256, length, received, boot, scene_id, created_ms, updated_ms, hash,"                      \

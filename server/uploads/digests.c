@@ -140,7 +140,7 @@ static bool compute(struct digests *d, int64_t job_id, const struct output_row *
                     char hex[SHA256_HEX_SIZE], bool *is_had) {
     struct error err;
     int fd;
-    enum status status = work_file_open_output(d->data_dir, job_id, row->name, &fd, &err);
+    enum status status = work_file_open_output(d->data_dir, job_id, row->attempt, row->name, &fd, &err);
     if (status == STATUS_OK) {
         status = digests_hash(fd, &d->stopping, version, hex, &err);
         close(fd);

@@ -9,7 +9,8 @@
  *   {"kind":"deliver","url":"https://…","secret":"…","body":"…","message_id":"msg_7",
  *    "allow_private":false,"sandbox":true}
  *
- * A check's folder is the scene's: it reads DIR/archive and leaves DIR/files/. */
+ * A check's folder is the scene's: it reads DIR/archive and leaves DIR/files/. "scene" is set by the executor
+ * (server/job/run.h), which knows where the scene lies. */
 #ifndef UNBAKE_WORKER_ORDER_H
 #define UNBAKE_WORKER_ORDER_H
 

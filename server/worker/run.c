@@ -26,13 +26,9 @@
 #include "common/sha256.h"
 #include "server/data/layout.h"
 #include "server/export/outputs.h"
-#include "server/ingest/bundle.h"
-#include "server/ingest/photo_color.h"
-#include "server/ingest/pixels.h"
-#include "server/ingest/photos.h"
 #include "server/reconstruct/reconstruct.h"
-#include "server/scene/select.h"
 #include "server/worker/checkpoint.h"
+#include "server/worker/load.h"
 #include "server/worker/pixel_memory.h"
 #include "server/worker/read_back.h"
 #include "server/worker/results.h"
@@ -291,89 +287,18 @@ static enum status write_outputs(struct worker_run *run, const struct reconstruc
 
 /* --- the whole ---------------------------------------------------------------------------------- */
 
-/* Leaves out what the settings exclude and crop. */
-static enum status select_parts(struct worker_run *run, const struct settings *settings, struct scene *scene,
-                                struct error *err) {
-    double lower[3], upper[3];
-    size_t frames = 0, triangles = 0;
-    enum status status = scene_exclude(scene, settings_text(settings, "exclude"), &frames, err);
-    if (status == STATUS_OK && settings_box(settings, "crop", lower, upper))
-        status = scene_crop(scene, lower, upper, &triangles, err);
-    if (status != STATUS_OK || frames + triangles == 0)
-        return status;
-    char *text = mem_printf("left out as the settings say: %zu photographs, %zu triangles", frames, triangles);
-    progress_log(run->progress, "info", text);
-    mem_free(text);
-    if (scene->photograph_count < PHOTOS_MIN_COUNT)
-        return error_set(err, STATUS_INPUT, "exclude leaves %zu photographs; %d are needed", scene->photograph_count,
-                         PHOTOS_MIN_COUNT);
-    return STATUS_OK;
-}
-
-static void tell_pixels(const struct worker_run *run, const struct scene *scene) {
-    uint64_t bytes = spill_file_bytes(run->spill);
-    if (bytes == 0)
-        return;
-    char *text =
-        mem_printf("photographs: the pixels of all %zu do not fit the %.0f MiB that they may have of the memory "
-                   "(photograph_memory_mib): they are read from the disk",
-                   scene->photograph_count, (double)spill_memory_bytes(run->spill) / 1048576.0);
-    progress_log(run->progress, "info", text);
-    mem_free(text);
-}
-
-static enum status load_scene(struct worker_run *run, const struct settings *settings, struct parallel *pool,
-                              struct scene *scene, struct error *err) {
-    struct bundle_limits limits = bundle_default_limits();
-    pixels_use(run->spill, &limits);
-    limits.later_bytes = PHOTOGRAPH_LATER_BYTES;
-    struct reading reading;
-    const char *transforms = settings_text(settings, "transforms");
-    enum status status = reading_parse(run->order->reading, &reading, err);
-    if (status != STATUS_OK)
-        return status;
-    if (strcmp(transforms, BUNDLE_TRANSFORMS) != 0) { /* the job's own file, in place of the scene's */
-        mem_free(reading.transforms);
-        reading.transforms = mem_strdup(transforms);
-    }
-    cJSON *problems = cJSON_CreateArray();
-    tell_stage(run, "load");
-    status = bundle_load(run->order->scene, &reading, &limits, pool, scene, problems, err);
-    reading_release(&reading);
-    /* Only with another transforms file than the scene's check has read. */
-    const cJSON *problem;
-    cJSON_ArrayForEach(problem, problems) {
-        char *text = json_text(problem);
-        progress_log(run->progress, "error", text);
-        mem_free(text);
-    }
-    cJSON_Delete(problems);
-    if (status == STATUS_OK) {
-        status = select_parts(run, settings, scene, err);
-        if (status != STATUS_OK)
-            scene_release(scene);
-    }
-    for (size_t i = 0; i < scene->warning_count; i++)
-        progress_log(run->progress, "warning", scene->warning[i]);
-    char *color = status == STATUS_OK ? photo_color_fact(scene) : NULL;
-    if (color) {
-        char *text = mem_printf("photographs: %s", color);
-        progress_log(run->progress, "info", text);
-        mem_free(text);
-    }
-    mem_free(color);
-    return status;
-}
-
 static enum status open_checkpoint(struct worker_run *run, struct error *err) {
     char note[512];
-    char *path = layout_checkpoint(run->order->dir);
+    char *folder = layout_checkpoint_folder(run->order->dir), *path = layout_checkpoint(run->order->dir);
     char *fingerprint = fingerprint_of(run->order);
-    enum status status = checkpoint_open(&run->checkpoint, path, fingerprint, note, err);
+    enum status status = file_make_dirs(folder, err);
+    if (status == STATUS_OK)
+        status = checkpoint_open(&run->checkpoint, path, fingerprint, note, err);
     if (status == STATUS_OK && note[0])
         progress_log(run->progress, "warning", note);
     mem_free(fingerprint);
     mem_free(path);
+    mem_free(folder);
     return status;
 }
 
@@ -396,12 +321,12 @@ static enum status reconstruct(struct worker_run *run, const struct settings *se
         .checkpoint_load = load_checkpoint,
         .preview = write_preview,
     };
-    enum status status = load_scene(run, settings, pool, &scene, err);
+    tell_stage(run, "load");
+    enum status status = load_scene(run->order, run->progress, run->spill, settings, pool, &scene, err);
     if (status != STATUS_OK) {
         scene_release(&scene);
         return status;
     }
-    tell_pixels(run, &scene);
     double now = clock_sec();
     run->next_checkpoint = now + run->order->checkpoint_interval_sec;
     run->next_preview = now; /* an early preview shows that something happens */

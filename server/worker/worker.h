@@ -6,7 +6,7 @@
  *    so two workers never work in one folder.
  * 2. It writes only below DIR and reads only the scene besides (sandbox.h); what it has to say
  *    goes down the pipe at PROGRESS_FD (progress.h), what it has to complain about to stderr.
- * 3. It dies with the daemon (PR_SET_PDEATHSIG, set by the supervisor): the next daemon starts
+ * 3. It dies with the daemon (PR_SET_PDEATHSIG, set by server/job/process.c): the next daemon starts
  *    the next attempt, which goes on from the checkpoint. */
 #ifndef UNBAKE_WORKER_WORKER_H
 #define UNBAKE_WORKER_WORKER_H

@@ -15,7 +15,7 @@ static enum status obey(struct rig *rig, const char *line, struct error *err) {
         return store_scene_ready(rig->store, RIG_SCENE, NULL, line + 6, err);
     int count = sscanf(line, "%15s %lld %d", word, &job, &attempt);
     if (count == 2 && strcmp(word, "start") == 0)
-        return store_job_start(rig->store, job, &attempt, err);
+        return store_job_start(rig->store, job, "process", &attempt, err);
     if (count == 3 && strcmp(word, "succeed") == 0)
         return store_job_succeed(rig->store, job, attempt, err);
     if (count == 3 && strcmp(word, "fail") == 0)

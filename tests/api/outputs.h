@@ -7,7 +7,7 @@
 
 static inline void write_output(struct rig *rig, int64_t job, const char *name, const void *data, size_t length) {
     struct error err;
-    char *path = mem_printf("%s/jobs/%lld/out/%s", rig->dir, (long long)job, name);
+    char *path = mem_printf("%s/jobs/%lld/attempt-1/out/%s", rig->dir, (long long)job, name);
     char *slash = strrchr(path, '/');
     *slash = '\0';
     rig_must(file_make_dirs(path, &err), &err, "file_make_dirs");

@@ -41,11 +41,8 @@ static inline void rig_open(struct rig *rig, const struct guard_limits *limits, 
     struct error err;
     log_set_level(LOG_WARNING);
     rig_must(store_open(&rig->store, rig->dir, &err), &err, "store_open");
-    struct scheduler_config work = {.data_dir = rig->dir,
-                                    .worker_binary = "/bin/false",
-                                    .max_running = 1,
-                                    .checkpoint_interval_sec = 60,
-                                    .stop_grace_sec = 1};
+    struct scheduler_config work = {
+        .data_dir = rig->dir, .max_running = 1, .checkpoint_interval_sec = 60, .stop_grace_sec = 1};
     rig_must(scheduler_new(&rig->scheduler, &work, rig->store, &err), &err, "scheduler_new");
     struct proxies *proxies = &rig->proxies; /* the test stands for many callers */
     rig_must(proxies_parse(proxies, "127.0.0.1", "X-Forwarded-For", &err), &err, "proxies_parse");
@@ -198,7 +195,7 @@ static inline int64_t rig_job(struct rig *rig) {
 static inline int rig_run_job(struct rig *rig, int64_t id) {
     struct error err;
     int attempt;
-    rig_must(store_job_start(rig->store, id, &attempt, &err), &err, "store_job_start");
+    rig_must(store_job_start(rig->store, id, "process", &attempt, &err), &err, "store_job_start");
     return attempt;
 }
 

@@ -38,7 +38,7 @@ churn "$("$build/unbake" show 1 --json)" & background=$!
 for n in 1 2; do
     unbaked backup --with-outputs "$work/copy$n" --data "$data" || fail "backup $n: $(cat "$work/err")"
     (cd "$work/copy$n" && sha256sum --quiet -c SHA256SUMS) || fail "backup $n is not what its list says"
-    wanted=$(sqlite3 "$work/copy$n/state.db" "SELECT job_id || '/out/' || outputs.name FROM outputs JOIN jobs ON jobs.id = job_id
+    wanted=$(sqlite3 "$work/copy$n/state.db" "SELECT job_id || '/attempt-' || outputs.attempt || '/out/' || outputs.name FROM outputs JOIN jobs ON jobs.id = job_id
         WHERE jobs.state IN (3, 4, 5) ORDER BY 1")
     for name in $wanted; do [ -e "$work/copy$n/jobs/$name" ] || fail "backup $n lacks $name"; done
     for id in $(ls "$work/copy$n/jobs"); do
@@ -49,13 +49,14 @@ wait "$background"; background=
 grep -q 'outputs; .* files with .* bytes' "$work/out" || fail "backup says: $(cat "$work/out")"
 equal "$(stat -c %a "$work/copy1")" 700 "mode of a backup"
 equal "$(ls -d "$work"/copy*part* 2>/dev/null)" "" "parts of backups"
-[ ! -e "$work/copy1/jobs/3/checkpoint.db" ] || fail "the checkpoint of a job that runs is in the backup"
-[ "$data/jobs/1/checkpoint.db" -ef "$work/copy1/jobs/1/checkpoint.db" ] && fail "a checkpoint is linked"
+[ ! -e "$work/copy1/jobs/3/attempt-1/checkpoint/checkpoint.db" ] || fail "the checkpoint of a job that runs is in the backup"
+[ -e "$work/copy1/jobs/1/attempt-1/checkpoint/checkpoint.db" ] || fail "a checkpoint is not in the backup"
+[ "$data/jobs/1/attempt-1/checkpoint/checkpoint.db" -ef "$work/copy1/jobs/1/attempt-1/checkpoint/checkpoint.db" ] && fail "a checkpoint is linked"
 refused 1 'is there already' unbaked backup --with-outputs "$work/copy1" --data "$data"
 
 # --- removed here, served there ---
 run 0 rm 1
-[ ! -e "$data/jobs/1/out" ] || fail "job 1 is still there"
+[ ! -e "$data/jobs/1" ] || fail "job 1 is still there"
 daemon_end TERM
 refused 1 'is not empty' unbaked restore "$work/copy1" "$data"
 refused 2 'is not a folder that' unbaked restore "$work/copy1/state.db" "$work/new"
@@ -75,22 +76,22 @@ grep -qi "warning\|error" <(grep -v 'min_free\|low_disk' "$work/log") && fail "t
 
 # --- damage ---
 cp -a "$work/copy2" "$work/damaged"
-target=$work/damaged/jobs/2/out/report.json
+target=$work/damaged/jobs/2/attempt-1/out/report.json
 cp --remove-destination "$target" "$work/whole"; rm "$target"; sed 's/0/1/' "$work/whole" >"$target"
-rm "$work/damaged/jobs/2/out/scene.glb"
+rm "$work/damaged/jobs/2/attempt-1/out/scene.glb"
 refused 1 '2 files' unbaked restore "$work/damaged" "$work/none"
 grep -q "report.json is damaged" "$work/err" || fail "$(cat "$work/err")"
 equal "$(ls -A "$work/none")" "" "what is left of a restore that failed"
 refused 1 'scene.glb is missing' unbaked restore --skip-damaged "$work/damaged" "$work/none"
 grep -q 'without those named above' "$work/out" || fail "restore says: $(cat "$work/out")"
-[ ! -e "$work/none/jobs/2/out/report.json" ] && [ -e "$work/none/jobs/2/out/base_color.exr" ] && [ -e "$work/none/state.db" ] ||
+[ ! -e "$work/none/jobs/2/attempt-1/out/report.json" ] && [ -e "$work/none/jobs/2/attempt-1/out/base_color.exr" ] && [ -e "$work/none/state.db" ] ||
     fail "what --skip-damaged restored"
 echo "$(printf '0%.0s' $(seq 64))  ../escaped" >>"$work/damaged/SHA256SUMS"
 refused 2 'SHA256SUMS:' unbaked restore "$work/damaged" "$work/climbed"
 [ ! -e "$work/escaped" ] || fail "a path led out"
 # In the data folder itself: told, and the rest is kept. A link in the place of an output is not followed.
 data=$old
-rm "$data/jobs/2/out/report.html"; ln -s /etc/passwd "$data/jobs/2/out/report.html"
+rm "$data/jobs/2/attempt-1/out/report.html"; ln -s /etc/passwd "$data/jobs/2/attempt-1/out/report.html"
 refused 1 'report.html is missing' unbaked backup --with-outputs "$work/copy4" --data "$data" # without a daemon
-[ -e "$work/copy4/jobs/2/out/base_color.exr" ] && [ ! -e "$work/copy4/jobs/2/out/report.html" ] || fail "a backup of damage"
+[ -e "$work/copy4/jobs/2/attempt-1/out/base_color.exr" ] && [ ! -e "$work/copy4/jobs/2/attempt-1/out/report.html" ] || fail "a backup of damage"
 finish

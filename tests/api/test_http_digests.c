@@ -151,7 +151,7 @@ int main(void) {
     part_by(&rig, job, etag, 200, other_etag);
 
     /* Written to in place, and its time of modification put back: the time of change tells. */
-    char *path = mem_printf("%s/jobs/%lld/out/big.exr", rig.dir, (long long)job);
+    char *path = mem_printf("%s/jobs/%lld/attempt-1/out/big.exr", rig.dir, (long long)job);
     struct stat info;
     int fd = open(path, O_WRONLY);
     CHECK(fd >= 0 && fstat(fd, &info) == 0 && pwrite(fd, "d", 1, 0) == 1);

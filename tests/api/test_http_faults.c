@@ -57,7 +57,8 @@ static void ended_job(void) {
 
 static void resumable_job(void) {
     ended_job();
-    char *dir = mem_printf("%s/jobs/%lld", rig.dir, (long long)job), *path = file_join(dir, "checkpoint.db");
+    char *dir = mem_printf("%s/jobs/%lld/attempt-1/checkpoint", rig.dir, (long long)job);
+    char *path = file_join(dir, "checkpoint.db");
     rig_must(file_make_dirs(dir, &err), &err, "a folder");
     rig_must(file_replace(path, "x", 1, &err), &err, "a checkpoint");
     mem_free(path);
@@ -67,7 +68,7 @@ static void resumable_job(void) {
 static void job_with_output(void) {
     queued_job();
     int attempt = rig_run_job(&rig, job);
-    char *dir = mem_printf("%s/jobs/%lld/out", rig.dir, (long long)job), *path = file_join(dir, "a.png");
+    char *dir = mem_printf("%s/jobs/%lld/attempt-1/out", rig.dir, (long long)job), *path = file_join(dir, "a.png");
     rig_must(file_make_dirs(dir, &err), &err, "a folder");
     rig_must(file_replace(path, "abc", 3, &err), &err, "an output");
     for (int i = 0; i < 2; i++)
@@ -314,7 +315,7 @@ static bool start_once(bool is_sql, long n) {
 }
 
 static long strike_start(void) {
-    struct scheduler_config work = {.data_dir = rig.dir, .worker_binary = "/bin/false", .max_running = 1};
+    struct scheduler_config work = {.data_dir = rig.dir, .max_running = 1};
     long calls = 0;
     snprintf(rig.dir, sizeof rig.dir, "%s/unbake-rig-XXXXXX", check_fast_dir());
     CHECK(mkdtemp(rig.dir) != NULL);

@@ -106,13 +106,13 @@ static void check_links(struct rig *rig) {
     int64_t job = rig_job(rig);
     int attempt = rig_run_job(rig, job);
     write_output(rig, job, "kept", "x", 1);
-    char *path = mem_printf("%s/jobs/%lld/out/link.exr", rig->dir, (long long)job);
+    char *path = mem_printf("%s/jobs/%lld/attempt-1/out/link.exr", rig->dir, (long long)job);
     CHECK(symlink("/etc/hostname", path) == 0);
     mem_free(path);
-    path = mem_printf("%s/jobs/%lld/out/folder", rig->dir, (long long)job);
+    path = mem_printf("%s/jobs/%lld/attempt-1/out/folder", rig->dir, (long long)job);
     CHECK(symlink("/etc", path) == 0);
     mem_free(path);
-    path = mem_printf("%s/jobs/%lld/out/pipe", rig->dir, (long long)job);
+    path = mem_printf("%s/jobs/%lld/attempt-1/out/pipe", rig->dir, (long long)job);
     CHECK(mkfifo(path, 0600) == 0);
     mem_free(path);
     static const char *const names[] = {"link.exr", "folder/hostname", "pipe", "folder"};

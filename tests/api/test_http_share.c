@@ -86,7 +86,7 @@ static void test_back_into_the_queue(const struct rig *rig, const char *token) {
     CHECK(ask(rig, token, post, 1, "/resume") == 429);
     CHECK(ask(rig, token, post, 2, "/retry") == 429);
     CHECK(ask(rig, token, post, 2, "/retry?from=load") == 429);
-    rig_must(store_job_start(rig->store, 3, &attempt, &err), &err, "start");
+    rig_must(store_job_start(rig->store, 3, "process", &attempt, &err), &err, "start");
     CHECK(ask(rig, token, post, 1, "/resume") == 202); /* one is no longer queued */
     CHECK(ask(rig, token, post, 2, "/retry") == 429);
 }

@@ -142,7 +142,7 @@ call POST "/v1/jobs/$job/retry?from=lunch"; expect 400; field .hint | grep -q re
 call POST "/v1/jobs/$job/retry?from=report"; expect 202; state "$job" queued
 move start "$job"; move succeed "$job" 5
 post "/v1/jobs/$job/extend" '{"looks":60}'; expect 409 "extend without a checkpoint"
-mkdir -p "$idle_dir/jobs/$job"; head -c 20000 /dev/zero >"$idle_dir/jobs/$job/checkpoint.db"
+mkdir -p "$idle_dir/jobs/$job/attempt-1/checkpoint"; head -c 20000 /dev/zero >"$idle_dir/jobs/$job/attempt-1/checkpoint/checkpoint.db"
 for bad in '{}' '[]' '{"time_limit_sec":1,"iterations":1}'; do post "/v1/jobs/$job/extend" "$bad"; expect 400 "extend by $bad"; done
 for bad in '{"looks":0}' '{"looks":"x"}' '{"looks":1e10}' '{"looks":1e-300}' '{"looks":1.5}' '{"iterations":5}' '{"time_limit_sec":60}'; do
     post "/v1/jobs/$job/extend" "$bad"; expect 422 "extend by $bad"

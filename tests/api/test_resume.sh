@@ -47,7 +47,7 @@ submit() {
 }
 # textures NAME: the hashes of what the job left.
 textures() {
-    (cd "$dir/$1/jobs/1/out" && sha256sum base_color.exr roughness.exr specular.exr emission.exr \
+    (cd "$(dirname "$dir/$1"/jobs/1/attempt-*/out/base_color.exr)" && sha256sum base_color.exr roughness.exr specular.exr emission.exr \
         confidence.exr base_color.png scene.ply scene.glb scene.obj scene.mtl scene.xml \
         scene.serialized) || fail "no textures in $1"
 }

@@ -276,7 +276,11 @@ static void record(const char *build, const char *archive) {
 static char *fingerprint(void) {
     sqlite3 *db = NULL;
     sqlite3_stmt *stmt = NULL;
-    char *path = mem_printf("%s/jobs/1/checkpoint.db", daemon_.data), *text = NULL;
+    struct error err;
+    char *holder = NULL, *text = NULL;
+    if (attempt_folder_with_checkpoint(daemon_.data, 1, &holder, &err) != STATUS_OK || !holder)
+        return NULL;
+    char *folder = layout_checkpoint(holder), *path = file_join(daemon_.data, folder);
     if (sqlite3_open(path, &db) == SQLITE_OK &&
         sqlite3_prepare_v2(db, "SELECT fingerprint FROM newest", -1, &stmt, NULL) == SQLITE_OK &&
         sqlite3_step(stmt) == SQLITE_ROW)
@@ -284,6 +288,8 @@ static char *fingerprint(void) {
     sqlite3_finalize(stmt);
     sqlite3_close(db);
     mem_free(path);
+    mem_free(folder);
+    mem_free(holder);
     return text;
 }
 

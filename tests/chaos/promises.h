@@ -15,6 +15,8 @@
 
 #include "common/log.h"
 #include "common/sha256.h"
+#include "server/data/attempt_folder.h"
+#include "server/data/layout.h"
 #include "server/uploads/resumable.h"
 #include "server/http/service.h"
 #include "server/worker/checkpoint.h"
@@ -56,12 +58,17 @@ static inline struct promise *promise_of(struct promises *p, const char *kind, c
     return made;
 }
 
-/* The name of the folder that holds the job whose worker spoke. */
-static inline const char *promise_worker(const struct cut *c, int node) {
+static inline const struct cut_step *promise_made(const struct cut *c, int node) {
     for (size_t i = 0; i < c->step_count; i++)
         if (c->step[i].op == OP_CREATE && c->step[i].node == node)
-            return c->step[i].name;
-    return "";
+            return &c->step[i];
+    return NULL;
+}
+
+/* The name of the folder that holds the job whose worker spoke, in its attempt's folder. */
+static inline const char *promise_worker(const struct cut *c, int node) {
+    const struct cut_step *attempt = promise_made(c, node), *job = attempt ? promise_made(c, attempt->folder) : NULL;
+    return job ? job->name : "";
 }
 
 static inline void promises_take(struct promises *p, const struct cut *c, const struct cut_step *s) {
@@ -150,7 +157,8 @@ static inline void promise_check_outputs(const struct promise *p, struct api *ap
         promise_lost(b, &b->lost, "job %s has succeeded and its outputs are not all there: %s", p->id, err.message);
     for (size_t i = 0; i < count; i++) {
         char hex[SHA256_HEX_SIZE];
-        char *path = mem_printf("%s/jobs/%s/out/%s", api->config.data_dir, p->id, rows[i].name);
+        char *path =
+            mem_printf("%s/jobs/%s/attempt-%d/out/%s", api->config.data_dir, p->id, rows[i].attempt, rows[i].name);
         if (sha256_of_file(path, hex, &err) != STATUS_OK || strcmp(hex, rows[i].sha256) != 0)
             promise_lost(b, &b->damaged, "job %s: its output %s is not what was announced", p->id, rows[i].name);
         mem_free(path);
@@ -208,9 +216,15 @@ static inline void promise_check_upload(const struct promise *p, struct api *api
 /* Every checkpoint that is there can be opened, and holds what was saved last, or more. */
 static inline void promise_check_checkpoint(const struct promise *p, const char *data, const char *fingerprint,
                                             struct broken *b) {
-    char *path = mem_printf("%s/jobs/%s/checkpoint.db", data, p->id), note[512];
     struct checkpoint *checkpoint = NULL;
     struct error err = {0};
+    char *holder = NULL, *folder, *path, note[512];
+    if (attempt_folder_with_checkpoint(data, strtoll(p->id, NULL, 10), &holder, &err) != STATUS_OK)
+        promise_lost(b, &b->lost, "job %s: %s", p->id, err.message);
+    folder = holder ? layout_checkpoint(holder) : mem_strdup("none");
+    path = file_join(data, folder);
+    mem_free(folder);
+    mem_free(holder);
     sqlite3 *db = NULL;
     sqlite3_stmt *stmt = NULL;
     if (access(path, F_OK) != 0) {
@@ -254,7 +268,7 @@ static inline void promises_check(const struct promises *p, const char *data, co
     struct store *store = NULL;
     struct scheduler *scheduler = NULL;
     struct api *api = NULL;
-    struct scheduler_config work = {.data_dir = data, .worker_binary = "/bin/false", .max_running = 1};
+    struct scheduler_config work = {.data_dir = data, .max_running = 1};
     struct api_config config = {.data_dir = data,
                                 .max_attempts = 2,
                                 .queue_limit = 1000,

@@ -17,7 +17,7 @@ set_clock() {
 hold() { "$build/tests/chaos/hold" "$work/faults" "$@"; }
 # The stream has something of another day than its first.
 clock_jumped() { jq -es '[.[].data.at[0:10]] | unique | length >= 2' "$work/stream"; }
-textures() { (cd "$data/jobs/$1/out" && sha256sum base_color.exr roughness.exr specular.exr emission.exr confidence.exr); }
+textures() { (cd "$(dirname "$data/jobs/$1"/attempt-*/out/base_color.exr)" && sha256sum base_color.exr roughness.exr specular.exr emission.exr confidence.exr); }
 
 make_room "$work/room"
 settings="--set texture_size=64 --set iterations=600 --set texels_per_iteration=256 --set cameras_per_texel=1 --set samples_per_camera=4 --set report_samples=1 --set seed=3"

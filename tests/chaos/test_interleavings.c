@@ -23,7 +23,7 @@ static enum status obey(struct rig *rig, const char *line, struct error *err) {
     if (sscanf(line, "%15s %lld %d", word, &job, &attempt) != 3)
         return error_set(err, STATUS_INPUT, "what is \"%s\"?", line);
     if (strcmp(word, "start") == 0)
-        return store_job_start(rig->store, job, &attempt, err);
+        return store_job_start(rig->store, job, "process", &attempt, err);
     if (strcmp(word, "succeed") == 0)
         return store_job_succeed(rig->store, job, attempt, err);
     if (strcmp(word, "fail") == 0)
@@ -274,7 +274,8 @@ static void submit(struct model *m) {
     *m = (struct model){.condition = QUEUED, .attempts_left = ATTEMPTS};
     sscanf(rig_body(&reply), "{\"id\":%lld", &m->id);
     buf_release(&reply);
-    char *folder = mem_printf("%s/jobs/%lld", dir, m->id), *file = file_join(folder, "checkpoint.db");
+    char *folder = mem_printf("%s/jobs/%lld/attempt-1/checkpoint", dir, m->id),
+         *file = file_join(folder, "checkpoint.db");
     struct error err;
     rig_must(file_make_dirs(folder, &err), &err, "a folder");
     rig_must(file_replace(file, "x", 1, &err), &err, "a file"); /* so that it can be extended */

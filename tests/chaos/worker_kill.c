@@ -28,7 +28,7 @@ static unsigned draw(unsigned limit) {
 /* Whether a transaction is under way: its journal is cut off when all is said. */
 static bool is_saving(const char *dir) {
     struct stat info;
-    char *path = file_join(dir, "checkpoint.db-journal");
+    char *path = file_join(dir, "checkpoint/checkpoint.db-journal");
     bool saving = stat(path, &info) == 0 && info.st_size > 0;
     mem_free(path);
     return saving;

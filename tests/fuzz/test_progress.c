@@ -9,6 +9,7 @@
 #include "common/mem.h"
 #include "server/http/views.h"
 #include "server/job/worker_messages.h"
+#include "server/job/lines.h"
 #include "server/job/outcome.h"
 #include "server/job/counters.h"
 #include "server/worker/progress.h"
@@ -55,6 +56,54 @@ static int pipe_of(const uint8_t *data, size_t size) {
     return ends[0];
 }
 
+/* A run that has said the bytes, and has ended. */
+struct said {
+    struct run run;
+    struct lines lines;
+    struct run_end end;
+};
+
+static struct said *said_of(struct run *run) { return (struct said *)(void *)run; }
+
+static void said_read(struct run *run, run_hear *each, void *user) {
+    struct said *said = said_of(run);
+    lines_read(&said->lines, SIZE_MAX, each, user);
+    run->long_lines = said->lines.dropped;
+}
+
+static bool said_ended(struct run *run, struct run_end *end, run_hear *each, void *user) {
+    said_read(run, each, user);
+    *end = said_of(run)->end;
+    return true;
+}
+
+static double said_cpu_sec(const struct run *run) {
+    (void)run;
+    return 0.0;
+}
+
+static char *said_last_words(const struct run *run, size_t limit) {
+    (void)run, (void)limit;
+    return mem_strdup("");
+}
+
+static void said_free(struct run *run) {
+    lines_release(&said_of(run)->lines);
+    mem_free(run);
+}
+
+static struct said *said_new(const uint8_t *data, size_t size) {
+    static const struct run_kind kind = {.read = said_read,
+                                         .ended = said_ended,
+                                         .cpu_sec = said_cpu_sec,
+                                         .last_words = said_last_words,
+                                         .free = said_free};
+    struct said *said = mem_calloc(1, sizeof *said);
+    said->run.kind = &kind;
+    lines_init(&said->lines, pipe_of(data, size));
+    return said;
+}
+
 /* A scene that waits for its check, whatever became of it the last time. */
 static void start_check(void) {
     struct error err;
@@ -69,7 +118,7 @@ static int64_t start_job(int *number) {
     int64_t id;
     bool replayed;
     MUST_OK(store_job_add(store, &job, 100, &id, &replayed, &err), &err);
-    MUST_OK(store_job_start(store, id, number, &err), &err);
+    MUST_OK(store_job_start(store, id, "process", number, &err), &err);
     return id;
 }
 
@@ -113,14 +162,16 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     static struct counters counters;
     struct attempt a = {.phase = ATTEMPT_ALIVE,
                         .iteration = -1.0,
+                        .data_dir = fuzz_folder(),
                         .dir = mem_strdup(fuzz_folder()),
-                        .worker = {.pid_fd = -1},
+                        .whole_dir = mem_strdup(fuzz_folder()),
                         .scene_id = CHECKED,
                         .settings = mem_strdup("{}"),
                         .number = 1};
     int64_t job_id = 0;
     if (size < 1 || size > SIZE_MAX_HERE) {
         mem_free(a.dir);
+        mem_free(a.whole_dir);
         mem_free(a.settings);
         return 0;
     }
@@ -131,12 +182,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         job_id = a.job_id = start_job(&a.number);
     else
         a.problems = cJSON_CreateArray();
-    buf_init(&a.worker.line, PROGRESS_LINE_MAX);
-    a.worker.log_path = mem_strdup("/dev/null");
-    a.worker.pipe_fd = pipe_of(data + 1, size - 1);
+    struct said *said = said_new(data + 1, size - 1);
+    said->end.code = data[0] & 2 ? PROGRESS_EXIT_OK : data[0] & 4 ? PROGRESS_EXIT_INPUT : PROGRESS_EXIT_FAILED;
+    a.run = &said->run;
     worker_messages_read(&a, store, &counters);
-    a.phase = ATTEMPT_ENDED;
-    a.wait_status = (data[0] & 2 ? PROGRESS_EXIT_OK : data[0] & 4 ? PROGRESS_EXIT_INPUT : PROGRESS_EXIT_FAILED) << 8;
+    MUST(a.phase == ATTEMPT_ENDED);
     struct error err;
     enum status status = outcome_settle(&a, store, NULL, &counters, &err);
     MUST_OK(status, &err);

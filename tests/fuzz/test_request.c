@@ -59,16 +59,16 @@ static void add_jobs(struct error *err) {
         .scene_id = SCENE, .name = "job", .labels = "{\"a\":\"b\"}", .settings = "{}", .max_attempts = 2};
     for (int i = 0; i < 4; i++)
         MUST_OK(store_job_add(lab.store, &job, 100, &id, &replayed, err), err);
-    MUST_OK(store_job_start(lab.store, 1, &attempt, err), err);
+    MUST_OK(store_job_start(lab.store, 1, "process", &attempt, err), err);
     sha256_of(text, strlen(text), digest);
-    put_file("jobs/1/out/preview/a.png", text);
+    put_file("jobs/1/attempt-1/out/preview/a.png", text);
     put_file("jobs/1/worker.log", "a line\nanother\n");
     put_file("jobs/1/checkpoint.db", "");
     MUST_OK(
         store_output_put(lab.store, 1, attempt, EVENT_OUTPUT, "preview/a.png", strlen(text), digest, "image/png", err),
         err);
     MUST_OK(store_job_succeed(lab.store, 1, attempt, err), err);
-    MUST_OK(store_job_start(lab.store, 2, &attempt, err), err);
+    MUST_OK(store_job_start(lab.store, 2, "process", &attempt, err), err);
     MUST_OK(store_job_pause(lab.store, 4, err), err);
 }
 
@@ -97,11 +97,8 @@ static void start_daemon(void) {
     add_jobs(&err);
     add_upload(&err);
     MUST_OK(store_token_add(lab.store, "ada", ROLE_USER, lab.token, &token_id, &err), &err);
-    struct scheduler_config work = {.data_dir = lab.dir,
-                                    .worker_binary = "/bin/false",
-                                    .max_running = 1,
-                                    .checkpoint_interval_sec = 60,
-                                    .stop_grace_sec = 1};
+    struct scheduler_config work = {
+        .data_dir = lab.dir, .max_running = 1, .checkpoint_interval_sec = 60, .stop_grace_sec = 1};
     MUST_OK(scheduler_new(&lab.scheduler, &work, lab.store, &err), &err);
     struct api_config config = {.data_dir = lab.dir,
                                 .max_attempts = 2,

@@ -56,7 +56,7 @@ static int64_t make_output(struct rig *rig) {
     struct error err;
     int64_t job = rig_job(rig);
     int attempt = rig_run_job(rig, job);
-    char *dir = mem_printf("%s/jobs/%lld/out", rig->dir, (long long)job), *path = file_join(dir, "large");
+    char *dir = mem_printf("%s/jobs/%lld/attempt-1/out", rig->dir, (long long)job), *path = file_join(dir, "large");
     rig_must(file_make_dirs(dir, &err), &err, "file_make_dirs");
     FILE *file = fopen(path, "w");
     CHECK(file && ftruncate(fileno(file), (off_t)OUTPUT_BYTES) == 0 && fclose(file) == 0);

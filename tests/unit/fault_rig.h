@@ -9,6 +9,7 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "common/protocol.h"
+#include "server/job/process.h"
 #include "server/job/scheduler_config.h"
 #include "server/store/store.h"
 #include "tests/check.h"
@@ -21,8 +22,9 @@ static struct error err;
 
 static char dir[64];
 static struct store *store;
+static struct process_executor at_home;
 static const struct scheduler_config config = {.data_dir = dir,
-                                               .worker_binary = "/proc/self/exe",
+                                               .executor = &at_home.executor,
                                                .max_running = 1,
                                                .thread_count = 1,
                                                .checkpoint_interval_sec = 60,
@@ -113,6 +115,7 @@ static inline void rig_start(void) {
     snprintf(dir, sizeof dir, "%s/unbake-test-faults-XXXXXX", check_fast_dir());
     if (!mkdtemp(dir))
         exit(1);
+    process_executor_init(&at_home, "/proc/self/exe", dir);
     OK(store_open(&store, dir, &err));
     OK(store_scene_add(store, SCENE_A, "scene", 1, 0, &existed, &err));
     OK(store_scene_ready(store, SCENE_A, NULL, "{}", &err));

@@ -14,6 +14,7 @@
 #include "common/file.h"
 #include "common/mem.h"
 #include "common/protocol.h"
+#include "server/job/process.h"
 #include "server/worker/progress.h"
 #include "tests/check.h"
 
@@ -44,14 +45,18 @@ static inline void on_term(int number) {
     told_to_stop = 1;
 }
 
-/* What is left of files that were being written, and files that have their names. */
-static const char *const scraps[] = {"job.json.tmp-a1B2c3", "out/a.exr.part", "out/compare/000.png.tmp-XYZxyz"};
-static const char *const kept[] = {"checkpoint.db", "out/a.exr", "out/compare/000.png", "out/tmp-a1B2c3"};
+/* What a killed worker has left that is of no use, and what is: out/tmp-a1B2c3 is announced. */
+static const char *const scraps[] = {"job.json.tmp-a1B2c3", "out/a.exr.part", "out/compare/000.png.tmp-XYZxyz",
+                                     "out/unannounced.exr"};
+static const char *const kept[] = {"checkpoint/checkpoint.db", "out/tmp-a1B2c3"};
 
 static inline void litter(const char *dir) {
-    char *inner = file_join(dir, "out/compare");
-    OK(file_make_dirs(inner, &err));
-    mem_free(inner);
+    static const char *const folders[] = {"out/compare", "checkpoint"};
+    for (size_t i = 0; i < sizeof folders / sizeof *folders; i++) {
+        char *inner = file_join(dir, folders[i]);
+        OK(file_make_dirs(inner, &err));
+        mem_free(inner);
+    }
     for (size_t i = 0; i < sizeof scraps / sizeof *scraps + sizeof kept / sizeof *kept; i++) {
         bool is_scrap = i < sizeof scraps / sizeof *scraps;
         char *path = file_join(dir, is_scrap ? scraps[i] : kept[i - sizeof scraps / sizeof *scraps]);
@@ -106,6 +111,8 @@ static inline int worker(const char *dir) {
 
 /* --- the daemon's side ------------------------------------------------------------------------ */
 
+static struct process_executor at_home; /* borrowed by the scheduler */
+
 struct daemon {
     char *dir;
     struct store *store;
@@ -124,7 +131,7 @@ static inline void *run_scheduler(void *argument) {
 
 static inline void daemon_start(struct daemon *d, int max_running, const char *binary) {
     struct scheduler_config config = {.data_dir = d->dir,
-                                      .worker_binary = binary,
+                                      .executor = process_executor_init(&at_home, binary, d->dir),
                                       .max_running = max_running,
                                       .thread_count = 4,
                                       .checkpoint_interval_sec = 60,

@@ -215,7 +215,7 @@ static enum status retry_job(void) {
     return store_job_retry(store, job, 9, "refine", &(struct count_limits){9, 9}, &err);
 }
 static enum status extend_job(void) { return store_job_extend(store, job, 9, "{}", NULL, &err); }
-static enum status start_job(void) { return store_job_start(store, job, &attempt, &err); }
+static enum status start_job(void) { return store_job_start(store, job, "process", &attempt, &err); }
 static enum status restarted_job(void) { return store_job_restarted(store, job, attempt, &err); }
 static enum status crash_job(void) { return store_job_crash(store, job, attempt, "why", "hint", 1, &err); }
 static enum status stop_job(void) { return store_job_stop(store, job, attempt, "why", &err); }
@@ -223,8 +223,8 @@ static enum status block_job(void) { return store_job_block(store, job, attempt,
 static enum status fail_job(void) { return store_job_fail(store, job, attempt, "why", "hint", &err); }
 static enum status succeed_job(void) { return store_job_succeed(store, job, attempt, &err); }
 static enum status delete_job(void) { return store_job_delete(store, second_job, &err); }
-static enum status explain(void) { return store_job_explain(store, "it waits", "", "", &err); }
-static enum status explain_no_more(void) { return store_job_explain(store, "", "it", "", &err); }
+static enum status explain(void) { return store_job_explain(store, 0, "it waits", "", "", &err); }
+static enum status explain_no_more(void) { return store_job_explain(store, 0, "", "it", "", &err); }
 static enum status reconcile(void) {
     size_t requeued;
     return store_reconcile(store, &requeued, &err);

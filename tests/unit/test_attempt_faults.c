@@ -272,7 +272,7 @@ static void check_restart(void) {
     struct attempt a = {0};
     struct job job;
     int64_t id = add_job("{}", NULL);
-    char *checkpoint = mem_printf("%s/jobs/%lld/checkpoint.db", dir, (long long)id);
+    char *checkpoint = mem_printf("%s/jobs/%lld/attempt-1/checkpoint/checkpoint.db", dir, (long long)id);
     OK(attempt_start_job(&a, &config, store, &figures, id, 1, &err));
     settle(&a);
     OK(file_replace(checkpoint, "old", 3, &err));

@@ -64,7 +64,7 @@ static bool is_trash_empty(void) {
 static void add_message(const char *url) {
     int number;
     int64_t id = add_job("{}", url);
-    OK(store_job_start(store, id, &number, &err));
+    OK(store_job_start(store, id, "process", &number, &err));
 }
 
 static enum status start(struct delivery *d, struct error *why) {

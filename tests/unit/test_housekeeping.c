@@ -4,6 +4,8 @@
 
 #include <time.h>
 
+#include "server/data/attempt_folder.h"
+
 #include "tests/unit/fault_rig.h"
 
 /* An hour and a minute from now, so that everything that has ended is old. */
@@ -24,17 +26,20 @@ static void write_file(const char *path) { OK(file_replace(path, "x", 1, &err));
 
 /* The files that a job has, and one that was being written. */
 static struct job_files make_files(int64_t id) {
-    struct job_files f = {.id = id, .dir = mem_printf("%s/jobs/%lld", dir, (long long)id)};
-    f.checkpoint = file_join(f.dir, "checkpoint.db");
-    f.journal = file_join(f.dir, "checkpoint.db-journal");
+    struct job_files f = {.id = id, .dir = mem_printf("%s/jobs/%lld/attempt-1", dir, (long long)id)};
+    f.checkpoint = file_join(f.dir, "checkpoint/checkpoint.db");
+    f.journal = file_join(f.dir, "checkpoint/checkpoint.db-journal");
     f.scrap = file_join(f.dir, "out/compare/a.png.part");
     f.output = file_join(f.dir, "out/compare/a.png");
-    char *out = file_join(f.dir, "out/compare");
+    char *out = file_join(f.dir, "out/compare"), *checkpoint = file_join(f.dir, "checkpoint");
     OK(file_make_dirs(out, &err));
+    OK(file_make_dirs(checkpoint, &err));
     write_file(f.checkpoint);
     write_file(f.journal);
     write_file(f.scrap);
     write_file(f.output);
+    OK(store_output_put(store, id, 1, EVENT_OUTPUT, "compare/a.png", 1, SCENE_A, "image/png", &err));
+    mem_free(checkpoint);
     mem_free(out);
     return f;
 }
@@ -52,7 +57,7 @@ static bool is_there(const char *path) { return access(path, F_OK) == 0; }
 static int64_t start_job(void) {
     int number;
     int64_t id = add_job("{}", NULL);
-    OK(store_job_start(store, id, &number, &err));
+    OK(store_job_start(store, id, "process", &number, &err));
     OK(store_event_add(store, id, number, EVENT_LOG, "{\"level\":\"info\",\"message\":\"x\"}", &err));
     return id;
 }
@@ -91,7 +96,9 @@ static bool run_once(bool is_sql, long n, bool stays) {
     CHECK_THAT(!is_there(f.checkpoint) && !is_there(f.journal) && count_events(id) == 1, "call %ld: it does not go", n);
     CHECK(is_there(f.output) && is_there(running.checkpoint) && is_there(failed.checkpoint));
     CHECK(count_events(running.id) == running_events);
-    OK(file_remove_tree(f.dir, &err));
+    char *job = mem_printf("%s/jobs/%lld", dir, (long long)id);
+    OK(file_remove_tree(job, &err));
+    mem_free(job);
     release_files(&f);
     return struck;
 }
@@ -124,10 +131,10 @@ static void check_words(void) {
     CHECK(!is_there(running.scrap));
     strike_system("unlinkat", 1, false);
     err = (struct error){0};
-    CHECK(housekeeping_drop_checkpoint(running.dir, &err) == STATUS_IO && strstr(err.message, running.journal));
+    CHECK(attempt_folder_drop_checkpoint(dir, running.id, &err) == STATUS_IO && strstr(err.message, running.journal));
     CHECK(lift() && is_there(running.checkpoint) && is_there(running.journal));
-    OK(housekeeping_drop_checkpoint(running.dir, &err));
-    OK(housekeeping_drop_checkpoint(running.dir, &err)); /* there is none */
+    OK(attempt_folder_drop_checkpoint(dir, running.id, &err));
+    OK(attempt_folder_drop_checkpoint(dir, running.id, &err)); /* there is none */
     CHECK(!is_there(running.checkpoint) && !is_there(running.journal) && is_there(running.output));
 }
 

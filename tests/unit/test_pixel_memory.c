@@ -46,7 +46,7 @@ static void hash_outputs(const char *folder, struct buf *hashes) {
 
 /* From the beginning, with what it said in `said`. */
 static enum status run(const struct order *with, struct buf *said, struct buf *hashes) {
-    static const char *const former[] = {"checkpoint.db", "checkpoint.db-wal", "checkpoint.db-shm", "out"};
+    static const char *const former[] = {"checkpoint", "out"};
     char text[1 << 16], *path = file_join(dir, "said"), *out = file_join(dir, "out");
     for (size_t i = 0; i < sizeof former / sizeof *former; i++) {
         char *old = file_join(dir, former[i]);

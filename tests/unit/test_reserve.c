@@ -129,7 +129,7 @@ int main(void) {
     for (size_t i = 0; i < JOBS; i++)
         ids[i] = add_job(store, SCENE_A, 0);
     for (int k = 0; k < 2; k++)
-        OK(store_job_start(store, ids[k], &attempt[k], &err));
+        OK(store_job_start(store, ids[k], "process", &attempt[k], &err));
     for (int i = 0; i < EVENTS; i++)
         for (int k = 0; k < 2; k++)
             OK(store_event_add(store, ids[k], attempt[k], EVENT_METRIC, "{\"series\":\"loss\",\"step\":1,\"value\":2}",
@@ -145,7 +145,7 @@ int main(void) {
     /* A daemon that ended, killed or not, on a disk that is full now. */
     int64_t id = add_job(store, SCENE_A, 0);
     size_t requeued;
-    OK(store_job_start(store, id, &attempt[0], &err));
+    OK(store_job_start(store, id, "process", &attempt[0], &err));
     store_close(store);
     fill_disk();
     OK(store_open(&store, dir, &err));

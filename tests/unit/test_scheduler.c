@@ -33,7 +33,7 @@ static int check_surroundings(const char *dir) {
     sigset_t blocked;
     sigprocmask(SIG_SETMASK, NULL, &blocked);
     bad += sigismember(&blocked, SIGTERM) != 0;
-    char *log = file_join(dir, "worker.log");
+    char *log = file_join(dir, "../worker.log");
     bad += access(log, F_OK) != 0;
     mem_free(log);
     return bad;
@@ -132,6 +132,7 @@ static int play(const char *role, const char *dir, int attempt) {
     }
     if (strcmp(role, "killed") == 0) {
         litter(dir);
+        progress_file(&p, "output", "tmp-a1B2c3", 0, SCENE_A, "text/plain");
         kill(getpid(), SIGKILL);
     }
     if (strcmp(role, "silent") == 0)
@@ -365,7 +366,7 @@ static void test_outcomes(struct daemon *d) {
     expect(d, full, JOB_PAUSED, 1, "disk full: checkpoint.db", "resume");
     expect(d, memory, JOB_FAILED, 2, "could not allocate 12345", "smaller texture_size");
     expect(d, killed, JOB_FAILED, 2, "killed from outside", "smaller texture_size");
-    char *killed_dir = mem_printf("%s/jobs/%lld", d->dir, (long long)killed);
+    char *killed_dir = mem_printf("%s/jobs/%lld/attempt-2", d->dir, (long long)killed);
     CHECK(is_tidy(killed_dir));
     mem_free(killed_dir);
     expect(d, silent, JOB_FAILED, 2, "without a result", "");

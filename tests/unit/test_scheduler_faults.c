@@ -10,6 +10,7 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "common/protocol.h"
+#include "server/job/process.h"
 #include "server/worker/progress.h"
 #include "tests/check.h"
 #include "tests/system_faults.h"
@@ -98,8 +99,9 @@ static void arm(bool is_sql, long n) {
 static long lift(bool is_sql) { return atomic_exchange(is_sql ? &sql_faults_left : &system_faults_left, 0); }
 
 static bool begin(pthread_t *thread) {
+    static struct process_executor at_home;
     struct scheduler_config config = {.data_dir = dir,
-                                      .worker_binary = "/proc/self/exe",
+                                      .executor = process_executor_init(&at_home, "/proc/self/exe", dir),
                                       .max_running = 1,
                                       .thread_count = 1,
                                       .checkpoint_interval_sec = 60,

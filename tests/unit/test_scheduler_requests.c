@@ -125,7 +125,7 @@ static void test_daemon_killed(struct daemon *d) {
     pid_t child = fork();
     if (child == 0) {
         struct scheduler_config config = {.data_dir = d->dir,
-                                          .worker_binary = "/proc/self/exe",
+                                          .executor = process_executor_init(&at_home, "/proc/self/exe", d->dir),
                                           .max_running = 1,
                                           .thread_count = 1,
                                           .stop_grace_sec = 1};
@@ -143,7 +143,7 @@ static void test_daemon_killed(struct daemon *d) {
     int64_t id = 0;
     CHECK(read(ends[0], &id, sizeof id) == (ssize_t)sizeof id);
     close(ends[0]);
-    char *job_dir = mem_printf("%s/jobs/%lld", d->dir, (long long)id);
+    char *job_dir = mem_printf("%s/jobs/%lld/attempt-1", d->dir, (long long)id);
     pid_t pid = 0;
     for (int i = 0; i < WAIT_TRIES && !pid; i++) {
         usleep(WAIT_US);
@@ -156,6 +156,9 @@ static void test_daemon_killed(struct daemon *d) {
         usleep(WAIT_US);
     CHECK_THAT(worker_pid(job_dir) == 0, "worker %d outlived its daemon", (int)pid);
     litter(job_dir);
+    OK(store_open(&d->store, d->dir, &err));
+    OK(store_output_put(d->store, id, 1, EVENT_OUTPUT, "tmp-a1B2c3", 0, SCENE_A, "text/plain", &err));
+    store_close(d->store);
 
     daemon_start(d, 1, "/proc/self/exe");
     struct job job = {0};
@@ -165,7 +168,19 @@ static void test_daemon_killed(struct daemon *d) {
         OK(store_job_get(d->store, id, &job, &err));
     }
     CHECK(job.attempt == 2 && job.attempts_left == 2);
+    /* The second attempt has its checkpoint now. */
+    char *former = file_join(job_dir, "checkpoint"), *present = mem_printf("%s/../attempt-2/checkpoint", job_dir);
+    for (int i = 0; i < WAIT_TRIES && access(former, F_OK) == 0; i++)
+        usleep(WAIT_US);
+    CHECK(file_is_in(present, "checkpoint.db"));
+    OK(file_make_dirs(former, &err));
+    char *there = file_join(former, "checkpoint.db");
+    OK(file_replace(there, "", 0, &err));
     CHECK(is_tidy(job_dir));
+    OK(file_remove_tree(former, &err));
+    mem_free(there);
+    mem_free(present);
+    mem_free(former);
     job_release(&job);
     OK(store_job_cancel(d->store, id, &err));
     scheduler_wake(d->scheduler);

@@ -104,7 +104,7 @@ static void test_orphans(struct daemon *d) {
         bool replayed;
         sql_faults_arm_only("FROM jobs", 1, true); /* the scheduler finds neither the one nor the other */
         OK(store_job_add(d->store, &new, 1000, &id, &replayed, &err));
-        OK(store_job_start(d->store, id, &number, &err));
+        OK(store_job_start(d->store, id, "process", &number, &err));
         sql_faults_arm_only(NULL, n, n % 2);
         for (int i = 0; i < WAIT_TRIES && atomic_load(&sql_faults_left) > 0; i++)
             let_go_on(d, 1);
@@ -128,7 +128,7 @@ static void test_orphans(struct daemon *d) {
 static void test_unsettled(struct daemon *d) {
     daemon_start(d, 1, "/proc/self/exe");
     int64_t id = submit(d, SCENE_A, "waits");
-    char *go = mem_printf("%s/jobs/%lld/go", d->dir, (long long)id);
+    char *go = mem_printf("%s/jobs/%lld/attempt-1/go", d->dir, (long long)id);
     CHECK(wait_for(d, id, JOB_RUNNING, NULL));
     let_go_on(d, 3);
     sql_faults_arm_only("BEGIN IMMEDIATE", 1, true);
@@ -148,7 +148,8 @@ static void test_unsettled(struct daemon *d) {
 static void test_start(struct daemon *d) {
     static const char *const statements[] = {"SELECT id FROM jobs WHERE state = ? LIMIT 1",
                                              "UPDATE scenes SET problems = '[]'"};
-    struct scheduler_config config = {.data_dir = d->dir, .worker_binary = "/proc/self/exe", .max_running = 1};
+    struct scheduler_config config = {
+        .data_dir = d->dir, .executor = process_executor_init(&at_home, "/proc/self/exe", d->dir), .max_running = 1};
     OK(store_open(&d->store, d->dir, &err));
     OK(scheduler_new(&d->scheduler, &config, d->store, &err));
     scheduler_stop(d->scheduler);
@@ -169,7 +170,7 @@ static void test_start(struct daemon *d) {
 /* No disk has so much room. */
 static void test_low_disk(struct daemon *d) {
     struct scheduler_config config = {.data_dir = d->dir,
-                                      .worker_binary = "/proc/self/exe",
+                                      .executor = process_executor_init(&at_home, "/proc/self/exe", d->dir),
                                       .max_running = 1,
                                       .low_disk_bytes = UINT64_MAX / 2,
                                       .stop_grace_sec = 1};

@@ -50,7 +50,7 @@ static int worker(const char *folder) {
         progress_scene(&p, cJSON_CreateObject());
     } else {
         progress_space(&p, NAMELESS);
-        write_file(folder, "checkpoint.db", 128);
+        write_file(folder, "checkpoint/checkpoint.db", 128);
         write_file(folder, "out/a.exr", 64);
         progress_file(&p, "output", "a.exr", 64 * KIB, SCENE_A, "image/x-exr");
     }
@@ -175,7 +175,7 @@ static void test_large_scene(void) {
 /* A job counts with all of its folder once an attempt has ended, and no longer with a checkpoint that is removed. */
 static void test_job(void) {
     int64_t before = kept_by(ALICE), id = job_of(ALICE);
-    char *folder = job_dir(id), *checkpoint = file_join(folder, "checkpoint.db");
+    char *folder = job_dir(id), *checkpoint = file_join(folder, "attempt-1/checkpoint/checkpoint.db");
     CHECK(kept_by(ALICE) == before && disk_of(id) == 0);
     CHECK(run_job(id, 0));
     int64_t size = size_of(folder);
@@ -190,7 +190,10 @@ static void test_job(void) {
     CHECK(kept_by(ALICE) == before + disk_of(id));
 
     /* What cannot be removed is still there at the next start. */
-    write_file(folder, "checkpoint.db", 128);
+    char *inner = file_join(folder, "attempt-1/checkpoint");
+    OK(file_make_dirs(inner, &err));
+    mem_free(inner);
+    write_file(folder, "attempt-1/checkpoint/checkpoint.db", 128);
     strike_system("unlinkat", 1, true);
     housekeeping_run(&with, store);
     CHECK(lift() && disk_of(id) == -1);
@@ -213,7 +216,7 @@ static void test_job(void) {
 static void test_running(void) {
     int64_t before = kept_by(ALICE), id = job_of(ALICE);
     int number;
-    OK(store_job_start(store, id, &number, &err));
+    OK(store_job_start(store, id, "process", &number, &err));
     OK(store_output_put(store, id, number, EVENT_OUTPUT, "a.exr", 1000, SCENE_A, "x/y", &err));
     CHECK(kept_by(ALICE) == before + 1000);
     OK(store_disk_enter(store, &(struct disk_use){.job_id = id, .bytes = 5000}, 1, &err));
@@ -231,7 +234,7 @@ static void test_nameless(void) {
     const struct scheduler_config with = limited((uint64_t)before + 5000 * KIB);
     struct attempt a = {0};
     double left = 0.0;
-    char *folder = job_dir(id), *path = file_join(folder, "job.json");
+    char *folder = job_dir(id), *path = file_join(folder, "attempt-1/job.json");
     cJSON *order = NULL;
     OK(attempt_start_job(&a, &with, store, &figures, id, 1, &err));
     OK(json_read(path, 1 << 20, &order, &err));
@@ -276,12 +279,13 @@ static void test_full(void) {
 /* A daemon is killed while a job runs, which has written what was never entered: the next start finds it. */
 static void test_killed(void) {
     int64_t before = kept_by(BOB), id = job_of(BOB);
-    char *folder = job_dir(id), *out = file_join(folder, "out");
+    char *folder = job_dir(id), *out = file_join(folder, "attempt-2/out");
     int number;
     size_t requeued;
     CHECK(run_job(id, 0));
     OK(store_job_retry(store, id, 3, "solve", NULL, &err));
-    OK(store_job_start(store, id, &number, &err));
+    OK(store_job_start(store, id, "process", &number, &err));
+    OK(file_make_dirs(out, &err));
     write_file(out, "b.exr", 512);
     store_close(store);
     OK(store_open(&store, dir, &err));

@@ -24,7 +24,7 @@ static int64_t job_in(struct store *store, enum condition condition, int *attemp
         OK(store_job_cancel(store, id, &err));
     if (condition == QUEUED || condition == PAUSED || condition == CANCELLED)
         return id;
-    OK(store_job_start(store, id, attempt, &err));
+    OK(store_job_start(store, id, "process", attempt, &err));
     if (condition == PAUSING)
         OK(store_job_pause(store, id, &err));
     if (condition == CANCELLING)
@@ -80,7 +80,7 @@ static void test_transitions(void) {
             case RETRY: status = store_job_retry(store, id, 3, NULL, NULL, &err); break;
             case AGAIN: status = store_job_retry(store, id, 3, "report", NULL, &err); break;
             case EXTEND: status = store_job_extend(store, id, 3, "{\"seed\":2}", NULL, &err); break;
-            case START: status = store_job_start(store, id, &started, &err); break;
+            case START: status = store_job_start(store, id, "process", &started, &err); break;
             case SUCCEED: status = store_job_succeed(store, id, attempt, &err); break;
             case FAIL: status = store_job_fail(store, id, attempt, "r", "h", &err); break;
             case CRASH: status = store_job_crash(store, id, attempt, "r", "h", 0, &err); break;
@@ -113,9 +113,9 @@ static void test_attempts(void) {
     int64_t id = add_job(store, SCENE_A, 0);
     int first, second, third;
     struct job job;
-    OK(store_job_start(store, id, &first, &err));
+    OK(store_job_start(store, id, "process", &first, &err));
     OK(store_job_crash(store, id, first, "signal 11", "", 0, &err));
-    OK(store_job_start(store, id, &second, &err));
+    OK(store_job_start(store, id, "process", &second, &err));
     CHECK(second == first + 1);
 
     /* The first attempt's process is still there and reports: every report is refused. */
@@ -130,7 +130,7 @@ static void test_attempts(void) {
 
     /* A stop that we asked for costs no attempt, the second crash is the last. */
     OK(store_job_stop(store, id, second, "shutdown", &err));
-    OK(store_job_start(store, id, &third, &err));
+    OK(store_job_start(store, id, "process", &third, &err));
     OK(store_job_crash(store, id, third, "signal 6", "try less", 0, &err));
     OK(store_job_get(store, id, &job, &err));
     CHECK(job.state == JOB_FAILED && job.attempt == third && job.attempts_left == 0);
@@ -142,7 +142,7 @@ static void test_attempts(void) {
 
     /* A retry is a new life, but numbers of attempts are not used again. */
     OK(store_job_retry(store, id, 2, NULL, NULL, &err));
-    OK(store_job_start(store, id, &first, &err));
+    OK(store_job_start(store, id, "process", &first, &err));
     CHECK(first == third + 1);
     OK(store_job_get(store, id, &job, &err));
     CHECK(job.attempts_left == 2 && job.reason[0] == '\0' && job.finished_ms == 0);
@@ -207,7 +207,7 @@ static void check_order(struct queue *q) {
     for (size_t i = 0; i < 3; i++) {
         OK(store_job_next(store, 0, &next, &err));
         CHECK(next == order[i]);
-        OK(store_job_start(store, next, &attempt, &err));
+        OK(store_job_start(store, next, "process", &attempt, &err));
     }
     IS(store_job_next(store, 0, &next, &err), STATUS_NOT_FOUND);
     OK(store_scene_reject(store, SCENE_B, NULL, "[]", "{}", &err));

@@ -163,9 +163,9 @@ static void test_reading_and_jobs(void) {
     IS(read_as(store, &alice, OPENCV), STATUS_CONFLICT);
     CHECK_THAT(strstr(err.message, "another user") && *err.hint, "%s", err.message);
     OK(read_as(store, &admin, OPENCV));
-    IS(store_job_start(store, job, &attempt, &err), STATUS_CONFLICT); /* while it is checked */
+    IS(store_job_start(store, job, "process", &attempt, &err), STATUS_CONFLICT); /* while it is checked */
     OK(store_scene_ready(store, SCENE_A, OPENCV, "{}", &err));
-    OK(store_job_start(store, job, &attempt, &err));
+    OK(store_job_start(store, job, "process", &attempt, &err));
     IS(read_as(store, &admin, "{}"), STATUS_CONFLICT);
     CHECK_THAT(strstr(err.message, "has begun") && strstr(err.hint, "Cancel"), "%s", err.message);
     OK(store_job_stop(store, job, attempt, "", &err)); /* it waits, with a checkpoint */
@@ -227,7 +227,7 @@ static void test_events(void) {
     add_ready_scene(store, SCENE_A);
     CHECK(changed_job == 0 && changed_count == 2);
     int64_t id = add_job(store, SCENE_A, 0), other = add_job(store, SCENE_A, 0);
-    OK(store_job_start(store, id, &attempt, &err));
+    OK(store_job_start(store, id, "process", &attempt, &err));
     CHECK(changed_job == id);
     for (int i = 0; i < 20; i++) {
         char text[128];
@@ -352,7 +352,7 @@ static void test_outbox(void) {
     OK(store_outbox_wait(store, &wait, &err));
     CHECK(isinf(wait));
     OK(store_job_add(store, &new, 1000, &id, &replayed, &err));
-    OK(store_job_start(store, id, &attempt, &err));
+    OK(store_job_start(store, id, "process", &attempt, &err));
     OK(store_job_succeed(store, id, attempt, &err));
     OK(store_outbox_next(store, 0, NULL, 0, &first, &err));
     OK(store_outbox_next(store, first.id, NULL, 0, &second, &err));
@@ -391,7 +391,7 @@ static void test_pruned_twice(void) {
     for (int life = 0; life < 3; life++) {
         int attempt;
         bool more = true;
-        OK(store_job_start(store, id, &attempt, &err));
+        OK(store_job_start(store, id, "process", &attempt, &err));
         for (int i = 0; i < 5; i++)
             OK(store_event_add(store, id, attempt, EVENT_LOG, "{}", &err));
         OK(store_job_fail(store, id, attempt, "x", "", &err));
@@ -487,7 +487,7 @@ static void test_output_digest(void) {
     OK(store_open(&store, dir, &err));
     add_ready_scene(store, SCENE_A);
     int64_t id = add_job(store, SCENE_A, 0);
-    OK(store_job_start(store, id, &attempt, &err));
+    OK(store_job_start(store, id, "process", &attempt, &err));
     IS(store_output_next_digest(store, &of, &row, &err), STATUS_NOT_FOUND);
     OK(store_output_put(store, id, attempt, EVENT_OUTPUT, "a", 3, SCENE_A, "x/y", &err));
     OK(store_output_next_digest(store, &of, &first, &err));

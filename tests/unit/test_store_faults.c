@@ -83,7 +83,7 @@ static void check_refusals(void) {
     char cursor[128], hash[2];
     int number;
     bool is_gone;
-    IS(store_job_start(store, 77, &number, &err), STATUS_NOT_FOUND);
+    IS(store_job_start(store, 77, "process", &number, &err), STATUS_NOT_FOUND);
     IS(store_job_delete(store, 77, &err), STATUS_NOT_FOUND);
     IS(store_event_add(store, 77, 1, EVENT_LOG, "{}", &err), STATUS_NOT_FOUND);
     IS(store_event_list(store, 77, 0, 9, no_event, NULL, &err), STATUS_OK);

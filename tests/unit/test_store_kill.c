@@ -60,7 +60,7 @@ static void child(const char *dir, int first_key, int fd) {
         tell(fd, &a);
         if (key % 4 == 0)
             continue;
-        if (store_job_start(store, a.id, &a.attempt, &err) != STATUS_OK)
+        if (store_job_start(store, a.id, "process", &a.attempt, &err) != STATUS_OK)
             _exit(4);
         a.state = JOB_RUNNING;
         tell(fd, &a);

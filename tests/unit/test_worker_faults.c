@@ -70,7 +70,7 @@ static void check_attempts(void) {
     CHECK(cJSON_GetObjectItem(json, "reduced_after_out_of_memory") != NULL);
     cJSON_Delete(json);
     mem_free(report);
-    put("checkpoint.db", "this is no database, whatever it says; it is told, and a new one is begun");
+    put("checkpoint/checkpoint.db", "this is no database, whatever it says; it is told, and a new one is begun");
     OK(reconstruct("{" TINY_SETTINGS "}", scene, ""));
 
     CHECK(reconstruct("{\"iterations\":\"many\"}", scene, "") == STATUS_INPUT && strstr(err.message, "iterations"));
@@ -92,7 +92,7 @@ static void check_attempts(void) {
                    n, status_name(read), err.message);
         is_output = strstr(err.message, "/out/") != NULL;
     }
-    put("checkpoint.db", ""); /* all is to be saved again */
+    put("checkpoint/checkpoint.db", ""); /* all is to be saved again */
     faults_are_off = false;
     sql_break();
     sql_faults_only = "INSERT INTO tiles";

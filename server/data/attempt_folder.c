@@ -1,0 +1,274 @@
+/* attempt_folder.c -- see attempt_folder.h. */
+#include "server/data/attempt_folder.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "common/file.h"
+#include "common/log.h"
+#include "common/mem.h"
+#include "server/data/layout.h"
+
+/* The numbers of the attempts that have folders, ascending; *numbers is the caller's. */
+static enum status list_attempts(const char *data_dir, int64_t job_id, int **numbers, size_t *count,
+                                 struct error *err) {
+    char *dir = layout_job(data_dir, job_id), **names = NULL;
+    size_t name_count = 0;
+    *numbers = NULL;
+    *count = 0;
+    enum status status = file_list(dir, &names, &name_count, err);
+    if (status == STATUS_NOT_FOUND) /* a job that has not begun */
+        status = STATUS_OK;
+    *numbers = mem_array(name_count + 1, sizeof **numbers);
+    for (size_t i = 0; status == STATUS_OK && i < name_count; i++) {
+        int number = layout_attempt_number(names[i]);
+        size_t at = number > 0 ? (*count)++ : 0;
+        for (; number > 0 && at > 0 && (*numbers)[at - 1] > number; at--)
+            (*numbers)[at] = (*numbers)[at - 1];
+        if (number > 0)
+            (*numbers)[at] = number;
+    }
+    file_free_names(names, name_count);
+    mem_free(dir);
+    return status;
+}
+
+/* Whether there is such a file or folder. */
+static enum status look(const char *path, bool *exists, struct error *err) {
+    struct stat info;
+    *exists = lstat(path, &info) == 0;
+    return *exists || errno == ENOENT || errno == ENOTDIR ? STATUS_OK
+                                                          : error_set_errno(err, errno, "cannot look at %s", path);
+}
+
+/* Moves a file or folder, durably; one that is absent is no error. */
+static enum status move(const char *from, const char *to, struct error *err) {
+    if (rename(from, to) != 0)
+        return errno == ENOENT ? STATUS_OK : error_set_errno(err, errno, "cannot move %s to %s", from, to);
+    enum status status = file_sync_parent(to, err);
+    return status == STATUS_OK ? file_sync_parent(from, err) : status;
+}
+
+/* --- checkpoints --------------------------------------------------------------------------- */
+
+/* Moves the checkpoint's folder of the newest attempt that has one. */
+static enum status take_over(const char *data_dir, int64_t job_id, int number, const char *to, struct error *err) {
+    int *others;
+    size_t count;
+    bool exists = false;
+    enum status status = list_attempts(data_dir, job_id, &others, &count, err);
+    for (size_t i = count; i-- > 0 && status == STATUS_OK && !exists;) {
+        char *dir = layout_attempt(data_dir, job_id, others[i]), *from = layout_checkpoint_folder(dir);
+        if (others[i] != number)
+            status = look(from, &exists, err);
+        if (status == STATUS_OK && exists)
+            status = move(from, to, err);
+        mem_free(from);
+        mem_free(dir);
+    }
+    mem_free(others);
+    return status;
+}
+
+enum status attempt_folder_begin(const char *data_dir, int64_t job_id, int number, struct error *err) {
+    char *dir = layout_attempt(data_dir, job_id, number), *out = layout_out(dir);
+    char *checkpoint = layout_checkpoint_folder(dir);
+    bool exists = false;
+    enum status status = file_make_dirs(out, err);
+    if (status == STATUS_OK)
+        status = look(checkpoint, &exists, err);
+    if (status == STATUS_OK && !exists)
+        status = take_over(data_dir, job_id, number, checkpoint, err);
+    if (status == STATUS_OK)
+        status = file_make_dirs(checkpoint, err);
+    mem_free(checkpoint);
+    mem_free(out);
+    mem_free(dir);
+    return status;
+}
+
+enum status attempt_folder_with_checkpoint(const char *data_dir, int64_t job_id, char **work_dir, struct error *err) {
+    int *numbers;
+    size_t count;
+    bool exists = false;
+    *work_dir = NULL;
+    enum status status = list_attempts(data_dir, job_id, &numbers, &count, err);
+    for (size_t i = count; i-- > 0 && status == STATUS_OK && !exists;) {
+        char *dir = layout_attempt(data_dir, job_id, numbers[i]), *path = layout_checkpoint(dir);
+        status = look(path, &exists, err);
+        if (exists)
+            *work_dir = layout_attempt(NULL, job_id, numbers[i]);
+        mem_free(path);
+        mem_free(dir);
+    }
+    mem_free(numbers);
+    return status;
+}
+
+enum status attempt_folder_drop_checkpoint(const char *data_dir, int64_t job_id, struct error *err) {
+    int *numbers;
+    size_t count;
+    enum status status = list_attempts(data_dir, job_id, &numbers, &count, err);
+    for (size_t i = 0; i < count; i++) {
+        /* The journal first: it must never meet another database. */
+        char *dir = layout_attempt(data_dir, job_id, numbers[i]);
+        char *parts[] = {layout_checkpoint_journal(dir), layout_checkpoint(dir), layout_checkpoint_folder(dir)};
+        for (size_t k = 0; k < sizeof parts / sizeof *parts; k++) {
+            if (status == STATUS_OK)
+                status = file_remove_tree(parts[k], err);
+            mem_free(parts[k]);
+        }
+        mem_free(dir);
+    }
+    mem_free(numbers);
+    return status;
+}
+
+/* --- what no row names ----------------------------------------------------------------------- */
+
+struct tidying {
+    const struct output_row *rows; /* [count], by name */
+    size_t count;
+    int number;     /* of the attempt */
+    bool has_files; /* something of it stays */
+};
+
+static bool is_named(const struct tidying *t, const char *name) {
+    size_t low = 0, high = t->count;
+    while (low < high) {
+        size_t middle = low + (high - low) / 2;
+        int order = strcmp(name, t->rows[middle].name);
+        if (order == 0)
+            return t->rows[middle].attempt == t->number;
+        low = order > 0 ? middle + 1 : low;
+        high = order < 0 ? middle : high;
+    }
+    return false;
+}
+
+/* `name` is that of the folder as outputs have it; "": out/ itself. Symbolic links are files here. */
+static enum status tidy_folder(struct tidying *t, const char *path, const char *name, struct error *err) {
+    char **names = NULL;
+    size_t count = 0;
+    enum status status = file_list(path, &names, &count, err);
+    if (status == STATUS_NOT_FOUND)
+        status = STATUS_OK;
+    for (size_t i = 0; status == STATUS_OK && i < count; i++) {
+        struct stat info;
+        char *inner = file_join(path, names[i]), *output = *name ? file_join(name, names[i]) : mem_strdup(names[i]);
+        if (lstat(inner, &info) != 0)
+            status = error_set_errno(err, errno, "cannot look at %s", inner);
+        else if (S_ISDIR(info.st_mode)) {
+            status = tidy_folder(t, inner, output, err);
+            if (status == STATUS_OK && rmdir(inner) != 0 && errno != ENOTEMPTY && errno != EEXIST)
+                status = error_set_errno(err, errno, "cannot remove %s", inner);
+        } else if (is_named(t, output))
+            t->has_files = true;
+        else
+            status = file_remove_tree(inner, err);
+        mem_free(output);
+        mem_free(inner);
+    }
+    file_free_names(names, count);
+    return status;
+}
+
+enum status attempt_folder_tidy(const char *data_dir, struct store *store, int64_t job_id, struct error *err) {
+    struct output_row *rows = NULL;
+    size_t row_count = 0, count = 0;
+    int *numbers = NULL;
+    enum status status = store_output_list(store, job_id, &rows, &row_count, err);
+    if (status == STATUS_OK)
+        status = list_attempts(data_dir, job_id, &numbers, &count, err);
+    for (size_t i = 0; status == STATUS_OK && i < count; i++) {
+        struct tidying t = {.rows = rows, .count = row_count, .number = numbers[i]};
+        char *dir = layout_attempt(data_dir, job_id, numbers[i]), *out = layout_out(dir);
+        char *checkpoint = layout_checkpoint(dir);
+        bool has_checkpoint = false;
+        status = tidy_folder(&t, out, "", err);
+        if (status == STATUS_OK)
+            status = look(checkpoint, &has_checkpoint, err);
+        if (status == STATUS_OK && !t.has_files && !has_checkpoint)
+            status = file_remove_tree(dir, err);
+        mem_free(checkpoint);
+        mem_free(out);
+        mem_free(dir);
+    }
+    for (size_t i = 0; i < row_count; i++)
+        output_row_release(&rows[i]);
+    mem_free(rows);
+    mem_free(numbers);
+    return status;
+}
+
+/* --- folders of earlier versions --------------------------------------------------------------- */
+
+/* The parts are gathered under a name that nobody reads, so that a database is never seen without its journal. */
+static enum status adopt_checkpoint(const char *job_dir, const char *dir, struct error *err) {
+    char *from[] = {layout_former_journal(job_dir), layout_former_checkpoint(job_dir)};
+    char *unready = layout_checkpoint_unready(dir), *ready = layout_checkpoint_folder(dir);
+    bool exists[2] = {false, false}, is_begun = false;
+    enum status status = look(unready, &is_begun, err);
+    for (size_t i = 0; i < 2 && status == STATUS_OK; i++)
+        status = look(from[i], &exists[i], err);
+    if (status == STATUS_OK && (exists[0] || exists[1])) {
+        status = file_make_dirs(unready, err);
+        is_begun = true;
+    }
+    for (size_t i = 0; i < 2 && status == STATUS_OK; i++) {
+        char *to = file_join(unready, strrchr(from[i], '/') + 1);
+        if (exists[i])
+            status = move(from[i], to, err);
+        mem_free(to);
+    }
+    if (status == STATUS_OK && is_begun)
+        status = move(unready, ready, err);
+    mem_free(ready);
+    mem_free(unready);
+    mem_free(from[0]);
+    mem_free(from[1]);
+    return status;
+}
+
+static enum status adopt(const char *data_dir, int64_t job_id, int number, struct error *err) {
+    char *job_dir = layout_job(data_dir, job_id), *dir = layout_attempt(data_dir, job_id, number);
+    char *from = layout_out(job_dir), *to = layout_out(dir), *order = layout_order(job_dir);
+    bool exists = false;
+    enum status status = look(job_dir, &exists, err); /* without files there is nothing to move */
+    if (status == STATUS_OK && exists)
+        status = file_make_dirs(dir, err);
+    if (status == STATUS_OK && exists)
+        status = adopt_checkpoint(job_dir, dir, err);
+    if (status == STATUS_OK && exists)
+        status = move(from, to, err);
+    if (status == STATUS_OK && exists) /* the next attempt gets its own */
+        status = file_remove_tree(order, err);
+    mem_free(order);
+    mem_free(to);
+    mem_free(from);
+    mem_free(dir);
+    mem_free(job_dir);
+    return status;
+}
+
+enum status attempt_folder_adopt(const char *data_dir, struct store *store, struct error *err) {
+    for (size_t count = 0;; count++) {
+        int64_t job_id;
+        int number;
+        enum status status = store_attempt_former(store, &job_id, &number, err);
+        if (status == STATUS_NOT_FOUND) {
+            if (count > 0)
+                log_info("the files of %zu jobs now lie in folders of their attempts", count);
+            return STATUS_OK;
+        }
+        if (status == STATUS_OK)
+            status = adopt(data_dir, job_id, number, err);
+        if (status == STATUS_OK)
+            status = store_attempt_adopted(store, job_id, number, err);
+        if (status != STATUS_OK)
+            return status;
+    }
+}

@@ -1,0 +1,32 @@
+/* attempt_folder.h -- the folders of a job's attempts, DATA/jobs/ID/attempt-N/: out/ with the files that it writes,
+ * checkpoint/ with what a later attempt goes on from.
+ *
+ * 1. At most one attempt of a job has a checkpoint. The next one takes it over when it begins, by one rename: the
+ *    database and its journal are never apart, and whoever had it before has lost it.
+ * 2. An output belongs to the attempt that wrote it, and a row of state.db says which. A file that no row names is seen
+ *    by nobody, and goes when its attempt has ended.
+ * 3. Nobody but an attempt changes its folder while it runs. */
+#ifndef UNBAKE_DATA_ATTEMPT_FOLDER_H
+#define UNBAKE_DATA_ATTEMPT_FOLDER_H
+
+#include <stdint.h>
+
+#include "common/error.h"
+#include "server/store/store.h"
+
+/* Makes the attempt's folder with all that it begins with, durably. No other attempt of the job may run. */
+enum status attempt_folder_begin(const char *data_dir, int64_t job_id, int number, struct error *err);
+
+/* The folder of the attempt that has a checkpoint, relative to data_dir; the caller's (mem_free). NULL: none has. */
+enum status attempt_folder_with_checkpoint(const char *data_dir, int64_t job_id, char **work_dir, struct error *err);
+/* Removes the checkpoint; without one it does nothing. */
+enum status attempt_folder_drop_checkpoint(const char *data_dir, int64_t job_id, struct error *err);
+
+/* Removes what attempts have left that no row names, of a job that no attempt works at. */
+enum status attempt_folder_tidy(const char *data_dir, struct store *store, int64_t job_id, struct error *err);
+
+/* At start: gives attempts of a version before 17 of state.db, whose files lay in their job's folder, folders of their
+ * own. One that is interrupted goes on at the next start. */
+enum status attempt_folder_adopt(const char *data_dir, struct store *store, struct error *err);
+
+#endif
