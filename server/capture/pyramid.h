@@ -14,8 +14,9 @@
 
 #include "server/scene/photograph.h"
 
-/* The coarsest has 1/16 of the width. */
-#define PYRAMID_LEVELS 5
+/* The coarsest has an eighth of the width: 80 pixels of the 640 of a level 0 (tracks.c), just above what is used
+ * (COARSEST_PX of calibrate_poses.c). */
+#define PYRAMID_LEVELS 4
 
 struct pyramid {
     float scale; /* pixels of level 0 per pixel of the photograph: 1, 1/2, 1/4, ... */
