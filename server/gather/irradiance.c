@@ -56,51 +56,68 @@ static bool is_enclosed(struct incident *in, const struct light_field *field, co
     return true;
 }
 
+/* The samples of a point, and those of them that are traced at once. */
+struct irradiance_samples {
+    size_t rays, lights;           /* of the point, in all */
+    size_t rays_done, lights_done; /* in batches before this */
+    size_t ray_count, light_count; /* in this one: rays first, then lights */
+};
+
+static void start_batch(struct irradiance_samples *s) {
+    const size_t most = INCIDENT_CHUNK * 2 / 3; /* with half as many lights */
+    s->ray_count = s->rays - s->rays_done < most ? s->rays - s->rays_done : most;
+    s->light_count = s->lights * (s->rays_done + s->ray_count) / s->rays - s->lights_done;
+}
+
+/* Whether the i-th of the batch is in the first half of the rays or lights of the point. */
+static bool is_early(const struct irradiance_samples *s, size_t i) {
+    return i < s->ray_count ? s->rays_done + i < s->rays / 2 : s->lights_done + i - s->ray_count < s->lights / 2;
+}
+
+/* Adds the radiance of a batch to the moments, weighted by the balance heuristic over rays and lights, and to the
+ * difference of the two halves. */
+static void add_batch(const struct irradiance_samples *s, const struct incident *in, vec3 shading,
+                      double sum[IRRADIANCE_MOMENTS][3], rgb *noise) {
+    float batch[IRRADIANCE_MOMENTS][3] = {{0}};
+    for (size_t i = 0; i < s->ray_count + s->light_count; i++) {
+        float c = vec3_dot(in->direction[i], shading);
+        if (!(c > 0.0f))
+            continue;
+        float density = (float)s->rays * c * (1.0f / BSDF_PI) + (float)s->lights * in->light_pdf[i];
+        float basis[IRRADIANCE_MOMENTS];
+        moment_basis(in->direction[i], c, basis);
+        rgb l = rgb_scale(in->radiance[i], 1.0f / density);
+        *noise = rgb_mad(*noise, is_early(s, i) ? c : -c, l);
+        for (int m = 0; m < IRRADIANCE_MOMENTS; m++) {
+            batch[m][0] += basis[m] * l.r;
+            batch[m][1] += basis[m] * l.g;
+            batch[m][2] += basis[m] * l.b;
+        }
+    }
+    for (int m = 0; m < IRRADIANCE_MOMENTS; m++)
+        for (int c = 0; c < 3; c++)
+            sum[m][c] += (double)batch[m][c];
+}
+
 void irradiance_gather(struct irradiance *irradiance, struct incident *in, const struct light_field *field,
                        const struct surface_point *at, uint32_t key, size_t samples) {
-    const size_t rays_per_chunk = INCIDENT_CHUNK * 2 / 3;
     vec3 frame[3];
     frame[2] = at->shading;
     vec3_frame(at->shading, &frame[0], &frame[1]);
-    if (is_enclosed(in, field, at, frame, key)) {
-        *irradiance = (struct irradiance){0};
+    *irradiance = (struct irradiance){0};
+    if (is_enclosed(in, field, at, frame, key))
         return;
-    }
-    size_t light_samples = lights_any(field->world->lights) ? samples / 2 : 0;
+    struct irradiance_samples s = {.rays = samples, .lights = lights_any(field->world->lights) ? samples / 2 : 0};
     double sum[IRRADIANCE_MOMENTS][3] = {{0}};
-    rgb noise = {0.0f, 0.0f, 0.0f};
-    size_t lights_done = 0;
-    for (size_t done = 0; done < samples; done += rays_per_chunk) {
-        size_t ray_count = samples - done < rays_per_chunk ? samples - done : rays_per_chunk;
-        size_t light_count = light_samples * (done + ray_count) / samples - lights_done;
-        for (size_t i = 0; i < ray_count; i++)
+    for (; s.rays_done < samples; s.rays_done += s.ray_count, s.lights_done += s.light_count) {
+        start_batch(&s);
+        for (size_t i = 0; i < s.ray_count; i++)
             in->direction[i] =
-                incident_cosine_direction(frame, sampler_pair(key, (uint32_t)(done + i), PAIR_DIRECTION));
-        incident_trace(in, field, at, key, (uint32_t)done, ray_count);
-        incident_sample_lights(in, field, at, key, (uint32_t)lights_done, ray_count, light_count);
-        float chunk[IRRADIANCE_MOMENTS][3] = {{0}};
-        for (size_t i = 0; i < ray_count + light_count; i++) {
-            float c = vec3_dot(in->direction[i], at->shading);
-            if (!(c > 0.0f))
-                continue;
-            float density = (float)samples * c * (1.0f / BSDF_PI) + (float)light_samples * in->light_pdf[i];
-            float basis[IRRADIANCE_MOMENTS];
-            moment_basis(in->direction[i], c, basis);
-            rgb l = rgb_scale(in->radiance[i], 1.0f / density);
-            bool early = i < ray_count ? done + i < samples / 2 : lights_done + i - ray_count < light_samples / 2;
-            noise = rgb_mad(noise, early ? c : -c, l);
-            for (int m = 0; m < IRRADIANCE_MOMENTS; m++) {
-                chunk[m][0] += basis[m] * l.r;
-                chunk[m][1] += basis[m] * l.g;
-                chunk[m][2] += basis[m] * l.b;
-            }
-        }
-        for (int m = 0; m < IRRADIANCE_MOMENTS; m++)
-            for (int c = 0; c < 3; c++)
-                sum[m][c] += (double)chunk[m][c];
-        lights_done += light_count;
+                incident_cosine_direction(frame, sampler_pair(key, (uint32_t)(s.rays_done + i), PAIR_DIRECTION));
+        incident_trace(in, field, at, key, (uint32_t)s.rays_done, s.ray_count);
+        incident_sample_lights(in, field, at, key, (uint32_t)s.lights_done, s.ray_count, s.light_count);
+        add_batch(&s, in, at->shading, sum, &irradiance->noise);
     }
-    irradiance->noise = noise;
     for (int m = 0; m < IRRADIANCE_MOMENTS; m++)
         for (int c = 0; c < 3; c++)
             irradiance->moment[m][c] = (float)sum[m][c];

@@ -179,8 +179,54 @@ static void mean_add(struct metric_mean *mean, double value) {
     mean->count += 1.0;
 }
 
+struct held_out_means {
+    struct metric_mean msre, render_noise, photograph_noise, psnr_db, ssim;
+};
+
+static void means_add(struct held_out_means *means, const struct held_out *view) {
+    mean_add(&means->msre, view->msre);
+    mean_add(&means->render_noise, view->msre_render_noise);
+    mean_add(&means->photograph_noise, view->msre_photograph_noise);
+    mean_add(&means->psnr_db, view->psnr_db);
+    mean_add(&means->ssim, view->ssim);
+}
+
+static cJSON *view_entry(const struct held_out *view, uint32_t samples) {
+    cJSON *entry = cJSON_CreateObject();
+    json_add_string(entry, "name", view->name);
+    json_add_int(entry, "samples", samples);
+    json_add_number(entry, "msre", view->msre);
+    json_add_number(entry, "msre_render_noise", view->msre_render_noise);
+    json_add_number(entry, "msre_photograph_noise", view->msre_photograph_noise);
+    json_add_number(entry, "psnr_db", view->psnr_db);
+    json_add_number(entry, "ssim", view->ssim);
+    return entry;
+}
+
+static void report_means(const struct held_out_means *means, size_t view_count, const struct reconstruct_hooks *hooks,
+                         cJSON *report) {
+    cJSON *metrics = cJSON_AddObjectToObject(report, "metrics");
+    double count = means->msre.count;
+    json_add_int(metrics, "held_out_views", (int64_t)view_count);
+    if (count == 0.0)
+        return;
+    json_add_number(metrics, "msre", means->msre.sum / count);
+    json_add_number(metrics, "msre_render_noise", means->render_noise.sum / means->render_noise.count);
+    json_add_number(metrics, "msre_photograph_noise", means->photograph_noise.sum / means->photograph_noise.count);
+    json_add_number(metrics, "psnr_db", means->psnr_db.sum / means->psnr_db.count);
+    json_add_number(metrics, "ssim", means->ssim.sum / means->ssim.count);
+    hooks->metric(hooks->user, "msre", 0, means->msre.sum / count);
+}
+
 static double pixels_of(const struct photograph *photo) {
     return (double)photo->camera.width * (double)photo->camera.height;
+}
+
+static double held_out_pixels(const struct scene *scene) {
+    double pixels = 0.0;
+    for (size_t i = 0; i < scene->photograph_count; i++)
+        pixels += scene->photograph[i].is_test ? pixels_of(&scene->photograph[i]) : 0.0;
+    return pixels;
 }
 
 enum status report_held_out(struct reconstruction *r, const struct views *views, const struct pace *pace,
@@ -188,11 +234,9 @@ enum status report_held_out(struct reconstruction *r, const struct views *views,
     const struct reconstruct_hooks *hooks = pace->hooks;
     struct scene *scene = r->scene;
     size_t total = scene->photograph_count - views->train_count;
+    double pixels_left = held_out_pixels(scene);
+    struct held_out_means means = {0};
     cJSON *list = cJSON_AddArrayToObject(r->report, "views");
-    double pixels_left = 0.0;
-    for (size_t i = 0; i < scene->photograph_count; i++)
-        pixels_left += scene->photograph[i].is_test ? pixels_of(&scene->photograph[i]) : 0.0;
-    struct metric_mean msre = {0}, render_noise = {0}, photograph_noise = {0}, psnr = {0}, ssim = {0};
     enum status status = spill_reserve(scene->spill, "the held-out photographs and their renders", 2 * total,
                                        2 * 3 * sizeof(float) * (uint64_t)pixels_left, 0, err);
     if (status != STATUS_OK)
@@ -206,34 +250,13 @@ enum status report_held_out(struct reconstruction *r, const struct views *views,
         uint32_t samples = samples_of(r, pixels_left);
         render_view(r, &scene->photograph[i], view, samples, (double)views->median_radiance);
         pixels_left -= pixels;
-        mean_add(&msre, view->msre);
-        mean_add(&render_noise, view->msre_render_noise);
-        mean_add(&photograph_noise, view->msre_photograph_noise);
-        mean_add(&psnr, view->psnr_db);
-        mean_add(&ssim, view->ssim);
-        cJSON *entry = cJSON_CreateObject();
-        json_add_string(entry, "name", view->name);
-        json_add_int(entry, "samples", samples);
-        json_add_number(entry, "msre", view->msre);
-        json_add_number(entry, "msre_render_noise", view->msre_render_noise);
-        json_add_number(entry, "msre_photograph_noise", view->msre_photograph_noise);
-        json_add_number(entry, "psnr_db", view->psnr_db);
-        json_add_number(entry, "ssim", view->ssim);
-        cJSON_AddItemToArray(list, entry);
+        means_add(&means, view);
+        cJSON_AddItemToArray(list, view_entry(view, samples));
         pace_advance(pace, "report", PLAN_REPORT, pixels * (double)samples);
         if (hooks->stop_requested(hooks->user))
             return error_set(err, STATUS_CANCELLED, "stopped while rendering the held-out views");
     }
-    cJSON *metrics = cJSON_AddObjectToObject(r->report, "metrics");
-    json_add_int(metrics, "held_out_views", (int64_t)total);
-    if (msre.count > 0.0) {
-        json_add_number(metrics, "msre", msre.sum / msre.count);
-        json_add_number(metrics, "msre_render_noise", render_noise.sum / render_noise.count);
-        json_add_number(metrics, "msre_photograph_noise", photograph_noise.sum / photograph_noise.count);
-        json_add_number(metrics, "psnr_db", psnr.sum / psnr.count);
-        json_add_number(metrics, "ssim", ssim.sum / ssim.count);
-        hooks->metric(hooks->user, "msre", 0, msre.sum / msre.count);
-    }
+    report_means(&means, total, hooks, r->report);
     return STATUS_OK;
 }
 
