@@ -54,6 +54,8 @@ static const struct config_option table[] = {
     INT(user_max_percent, "%", 0, 100, "50",
         "The same as a share of the whole disk, as it is when the daemon starts; the smaller one counts. 0: no limit."),
     INT(worker_memory_mib, "MiB", 0, 16777216, "0", "Memory that a job may use. 0: no limit."),
+    INT(jobs_memory_mib, "MiB", 0, 16777216, "0",
+        "Memory for all running jobs together; one that is foretold to need more than is left waits. 0: what is free when none runs."),
     INT(photograph_memory_mib, "MiB", 0, 16777216, "0",
         "Memory for pixels of photographs in a job; what is more lies on the disk while it runs. 0: half of worker_memory_mib, or of what is free."),
     REAL(checkpoint_interval_sec, "s", 0.1, 86400, "60",

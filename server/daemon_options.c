@@ -29,6 +29,7 @@ struct scheduler_config daemon_options_scheduler(const struct config *c, const s
         .max_checks = (int)c->max_checks,
         .thread_count = (int)c->threads,
         .user_max_bytes = user_max_bytes(c),
+        .jobs_memory_bytes = (uint64_t)c->jobs_memory_mib << 20,
         .worker_memory_bytes = (uint64_t)c->worker_memory_mib << 20,
         .photograph_memory_bytes = (uint64_t)c->photograph_memory_mib << 20,
         .checkpoint_interval_sec = c->checkpoint_interval_sec,

@@ -208,6 +208,8 @@ static void add_job(cJSON *facts, cJSON *table, const struct scene *scene, const
     buf_printf(text, " on %d processor%s", parallel_thread_count(pool), parallel_thread_count(pool) == 1 ? "" : "s");
     add_row(table, "time of a job", text);
     json_add_number(facts, "memory_bytes", floor(bytes));
+    json_add_number(facts, "memory_texture_size", side);
+    json_add_number(facts, "memory_texel_bytes", ESTIMATE_TEXEL_BYTES);
     json_add_number(facts, "time_sec", sec);
     if (memory_limit > 0.0 && bytes > memory_limit)
         warn_of_memory(facts, scene, side, bytes, memory_limit);

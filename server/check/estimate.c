@@ -8,7 +8,6 @@
 
 #define MIB 1048576.0
 #define BASE_BYTES (40.0 * MIB) /* program and libraries */
-#define TEXEL_BYTES 100.0       /* of the square */
 #define TRIANGLE_BYTES 200.0    /* mesh, acceleration structure, adjacency, charts */
 #define PIXEL_BYTES 25.0        /* 11 to 13 of a photograph with what is found of it, 14 while detail is solved */
 
@@ -19,7 +18,8 @@ double estimate_memory_bytes(const struct scene *scene, double side) {
     double pixel_bytes = PIXEL_BYTES * pixels;
     if (scene->spill)
         pixel_bytes = fmin(pixel_bytes, (double)spill_memory_bytes(scene->spill));
-    return BASE_BYTES + pixel_bytes + TRIANGLE_BYTES * (double)scene->mesh.triangle_count + TEXEL_BYTES * side * side;
+    return BASE_BYTES + pixel_bytes + TRIANGLE_BYTES * (double)scene->mesh.triangle_count +
+           ESTIMATE_TEXEL_BYTES * side * side;
 }
 
 double estimate_time_sec(const struct scene *scene, const struct settings *settings, struct parallel *pool) {

@@ -38,6 +38,7 @@ struct attempt {
     bool killed;                    /* as this daemon asked */
     double kill_at_sec;             /* as clock_sec; 0: never */
     char *settings;                 /* the job's, as submitted; owned; NULL for a check */
+    double memory_bytes;            /* that it is foretold to need; 0: not known */
     int thread_count, memory_step;  /* as ordered, and how often that was reduced */
     long event_count, event_max;    /* reports so far; above event_max they are thinned */
     double thinned_at;              /* when the last thinned report was entered, as clock_sec */

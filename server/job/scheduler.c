@@ -20,6 +20,7 @@
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
+#include "server/job/admission.h"
 #include "server/job/attempt.h"
 #include "server/job/checks.h"
 #include "server/job/deliveries.h"
@@ -46,6 +47,7 @@ struct scheduler {
     struct trash *trash;    /* NULL: this thread removes trees itself */
     bool must_retry;        /* something failed that may work later */
     double housekeeping_at; /* when it is due, as clock_sec */
+    struct admission admission;
     struct disk_watch disk;
     atomic_bool waits_for_disk; /* disk.is_low, for other threads */
     uint64_t check_room;        /* free bytes above which scenes that had too little are checked again; 0: none waits */
@@ -64,6 +66,7 @@ enum status scheduler_new(struct scheduler **out, const struct scheduler_config 
     s->store = store;
     s->wake_fd = fd;
     disk_init(&s->disk, config->low_disk_bytes);
+    admission_init(&s->admission, config->jobs_memory_bytes, config->worker_memory_bytes);
     if (s->config.thread_count <= 0) {
         cpu_set_t set;
         s->config.thread_count = sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : 1;
@@ -135,11 +138,24 @@ static void charge_all(struct scheduler *s) {
     (void)store_usage_pay(s->store, NULL); /* charges that failed earlier */
 }
 
+/* Whether there is memory for the job beside those that run. */
+static enum status ask_admission(struct scheduler *s, int64_t id, bool *may, double *need, struct error *err) {
+    size_t running = 0;
+    double used = 0.0;
+    for (size_t i = 0; i < s->job_slots; i++) {
+        running += s->slot[i].phase == ATTEMPT_ALIVE;
+        used += s->slot[i].phase == ATTEMPT_ALIVE ? s->slot[i].memory_bytes : 0.0;
+    }
+    return admission_ask(&s->admission, s->store, id, running, used, may, need, err);
+}
+
 static void start_jobs(struct scheduler *s) {
     if (s->disk.is_low)
         return;
     for (size_t i = 0; i < s->job_slots; i++) {
         struct error err;
+        bool may = true;
+        double need = 0.0;
         /* The slot stays empty if the job left the queue without starting: take the next one. */
         while (s->slot[i].phase == ATTEMPT_EMPTY) {
             int64_t id;
@@ -148,11 +164,16 @@ static void start_jobs(struct scheduler *s) {
             if (status == STATUS_NOT_FOUND)
                 return;
             if (status == STATUS_OK)
+                status = ask_admission(s, id, &may, &need, &err);
+            if (status == STATUS_OK && !may)
+                return;
+            if (status == STATUS_OK)
                 status = attempt_start_job(&s->slot[i], &s->config, s->store, &s->counters, id, thread_share(s), &err);
             if (status != STATUS_OK) {
                 retry_later(s, "cannot start a job", &err);
                 return;
             }
+            s->slot[i].memory_bytes = need;
         }
     }
 }
@@ -269,6 +290,7 @@ static void watch_disk(struct scheduler *s) {
     atomic_store(&s->waits_for_disk, s->disk.is_low);
     if (!changed && !s->disk.is_low)
         return;
+    s->admission.told_id = -1; /* the reason that a job waits is the disk now, or none */
     for (size_t i = 0; s->disk.is_low && i < s->job_slots; i++)
         ask_to_stop(s, &s->slot[i]);
     if (store_job_explain(s->store, 0, s->disk.is_low ? s->disk.reason : "", DISK_REASON,

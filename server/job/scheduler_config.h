@@ -15,6 +15,7 @@ struct scheduler_config {
     int max_checks;                   /* checks of scenes at once; 0: CHECKS_AT_ONCE */
     int thread_count;                 /* shared between running jobs; 0: all processors */
     uint64_t user_max_bytes;          /* what one user may keep; 0: no limit */
+    uint64_t jobs_memory_bytes;       /* for all running jobs, as foretold; 0: what is free when none runs */
     uint64_t worker_memory_bytes;     /* 0: no limit */
     uint64_t photograph_memory_bytes; /* of it for pixels of photographs; 0: half of what there is */
     double checkpoint_interval_sec;

@@ -45,6 +45,10 @@ int main(void) {
     CHECK(strstr(value_of(facts, "segments"), "found in the mesh") != NULL);
     CHECK(cJSON_GetObjectItem(facts, "time_sec")->valuedouble > 1.0);
     CHECK(cJSON_GetObjectItem(facts, "memory_bytes")->valuedouble > 2e8);
+    double side = cJSON_GetObjectItem(facts, "memory_texture_size")->valuedouble,
+           texel_bytes = cJSON_GetObjectItem(facts, "memory_texel_bytes")->valuedouble;
+    CHECK_NEAR(cJSON_GetObjectItem(facts, "memory_bytes")->valuedouble + texel_bytes * (500.0 * 500.0 - side * side),
+               estimate_memory_bytes(&room.scene, 500.0), 1.0);
     CHECK(cJSON_GetArraySize(cJSON_GetObjectItem(facts, "warnings")) == 0);
     cJSON_Delete(facts);
 

@@ -5,6 +5,8 @@
 
 #include "tests/unit/scheduler_rig.h"
 
+#define LARGE_BYTES 3e9
+
 /* --- the worker's side ----------------------------------------------------------------------- */
 
 static int play(const char *role, const char *dir, int attempt) {
@@ -23,8 +25,15 @@ static int play(const char *role, const char *dir, int attempt) {
 
 static int play_check(const char *role, const char *dir) {
     struct progress p = {.fd = PROGRESS_FD};
-    (void)role, (void)dir;
-    check_out(&p);
+    (void)dir;
+    if (strcmp(role, "large") == 0) {
+        cJSON *facts = cJSON_CreateObject();
+        json_add_number(facts, "memory_bytes", LARGE_BYTES);
+        progress_scene(&p, facts);
+        progress_end(&p, STATUS_OK, "", "");
+    } else {
+        check_out(&p);
+    }
     return 0;
 }
 
@@ -189,12 +198,52 @@ static void test_daemon_killed(struct daemon *d) {
     mem_free(job_dir);
 }
 
+/* Where there is memory for one and a half of them, one of three large jobs runs at a time, and what is behind them
+ * waits for its turn though it would fit. */
+static void test_memory(struct daemon *d) {
+    struct scheduler_config config = {.data_dir = d->dir,
+                                      .executor = process_executor_init(&at_home, "/proc/self/exe", d->dir),
+                                      .max_running = 3,
+                                      .thread_count = 4,
+                                      .jobs_memory_bytes = (uint64_t)(1.5 * LARGE_BYTES),
+                                      .stop_grace_sec = 1};
+    OK(store_open(&d->store, d->dir, &err));
+    OK(scheduler_new(&d->scheduler, &config, d->store, &err));
+    CHECK(pthread_create(&d->thread, NULL, run_scheduler, d) == 0);
+    add_scene(d, SCENE_A, "good");
+    add_scene(d, SCENE_C, "large");
+    CHECK(wait_for_scene(d, SCENE_C, SCENE_READY));
+    int64_t first = submit(d, SCENE_C, "hang");
+    CHECK(wait_for(d, first, JOB_RUNNING, "refine"));
+    int64_t small = submit(d, SCENE_A, "hang"); /* of which nothing is foretold */
+    CHECK(wait_for(d, small, JOB_RUNNING, "refine"));
+    int64_t second = submit(d, SCENE_C, "good"), third = submit(d, SCENE_A, "good");
+    struct job job = {0};
+    for (int i = 0; i < WAIT_TRIES && !(job.reason && *job.reason); i++) {
+        usleep(WAIT_US);
+        job_release(&job);
+        OK(store_job_get(d->store, second, &job, &err));
+    }
+    CHECK_THAT(job.state == JOB_QUEUED && strstr(job.reason, "waits for memory"), "%s", job.reason);
+    job_release(&job);
+    expect(d, third, JOB_QUEUED, 0, "", "");
+    OK(store_job_cancel(d->store, first, &err));
+    scheduler_wake(d->scheduler);
+    expect(d, second, JOB_SUCCEEDED, 1, "", "");
+    expect(d, third, JOB_SUCCEEDED, 1, "", "");
+    OK(store_job_cancel(d->store, small, &err));
+    scheduler_wake(d->scheduler);
+    expect(d, small, JOB_CANCELLED, 1, "", "");
+    daemon_stop(d);
+}
+
 int main(int argc, char **argv) {
     struct daemon d;
     daemon_begin(&d, argc, argv);
     test_daemon_killed(&d); /* first: it forks, and this process has no threads yet */
     test_wishes(&d);
     test_false_start(&d);
+    test_memory(&d);
     daemon_end(&d);
     return check_result();
 }

@@ -1,0 +1,92 @@
+/* admission.c -- see admission.h. */
+#include "server/job/admission.h"
+
+#include <math.h>
+#include <stdio.h>
+
+#include "common/json.h"
+#include "common/machine.h"
+#include "common/settings.h"
+#include "server/job/memory.h"
+
+#define HINT "It begins when others have ended. A smaller texture_size needs less memory."
+
+void admission_init(struct admission *a, uint64_t limit_bytes, uint64_t worker_limit_bytes) {
+    *a = (struct admission){.limit_bytes = limit_bytes, .worker_limit_bytes = worker_limit_bytes, .told_id = -1};
+}
+
+/* Texels a side of the textures that the next attempt makes; `fallback` where its settings cannot be read. */
+static double side_of(const struct job *job, double fallback) {
+    struct settings settings;
+    struct buf what;
+    int threads = 1;
+    cJSON *given = cJSON_Parse(job->settings);
+    buf_init(&what, 4096);
+    cJSON *reduced = memory_reduce(given, job->memory_step, &threads, &what);
+    settings_init(&settings);
+    double side = settings_apply(&settings, reduced, NULL, NULL) == STATUS_OK
+                      ? settings_number(&settings, "texture_size")
+                      : fallback;
+    settings_release(&settings);
+    cJSON_Delete(reduced);
+    cJSON_Delete(given);
+    buf_release(&what);
+    return side;
+}
+
+double admission_need(const struct admission *a, const char *text, const struct job *job) {
+    double bytes = 0.0, texel_bytes = 0.0, side = 0.0;
+    cJSON *facts = cJSON_Parse(text);
+    bool is_foretold = facts && json_number(facts, "memory_bytes", "facts", 0.0, &bytes, NULL) == STATUS_OK &&
+                       json_number(facts, "memory_texel_bytes", "facts", 0.0, &texel_bytes, NULL) == STATUS_OK &&
+                       json_number(facts, "memory_texture_size", "facts", 0.0, &side, NULL) == STATUS_OK && bytes > 0.0;
+    cJSON_Delete(facts);
+    if (!is_foretold)
+        return 0.0;
+    double wanted = side_of(job, side);
+    bytes = fmax(bytes + texel_bytes * (wanted * wanted - side * side), 0.0);
+    return a->worker_limit_bytes > 0 ? fmin(bytes, (double)a->worker_limit_bytes) : bytes;
+}
+
+static enum status find_need(const struct admission *a, struct store *store, int64_t id, double *need,
+                             struct error *err) {
+    struct job job = {0};
+    struct scene_row scene = {0};
+    *need = 0.0;
+    enum status status = store_job_get(store, id, &job, err);
+    if (status == STATUS_OK)
+        status = store_scene_get(store, job.scene_id, &scene, err);
+    if (status == STATUS_OK)
+        *need = admission_need(a, scene.facts, &job);
+    scene_row_release(&scene);
+    job_release(&job);
+    return status == STATUS_NOT_FOUND ? STATUS_OK : status; /* deleted meanwhile: its start will find that */
+}
+
+/* Tells the job `id` (0: none) that it waits, and another one that it does not any more. */
+static enum status tell(struct admission *a, struct store *store, int64_t id, double need, struct error *err) {
+    char reason[200];
+    if (a->told_id == id)
+        return STATUS_OK;
+    enum status status = a->told_id == 0 ? STATUS_OK : store_job_explain(store, 0, "", ADMISSION_REASON, "", err);
+    if (status != STATUS_OK)
+        return status;
+    a->told_id = 0;
+    if (id == 0)
+        return STATUS_OK;
+    snprintf(reason, sizeof reason,
+             ADMISSION_REASON ": it needs about %.1f GiB, and all jobs that run may take %.1f GiB together",
+             need / 0x1p30, a->total_bytes / 0x1p30);
+    status = store_job_explain(store, id, reason, "", HINT, err);
+    a->told_id = status == STATUS_OK ? id : 0;
+    return status;
+}
+
+enum status admission_ask(struct admission *a, struct store *store, int64_t id, size_t running, double used, bool *may,
+                          double *need, struct error *err) {
+    enum status status = find_need(a, store, id, need, err);
+    if (running == 0)
+        a->total_bytes = (double)(a->limit_bytes > 0 ? a->limit_bytes : machine_memory_available(""));
+    *may = running == 0 || *need <= 0.0 || a->total_bytes <= 0.0 || used + *need <= a->total_bytes;
+    return status == STATUS_OK ? tell(a, store, *may ? 0 : id, *need, err) : status;
+}
