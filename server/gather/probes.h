@@ -18,6 +18,16 @@
 #include "server/scene/inverse_uv.h"
 #include "server/scene/mesh.h"
 
+/* Texels a side of a block, for a texture of so many texels along its longer side: 8 of 2048 and in proportion, so that
+ * blocks are as large on the surface whatever the texture; at least 4, since a block of fewer texels costs more than it
+ * saves. */
+#define PROBES_SPACING_AT_2048 8
+#define PROBES_MIN_SPACING 4
+static inline uint32_t probes_spacing(uint32_t side) {
+    uint32_t spacing = side * PROBES_SPACING_AT_2048 / 2048;
+    return spacing < PROBES_MIN_SPACING ? PROBES_MIN_SPACING : spacing;
+}
+
 struct probe {
     uint32_t texel, chart;
     bool seen;    /* a photograph sees the texel */

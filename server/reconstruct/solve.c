@@ -20,9 +20,6 @@
 /* The first pass finds outgoing radiance, the second specular lobes in that light, the last everything. The second is
  * skipped where most light is an estimate (unseen_light.h), whose error exceeds its gain. */
 enum { PASS_LIGHT, PASS_SPECULAR, PASS_ALL, PASSES };
-/* Probe spacing, texels, in a texture of 2048 texels a side; in proportion in others, and at least LEAST_SPACING. */
-#define SPACING_AT_2048 8
-#define MIN_SPACING 4
 /* Part of gather_samples that passes before the last use: twice the noise, in what is averaged over again. */
 #define EARLY_PASS_PART 0.25
 /* Factor of measure_stride in passes before the last, which only need outgoing radiance, and in the last where a time
@@ -170,12 +167,6 @@ static enum status find_detail(struct solve *s, struct error *err) {
 
 /* --- the whole ----------------------------------------------------------------------------------- */
 
-static uint32_t spacing_for(const struct atlas *atlas) {
-    uint32_t side = atlas->width > atlas->height ? atlas->width : atlas->height;
-    uint32_t spacing = side * SPACING_AT_2048 / 2048;
-    return spacing < MIN_SPACING ? MIN_SPACING : spacing;
-}
-
 static void solve_init(struct solve *s, struct reconstruction *r, const struct views *views, const struct pace *pace) {
     size_t texels = (size_t)r->atlas.width * r->atlas.height;
     *s = (struct solve){.r = r, .views = views, .pace = pace, .hooks = pace->hooks, .is_previewed = true};
@@ -187,7 +178,8 @@ static void solve_init(struct solve *s, struct reconstruction *r, const struct v
     solve_emitters_init(&s->emitters, r, views, &s->divide);
     s->field = (struct light_field){&r->world, (const uint16_t(*)[3])s->outgoing.unmirrored, s->outgoing.lobe, NULL};
     s->isotropic = (struct light_field){&r->world, (const uint16_t(*)[3])s->outgoing.total, NULL, NULL};
-    probes_init(&s->probes, spacing_for(&r->atlas), &r->scene->mesh, &r->atlas, &r->inverse, &r->fused);
+    probes_init(&s->probes, probes_spacing(r->atlas.width > r->atlas.height ? r->atlas.width : r->atlas.height),
+                &r->scene->mesh, &r->atlas, &r->inverse, &r->fused);
     const struct surface surface = reconstruction_surface(r);
     s->texels_per_pixel = detail_texels_per_pixel(&surface, views);
     s->divide = inputs_of_divide(r, views, &s->probes, &s->isotropic);

@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "common/parallel.h"
+#include "server/gather/probes.h"
 
 #define PREPARE_SEC 3.0          /* of any room */
 #define PREPARE_PIXEL_SEC 4.5e-6 /* a pixel of photographs */
@@ -84,7 +85,7 @@ static void plan_texels(const struct pace *p, double valid) {
     plan_set_fixed(p->plan, PLAN_EXPORT, 1.0, EXPORT_TEXEL_SEC * side(p) * side(p)); /* on one core, mostly */
     if (!solves(p))
         return;
-    double spacing = fmax(side(p) * 8.0 / 2048.0, 4.0); /* as solve.c has it */
+    double spacing = (double)probes_spacing((uint32_t)side(p));
     double probes = USUAL_PROBES * valid / (spacing * spacing), texels = valid / (stride * stride);
     pace_plan_solve(p, valid, 1.5 * probes * settings_number(p->settings, "gather_samples"), 0.5 * texels, texels,
                     settings_number(p->settings, "detail_steps") * valid);
