@@ -33,7 +33,7 @@
 #define MIN_DIFFERENCES 64        /* +25 %: 0 dB */
 #define MEDIAN_DEVIATIONS 0.6745f /* median of |x| for standard normal x; +25 %: +0.04 dB */
 #define SCALE_MIN 0.5f            /* +25 %: +0.05 dB */
-#define SCALE_MAX 4.0f
+#define SCALE_MAX 4.0f            /* +25 %: no change */
 
 /* Differences of one octave: an even sample of those offered (reservoir sampling, Vitter 1985). */
 struct octave {

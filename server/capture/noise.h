@@ -16,7 +16,8 @@
 #include "server/capture/views.h"
 
 #define NOISE_OCTAVES 40 /* octaves of stored values: from 2^-24, the smallest half, to 2^16, the largest */
-#define NOISE_BLOCK 16   /* pixels a side: up to 768 differences, whose median is off by 4 %; +25 %: +0.01 dB */
+/* Pixels a side: up to 768 differences, whose median is off by 4 %; +25 %: +0.01 dB. */
+#define NOISE_BLOCK 16
 
 struct noise {
     float share[NOISE_OCTAVES]; /* standard deviation over value, for each octave */

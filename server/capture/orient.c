@@ -9,7 +9,8 @@
 #include "server/render/accel.h"
 #include "server/scene/adjacency.h"
 
-#define PIXEL_STRIDE 2 /* along both axes, of the pixels traced, for time: what is seen at all covers more */
+/* Along both axes, of the pixels traced, for time: what is seen at all covers more; to 3: no change. */
+#define PIXEL_STRIDE 2
 
 /* --- sides seen by photographs --------------------------------------------------------------------- */
 

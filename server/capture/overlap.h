@@ -15,8 +15,8 @@
 #include "server/scene/atlas.h"
 #include "server/scene/inverse_uv.h"
 
-/* Photographs a point, a random subset where more see it: bounds time and memory; +25 %: no change. */
-#define OVERLAP_OBSERVATIONS_MAX 12
+/* Photographs a point, a random subset where more see it: bounds time and memory. */
+#define OVERLAP_OBSERVATIONS_MAX 12 /* +25 %: no change */
 
 /* One photograph's observation of one point. */
 struct overlap_observation {

@@ -7,17 +7,18 @@
 
 /* Scale of a frame's residuals: so many times the mean absolute residual, which is .8 standard deviations, so that the
  * scale is two of them, as light_fit.h has it; each residual is clamped to so many scales. */
-#define SCALE_PER_MEAN 2.5
-#define RESIDUAL_CLAMP 2.0
-#define CONSENSUS_ROUNDS 4 /* of reweighting, of the mean of eleven at most */
-#define MIN_CONSENSUS 3    /* observations: of two that differ neither is known to be wrong */
-#define FIRST_SCALE 0.1    /* of log residuals, until the first round has measured them: 10 % */
+#define SCALE_PER_MEAN 2.5 /* +25 %: no change */
+#define RESIDUAL_CLAMP 2.0 /* +25 %: no change */
+#define CONSENSUS_ROUNDS 4 /* of reweighting, of the mean of eleven at most; +25 %: no change */
+#define MIN_CONSENSUS 3    /* observations: of two that differ neither is known to be wrong; to 4: no change */
+/* Of log residuals, until the first round has measured them: 10 %; +25 %: no change. */
+#define FIRST_SCALE 0.1
 
 /* A correction is accepted when it lowers the robust cost at held-out tracks by this share, and by so many standard
  * errors. At 6 (a chance of 1e-9) not even 10,000 photographs have one that is moved by noise; errors are not quite
  * independent, since tracks share photographs. */
-#define MIN_GAIN 0.02
-#define MIN_SIGNIFICANCE 6.0
+#define MIN_GAIN 0.02        /* +25 %: no change */
+#define MIN_SIGNIFICANCE 6.0 /* +25 %: no change */
 
 /* --- poses ----------------------------------------------------------------------------------- */
 

@@ -22,9 +22,10 @@
 #include "server/capture/tracks.h"
 #include "server/capture/validation.h"
 
-#define POSE_UNKNOWNS 6     /* of a pose: rotation and translation */
-#define POSE_CELL_COLUMNS 8 /* of the grid of offsets: as smooth as a vignette or a reflection; +25 %: no change */
-#define POSE_CELL_ROWS 6    /* as coarse as 8 columns in a picture of 4 : 3 */
+#define POSE_UNKNOWNS 6 /* of a pose: rotation and translation */
+/* Of the grid of offsets: as smooth as a vignette or a reflection; +25 %: no change. */
+#define POSE_CELL_COLUMNS 8
+#define POSE_CELL_ROWS 6 /* as coarse as 8 columns in a picture of 4 : 3; to 7: no change */
 #define POSE_CELLS (POSE_CELL_COLUMNS * POSE_CELL_ROWS)
 #define POSE_OBSERVATIONS_MAX (TRACK_OTHERS + 1) /* of a track, with its own photograph */
 #define POSE_HELD_OUT_EVERY 3    /* one track in so many is held out: 50 of TRACKS_MIN judge a photograph */

@@ -9,10 +9,11 @@
 #include "server/render/light.h"
 #include "server/render/sampler.h"
 
-enum { PAIR_HALF = 8 };  /* sample dimension of the lobes, after those of incident.c */
-#define MIN_COSINE 1e-3f /* between view and shading normal, 89.94 degrees; more grazing views have no highlight */
+enum { PAIR_HALF = 8 }; /* sample dimension of the lobes, after those of incident.c */
+/* Between view and shading normal, 89.94 degrees; more grazing views have no highlight; +25 %: no change. */
+#define MIN_COSINE 1e-3f
 /* Pairs of a view direction and a lobe sample; the mean is off by 1/32 of their deviation. */
-#define ALBEDO_SAMPLES 1024
+#define ALBEDO_SAMPLES 1024 /* +25 %: no change */
 #define KEY_ALBEDO 11
 
 /* Adds the light from one direction to every level, with the density of the whole mixture of samplers. */

@@ -12,7 +12,7 @@
 
 /* Levels evaluated at once, at most; every highlight costs time and memory for all. Roughness in steps
  * of a twelfth; specular as specular_fit.c has its levels. */
-#define HIGHLIGHT_ROUGHNESSES 12
+#define HIGHLIGHT_ROUGHNESSES 12 /* +25 %: -0.06 dB, specular +0.29 */
 #define HIGHLIGHT_SPECULARS 5
 
 /* The materials to evaluate: every pair of a roughness and a specular, both above 0. */

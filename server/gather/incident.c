@@ -18,14 +18,15 @@ enum {
     PAIR_ROULETTE = 56
 };
 /* Continuations of a ray, from backs and specular fronts: after four of a dielectric .04^4 is left. */
-#define MAX_BOUNCES 4
-#define MIN_COSINE 1e-3f /* to a normal, 89.94 degrees; more grazing rays are not continued by the lobe */
+#define MAX_BOUNCES 4 /* +25 %: 0 dB */
+/* To a normal, 89.94 degrees; more grazing rays are not continued by the lobe; +25 %: no change. */
+#define MIN_COSINE 1e-3f
 /* Probability to continue by the lobe over the specular share of what is reflected: above 1, since what a lobe meets
  * (lamps, windows) varies more than the diffuse part, which is looked up. */
-#define ROULETTE_FACTOR 2.0f
+#define ROULETTE_FACTOR 2.0f /* +25 %: no change */
 /* Least roughness of the lobe that reflects lights: narrower ones leave fireflies. A lobe of .5 is 30 degrees wide,
  * about what probes of irradiance resolve. */
-#define WIDE_ROUGHNESS 0.5f
+#define WIDE_ROUGHNESS 0.5f /* +25 %: no change */
 
 vec3 incident_cosine_direction(const vec3 frame[3], vec2 u) {
     vec2 circle = bsdf_circle(u.x);

@@ -11,7 +11,7 @@
 enum { PAIR_DIRECTION }; /* sample dimension, before those of incident.c */
 /* A point is inside a closed body when all of these rays meet a back; traced in batches, most points end with the
  * first. A point that sees the outside through 10 % of its sphere is taken for enclosed in one case of 30. */
-#define ENCLOSED_RAYS 32
+#define ENCLOSED_RAYS 32 /* +25 %: 0 dB */
 #define ENCLOSED_BATCH 4
 
 /* Integrands of the moments for light from direction w at cosine c. */
