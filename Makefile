@@ -153,7 +153,7 @@ fidelity: deps ## compare with the truth of known rooms, some 6 minutes each; FI
 	@+$(BUILD) all $(B)/tests/bench/reconstruct_room
 	@tests/bench/fidelity.sh $(B)
 
-rooms: ## make furnished rooms with their truth, by Mitsuba 3, under build/rooms, for FIDELITY_ROOMS; ROOM_SPP
+rooms: ## make furnished rooms with their truth, by Mitsuba 3, under build/rooms, for FIDELITY_ROOMS and LIGHT_ROOMS; ROOM_NAMES, ROOM_SPP
 	@deploy/install-deps.sh rooms
 	@tests/bench/rooms.sh $(B)
 

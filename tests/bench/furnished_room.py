@@ -1,22 +1,12 @@
 """Makes a furnished room with its truth, to measure fidelity beyond the rooms of the test data.
 
-Not unseen any more: constants of gloss.c, sun_find.c and measured.c were chosen on these rooms, too; on the last only
-SKY_DOUBT of solve.c was.
+usage: furnished_room.py ROOM OUT [SPP]
 
-usage: furnished_room.py kitchen|parlour|bedroom|lounge|study|cafe OUT [SPP]
-
-OUT becomes a bundle like those of the test data, which `FIDELITY_ROOMS=OUT make fidelity` takes: 72
-training and 8 held-out frames of 320 x 240 by Mitsuba 3 (llvm_ad_rgb, an hour on two cores; with
-MITSUBA_VARIANT=cuda_ad_rgb a minute on a large GPU; SPP samples a pixel, 256), HDR and 8-bit at cycling
-exposures, and the truth of the held-out ones. Needs Debian's sweethome3d-furniture, whose models it uses;
-nothing of them is kept here.
-
-  kitchen   closed; four spots at the ceiling and a strip lamp, polished tiles, much steel
-  parlour   two windows under a sky that the sun has just left, a lamp, a lit screen, wallpaper, books
-  bedroom   sun through one window, a red wall, two lamps with shades that shine, a patterned bed
-  lounge    a window whose panes shine as one emitter, twelve small bulbs, a warm and a blue lamp, black polish
-  study     sun through blinds, a hall with a brighter lamp behind a door, a panelled wall, a screen with a picture
-  cafe      three windows under a grey sky, pendants over a polished counter, neon, a lit board, dark walls
+ROOM: one of rooms_boxes.py, rooms_choice.py, rooms_report.py, which say what they are. OUT becomes a bundle like those
+of the test data, which `FIDELITY_ROOMS=OUT make fidelity` takes: frames of 320 x 240 by Mitsuba 3 (MITSUBA_VARIANT:
+llvm_ad_rgb, or cuda_ad_rgb, a minute on a large GPU; SPP samples a pixel), HDR (transforms.json), 8-bit at cycling
+exposures (transforms_sdr.json) and 8-bit at one (transforms_one.json); of the held-out ones the truth, and the truth of
+the light (light_truth.py). Needs Debian's sweethome3d-furniture, whose models it uses; nothing of them is kept here.
 """
 import json
 import os
@@ -27,396 +17,17 @@ import numpy as np
 
 mi.set_variant(os.environ.get("MITSUBA_VARIANT", "llvm_ad_rgb"))
 
-from furniture import (METAL, POLISHED, SATIN, Catalogue, box, join, material, picture, planks, quad, sphere, stripes,  # noqa: E402
-                       tiles)
+import light_truth  # noqa: E402
+import rooms_boxes  # noqa: E402
+import rooms_choice  # noqa: E402
+import rooms_report  # noqa: E402
+from furniture import join  # noqa: E402
+from photographs import write_exposures, write_hdr  # noqa: E402
+from rendering import choose_poses, render, scene_of, spectrum, texture_of  # noqa: E402
 
-WIDTH, HEIGHT, FOCAL = 320, 240, 208.5160596545929
-TRAIN, TEST = 72, 8
 DEPTH = 16
-EXPOSURES = (1.0, 1 / 16.66, 1 / 166.66)
-CLEARANCE = 0.25  # of cameras from furniture
-
-
-class Room:
-    """Parts, and the boxes where no camera can stand."""
-
-    def __init__(self, size, rng):
-        self.size, self.rng, self.catalogue = np.array(size), rng, Catalogue()
-        self.parts, self.boxes, self.sky = [], [], None
-
-    def add(self, *parts, blocks=False):
-        self.parts.extend(parts)
-        if blocks:
-            points = np.concatenate([p.positions for p in parts])
-            self.boxes.append((points.min(0) - CLEARANCE, points.max(0) + CLEARANCE))
-
-    def model(self, name, at, blocks=True, **how):
-        self.add(*self.catalogue.model(name, at, **how), blocks=blocks)
-
-    def walls(self, floor, wall, ceiling, windows=()):
-        """Windows are holes in the wall of greatest x: (z0, z1, y0, y1)."""
-        w, h, d = self.size
-        self.add(quad("floor", (0, 0, 0), (0, 0, d), (w, 0, 0), floor, (d / 1.6, w / 1.6)),
-                 quad("ceiling", (0, h, 0), (w, 0, 0), (0, 0, d), ceiling),
-                 quad("wall-x0", (0, 0, d), (0, 0, -d), (0, h, 0), wall, (d, h)),
-                 quad("wall-z0", (0, 0, 0), (w, 0, 0), (0, h, 0), wall, (w, h)),
-                 quad("wall-z1", (w, 0, d), (-w, 0, 0), (0, h, 0), wall, (w, h)))
-        z_cuts = sorted({0, d, *(z for win in windows for z in win[:2])})
-        y_cuts = sorted({0, h, *(y for win in windows for y in win[2:])})
-        panes = [quad("wall-x1", (w, y0, z0), (0, 0, z1 - z0), (0, y1 - y0, 0), wall, (z1 - z0, y1 - y0))
-                 for z0, z1 in zip(z_cuts, z_cuts[1:]) for y0, y1 in zip(y_cuts, y_cuts[1:])
-                 if not any(a <= z0 and z1 <= b and low <= y0 and y1 <= high for a, b, low, high in windows)]
-        self.add(join("wall-x1", panes, wall))
-        for z0, z1, y0, y1 in windows:
-            self.window(w, z0, z1, y0, y1)
-
-    def window(self, x, z0, z1, y0, y1, deep=0.2, thick=0.04):
-        white = material(SATIN, color=(0.8, 0.8, 0.78))
-        sides = ((y0 - thick, y0, z0 - thick, z1 + thick), (y1, y1 + thick, z0 - thick, z1 + thick),
-                 (y0, y1, z0 - thick, z0), (y0, y1, z1, z1 + thick))
-        self.add(*(box("reveal", (x, low, a), (x + deep, high, b), white) for low, high, a, b in sides))
-        middle = (z0 + z1) / 2
-        self.add(box("mullion", (x + 0.08, y0, middle - 0.03), (x + 0.13, y1, middle + 0.03),
-                     material(color=(0.8, 0.8, 0.78))))
-
-
-def kitchen(rng):
-    room = Room((4.5, 2.6, 4.0), rng)
-    room.walls(floor=material(roughness=0.15, specular=0.5,
-                              texture=tiles(rng, ((0.7, 0.68, 0.62), (0.08, 0.08, 0.09)))),
-               wall=material(color=(0.62, 0.68, 0.6)), ceiling=material(color=(0.82, 0.82, 0.82)))
-    backsplash = tiles(rng, ((0.75, 0.78, 0.8),), count=2, joint=(0.25, 0.25, 0.25), joint_width=8)
-    room.add(quad("backsplash", (0.6, 0.9, 0.01), (3.3, 0, 0), (0, 0.6, 0),
-                  material(roughness=0.2236, specular=0.5, texture=backsplash), (8, 1.5)))
-    for k, name in enumerate(("kitchenLowerCabinet", "largeStove", "kitchenDrawersCabinet", "kitchenLowerCabinet")):
-        room.model("blendswap-cc-by/" + name, (0.9 + 0.85 * k, 0, 0.33), height=0.9)
-        if k != 1:
-            room.model("blendswap-cc-by/kitchenUpperCabinet", (0.9 + 0.85 * k, 1.5, 0.2), height=0.75)
-    white = material(color=(0.8, 0.8, 0.8))
-    room.add(box("strip-body", (2.3, 1.47, 0.1), (3.8, 1.5, 0.16), white),
-             quad("strip", (2.32, 1.468, 0.11), (1.46, 0, 0), (0, 0, 0.04), material(emission=(16, 17, 18))))
-    for x in (1.2, 3.2):
-        for z in (1.4, 3.0):
-            room.add(box("spot-ring", (x - 0.09, 2.56, z - 0.09), (x + 0.09, 2.598, z + 0.09),
-                         material(METAL, color=(0.7, 0.7, 0.7))),
-                     quad("spot", (x - 0.06, 2.557, z - 0.06), (0.12, 0, 0), (0, 0, 0.12),
-                          material(emission=(40, 34, 26))))
-    for name, at, how in (
-            ("blendswap-cc-0/largeFridge", (4.1, 0, 2.2), dict(height=1.85, turned=-90)),
-            ("blendswap-cc-by/microwave", (3.4, 0.91, 0.33), dict(height=0.3)),
-            ("blendswap-cc-0/kitchenaid", (2.4, 0.91, 0.33), dict(height=0.38, turned=20)),
-            ("blendswap-cc-by/espressokettle", (1.7, 0.93, 0.35), dict(height=0.22)),
-            ("blendswap-cc-0/oakTable", (1.5, 0, 2.6), dict(height=0.75)),
-            ("blendswap-cc-0/oakChair", (1.5, 0, 1.8), dict(height=0.95)),
-            ("blendswap-cc-0/oakChair", (1.4, 0, 3.4), dict(height=0.95, turned=180)),
-            ("blendswap-cc-by/chair3", (2.6, 0, 2.6), dict(height=0.9, turned=-90)),
-            ("scopia/teapot", (1.6, 0.76, 2.6), dict(height=0.2)),
-            ("katorlegaz/bowl", (1.2, 0.76, 2.7), dict(height=0.1)),
-            ("scopia/apples", (1.2, 0.8, 2.7), dict(height=0.1)),
-            ("katorlegaz/coffee-mug", (1.9, 0.76, 2.5), dict(height=0.1)),
-            ("blendswap-cc-by/yuccaPlant", (0.4, 0, 3.6), dict(height=1.3)),
-            ("blendswap-cc-0/radiator", (4.42, 0.1, 3.3), dict(height=0.6, turned=-90)),
-            ("blendswap-cc-0/whiteBoard", (0.08, 1.2, 2.0), dict(height=0.8, turned=90, blocks=False))):
-        room.model(name, at, **how)
-    room.add(quad("calendar", (0.02, 1.3, 3.5), (0, 0, -0.5), (0, 0.7, 0), material(texture=picture(rng))))
-    return room
-
-
-def parlour(rng):
-    room = Room((6.0, 2.8, 5.0), rng)
-    room.walls(floor=material(SATIN, texture=planks(rng)),
-               wall=material(texture=stripes(rng, (0.55, 0.5, 0.38), (0.7, 0.66, 0.55))),
-               ceiling=material(color=(0.8, 0.8, 0.78)), windows=((0.8, 2.2, 0.9, 2.3), (3.0, 4.4, 0.9, 2.3)))
-    leather = material(roughness=0.4472, specular=0.5, color=(0.35, 0.12, 0.1))
-    for name, at, how in (
-            ("blendswap-cc-0/L_shaped_sofa", (1.3, 0, 1.3), dict(width=2.2, kind=leather)),
-            ("katorlegaz/oriental-rug", (2.6, 0.002, 2.4), dict(width=2.4, blocks=False)),
-            ("blendswap-cc-by/coffeeTable", (2.7, 0.01, 2.5), dict(height=0.45)),
-            ("katorlegaz/full-bookcase", (0.25, 0, 3.2), dict(height=2.1, turned=90)),
-            ("katorlegaz/full-bookcase", (0.25, 0, 4.3), dict(height=2.1, turned=90)),
-            ("blendswap-cc-0/televisionCabinet", (3.2, 0, 4.65), dict(width=2.0, turned=180)),
-            ("blendswap-cc-0/modernArmchair", (4.6, 0, 1.0),
-             dict(height=0.8, turned=-40, kind=material(color=(0.15, 0.25, 0.4)))),
-            ("blendswap-cc-0/teddyBear", (4.6, 0.42, 1.0), dict(height=0.35, turned=-40)),
-            ("blendswap-cc-by/mediumIndoorPlant", (5.5, 0, 4.5), dict(height=1.3)),
-            ("katorlegaz/coffee-mug", (2.6, 0.46, 2.4), dict(height=0.12)),
-            ("blendswap-cc-by/clock", (0.1, 2.2, 1.5), dict(height=0.4, turned=90, blocks=False))):
-        room.model(name, at, **how)
-    room.add(box("screen-body", (2.5, 0.9, 4.8), (3.9, 1.7, 4.9),
-                 material(roughness=0.2, specular=0.5, color=(0.03, 0.03, 0.03))), blocks=True)
-    room.add(quad("screen", (2.55, 0.95, 4.79), (0, 0.7, 0), (1.3, 0, 0), material(emission=(0.9, 1.3, 2.0))),
-             box("lamp-rod", (2.98, 2.3, 2.48), (3.02, 2.8, 2.52), material(METAL, color=(0.6, 0.6, 0.6))),
-             sphere("lamp", (3.0, 2.2, 2.5), 0.12, material(emission=(9, 7.5, 5.5))))
-    for x in (1.2, 2.7, 4.2):
-        room.add(box("frame", (x - 0.05, 1.35, 0.001), (x + 0.95, 2.1, 0.028),
-                     material(roughness=0.3162, specular=1.0, color=(0.5, 0.35, 0.12))),
-                 quad("picture", (x, 1.4, 0.03), (0.9, 0, 0), (0, 0.65, 0),
-                      material(roughness=0.2, specular=0.5, texture=picture(rng))))
-    # From the horizon up bluer and darker, brighter towards +x, brown below.
-    up, around = directions()
-    along = 1 + 0.5 * np.cos(around - np.pi / 2)
-    room.sky = np.where(up > 0, (8, 9, 11) - up * np.array((5, 4, 3)), (2.2, 1.9, 1.5)) * along
-    return room
-
-
-def bedroom(rng):
-    room = Room((4.8, 2.7, 4.2), rng)
-    room.walls(floor=material(roughness=0.2, specular=0.5, texture=planks(rng, count=6, color=(0.5, 0.32, 0.18))),
-               wall=material(color=(0.75, 0.73, 0.68)), ceiling=material(color=(0.85, 0.85, 0.84)),
-               windows=((1.2, 2.8, 0.8, 2.2),))
-    room.add(quad("red-wall", (0.01, 0, 4.2), (0, 0, -4.2), (0, 2.7, 0), material(color=(0.6, 0.09, 0.07))))
-    for name, at, how in (
-            ("blendswap-cc-0/bedWithTexture", (1.3, 0, 2.1), dict(width=2.1, turned=90)),
-            ("blendswap-cc-by/bedsideTable", (0.35, 0, 0.7), dict(height=0.5, turned=90)),
-            ("blendswap-cc-by/bedsideTable", (0.35, 0, 3.5), dict(height=0.5, turned=90)),
-            ("blendswap-cc-by/wardrobe", (3.2, 0, 0.35), dict(height=2.0)),
-            ("blendswap-cc-by/dresserWithDrawers", (3.0, 0, 3.85), dict(height=0.9, turned=180)),
-            ("blendswap-cc-0/antiqueChair", (4.2, 0, 3.5), dict(height=1.0, turned=-120)),
-            ("blendswap-cc-0/pianoBench", (3.9, 0, 1.9), dict(height=0.45, turned=90)),
-            ("scopia/round-carpet", (3.2, 0.003, 2.2), dict(width=1.6, blocks=False)),
-            ("blendswap-cc-by/tulips", (2.7, 0.91, 3.85), dict(height=0.35)),
-            ("scopia/teapot", (3.4, 0.91, 3.85), dict(height=0.2)),
-            ("blendswap-cc-0/cactus", (4.45, 0, 0.5), dict(height=0.8))):
-        room.model(name, at, **how)
-    for z in (0.7, 3.5):
-        room.add(box("lamp-foot", (0.32, 0.5, z - 0.03), (0.38, 0.72, z + 0.03), material(METAL, color=(0.5, 0.4, 0.2))),
-                 sphere("lamp-shade", (0.35, 0.8, z), 0.11, material(color=(0.7, 0.6, 0.45), emission=(3.5, 2.2, 1.1))))
-    room.add(box("mirror-frame", (2.2, 1.1, 4.16), (3.8, 2.1, 4.199), material(SATIN, color=(0.2, 0.1, 0.05))),
-             quad("mirror", (3.72, 1.18, 4.155), (-1.44, 0, 0), (0, 0.84, 0),
-                  material(color=(0.25, 0.27, 0.28), roughness=0.12, specular=1.0)))
-    up, around = directions()
-    room.sky = np.where(up > 0, (3, 3.6, 4.5) - up * np.array((1.5, 1.5, 1.2)), (1.0, 0.9, 0.7)) * np.ones_like(around)
-    sun_at(room.sky, (0.72, 0.55, 0.3), (900, 800, 640))
-    return room
-
-
-def lounge(rng):
-    room = Room((6.5, 3.2, 5.0), rng)
-    room.walls(floor=material(POLISHED, texture=tiles(rng, ((0.25, 0.14, 0.08), (0.4, 0.26, 0.15)), count=8,
-                                                      joint=(0.1, 0.06, 0.04), joint_width=2)),
-               wall=material(color=(0.42, 0.5, 0.52)), ceiling=material(color=(0.78, 0.76, 0.7)))
-    for k in range(3):
-        room.add(quad("pane", (6.49, 1.0, 1.15 + 0.95 * k), (0, 0, 0.85), (0, 1.5, 0), material(emission=(7, 8, 9.5))))
-    room.add(box("window-frame", (6.46, 0.9, 1.0), (6.498, 1.0, 4.0), material(SATIN, color=(0.85, 0.85, 0.85))),
-             box("window-frame", (6.46, 2.5, 1.0), (6.498, 2.6, 4.0), material(SATIN, color=(0.85, 0.85, 0.85))))
-    for z in (1.0, 2.0, 2.95, 3.9):
-        room.add(box("window-post", (6.46, 1.0, z), (6.498, 2.5, z + 0.14), material(SATIN, color=(0.85, 0.85, 0.85))))
-    for name, at, how in (
-            ("blendswap-cc-0/pianoAQueue", (4.6, 0, 3.9), dict(width=1.6, turned=200)),
-            ("blendswap-cc-0/winchesterSofa", (1.6, 0, 0.6), dict(width=2.0)),
-            ("blendswap-cc-0/winchesterArmchair", (0.7, 0, 2.4), dict(width=1.0, turned=80)),
-            ("blendswap-cc-0/oakTable", (4.3, 0, 1.4), dict(height=0.75)),
-            ("blendswap-cc-0/thonet", (4.3, 0, 0.7), dict(height=0.95)),
-            ("blendswap-cc-0/thonet", (4.2, 0, 2.2), dict(height=0.95, turned=180)),
-            ("blendswap-cc-0/electricGuitar", (0.25, 0.02, 3.6), dict(height=1.0, turned=90)),
-            ("blendswap-cc-0/decorativePlant", (6.0, 0, 0.5), dict(height=1.4)),
-            ("katorlegaz/oriental-rug", (1.8, 0.002, 2.4), dict(width=2.2, blocks=False)),
-            ("blendswap-cc-by/coffeeTable", (1.8, 0.01, 2.2), dict(height=0.42)),
-            ("scopia/vase2", (4.3, 0.76, 1.4), dict(height=0.3)),
-            ("blendswap-cc-by/bulldog", (2.9, 0, 3.4), dict(height=0.4, turned=150)),
-            ("blendswap-cc-by/laptop", (1.8, 0.43, 2.2), dict(width=0.35, turned=20)),
-            ("scopia/fireplace1", (2.2, 0, 4.75), dict(height=1.2, turned=180))):
-        room.model(name, at, **how)
-    brass = material(METAL, color=(0.6, 0.42, 0.15))
-    room.add(box("chandelier", (3.2, 2.35, 2.3), (3.3, 3.2, 2.4), brass))
-    for k in range(12):
-        x, z = 3.25 + 0.4 * np.cos(np.pi * k / 6), 2.35 + 0.4 * np.sin(np.pi * k / 6)
-        room.add(sphere("bulb", (x, 2.42, z), 0.03, material(emission=(45, 36, 24)), rows=10),
-                 box("arm", (min(x, 3.25), 2.36, min(z, 2.35)), (max(x, 3.25) + 0.01, 2.38, max(z, 2.35) + 0.01), brass))
-    room.add(box("stand", (0.38, 0, 4.48), (0.42, 1.5, 4.52), brass),
-             sphere("warm-lamp", (0.4, 1.6, 4.5), 0.13, material(emission=(16, 8, 2.5))),
-             quad("blue-tube", (5.2, 3.19, 0.2), (1.0, 0, 0), (0, 0, 0.06), material(emission=(2, 5, 20))))
-    for x in (3.2, 4.9):
-        room.add(quad("picture", (x, 1.5, 0.03), (1.1, 0, 0), (0, 0.8, 0), material(texture=picture(rng))))
-    return room
-
-
-def study(rng):
-    room = Room((7.0, 2.7, 4.5), rng)
-    wall = material(color=(0.66, 0.62, 0.54))
-    room.walls(floor=material(POLISHED, texture=planks(rng, count=10, color=(0.3, 0.17, 0.09))), wall=wall,
-               ceiling=material(color=(0.8, 0.8, 0.8)), windows=((1.0, 3.4, 0.8, 2.2),))
-    slats = [quad("blinds", (6.94, y, 1.02), (0, 0, 2.36), (0.022, 0.012, 0), wall) for y in np.arange(0.82, 2.18, 0.035)]
-    room.add(join("blinds", slats, material(roughness=0.4472, specular=0.5, color=(0.75, 0.73, 0.68))),
-             box("partition", (2.35, 0, 0), (2.45, 2.7, 1.4), wall), box("partition", (2.35, 0, 2.3), (2.45, 2.7, 4.5), wall),
-             box("lintel", (2.35, 2.0, 1.4), (2.45, 2.7, 2.3), wall),
-             sphere("hall-lamp", (1.2, 2.3, 2.2), 0.1, material(emission=(34, 32, 28))))
-    room.boxes += [(np.array((2.1, 0, 0)), np.array((2.7, 2.7, 1.6))), (np.array((2.1, 0, 2.1)), np.array((2.7, 2.7, 4.5)))]
-    room.add(box("panels", (3.0, 0, 4.47), (7.0, 1.3, 4.499), material(POLISHED, texture=planks(rng, color=(0.16, 0.08, 0.05)))),
-             box("mirror-frame", (4.1, 0.5, 0.001), (5.9, 2.1, 0.03), material(SATIN, color=(0.03, 0.03, 0.03))),
-             quad("mirror", (4.15, 0.55, 0.035), (1.7, 0, 0), (0, 1.5, 0),
-                  material(color=(0.3, 0.32, 0.33), roughness=0.05, specular=1.0)),
-             box("screen-body", (2.451, 1.1, 2.6), (2.48, 1.95, 4.0), material(POLISHED, color=(0.03, 0.03, 0.03))),
-             quad("screen", (2.485, 1.15, 3.95), (0, 0, -1.3), (0, 0.75, 0),
-                  material(color=(0.02, 0.02, 0.02), emission=3.0 * picture(rng) ** 2)))
-    for name, at, how in (
-            ("katorlegaz/custom-desk", (5.2, 0, 3.7), dict(width=1.8, turned=180)),
-            ("katorlegaz/office-chair", (5.1, 0, 2.8), dict(height=1.0, turned=20)),
-            ("blendswap-cc-0/verticalShelves", (3.5, 0, 0.3), dict(height=2.0)),
-            ("blendswap-cc-by/bookcase", (0.25, 0, 1.2), dict(height=2.0, turned=90)),
-            ("blendswap-cc-0/designChair", (3.3, 0, 3.3), dict(height=0.9, turned=130)),
-            ("blendswap-cc-by/suitcase", (0.5, 0, 3.9), dict(height=0.6, turned=60)),
-            ("blendswap-cc-by/yuccaPlant", (6.5, 0, 0.5), dict(height=1.4)),
-            ("scopia/cardboard-box", (1.8, 0, 0.5), dict(height=0.4, turned=15)),
-            ("blendswap-cc-by/radio", (5.8, 0.78, 3.8), dict(height=0.2, turned=180)),
-            ("scopia/round-carpet", (4.6, 0.003, 1.8), dict(width=1.8, blocks=False)),
-            ("blendswap-cc-by/clock", (0.1, 2.1, 3.2), dict(height=0.35, turned=90, blocks=False))):
-        room.model(name, at, **how)
-    room.add(box("lamp-hood", (4.6, 1.25, 3.6), (4.9, 1.29, 3.9), material(SATIN, color=(0.05, 0.15, 0.08))),
-             box("lamp-rod", (4.73, 0.78, 3.87), (4.77, 1.25, 3.9), material(METAL, color=(0.5, 0.5, 0.5))),
-             sphere("lamp", (4.75, 1.2, 3.75), 0.04, material(emission=(60, 44, 26))))
-    up, around = directions()
-    room.sky = np.where(up > 0, (4, 4.8, 6) - up * np.array((2, 2, 2)), (1.2, 1.1, 0.8)) * np.ones_like(around)
-    sun_at(room.sky, (0.75, 0.42, -0.25), (700, 600, 450))
-    return room
-
-
-def cafe(rng):
-    room = Room((8.0, 3.0, 6.0), rng)
-    room.walls(floor=material(roughness=0.3162, specular=0.5,
-                              texture=tiles(rng, ((0.55, 0.5, 0.42), (0.12, 0.16, 0.18), (0.4, 0.2, 0.12)), count=6)),
-               wall=material(color=(0.1, 0.16, 0.24)), ceiling=material(color=(0.35, 0.34, 0.33)),
-               windows=((0.8, 2.0, 0.7, 2.5), (2.4, 3.6, 0.7, 2.5), (4.0, 5.2, 0.7, 2.5)))
-    marble = material(roughness=0.1, specular=0.5, color=(0.75, 0.73, 0.7))
-    room.add(box("counter", (1.2, 0, 1.2), (1.9, 1.0, 4.2), material(SATIN, texture=planks(rng, count=12, color=(0.45, 0.25, 0.1)))),
-             box("counter-top", (1.1, 1.0, 1.1), (2.0, 1.05, 4.3), marble), blocks=True)
-    for k in range(3):
-        z = 1.8 + 0.9 * k
-        room.add(box("cord", (1.545, 2.0, z - 0.005), (1.555, 3.0, z + 0.005), material(color=(0.05, 0.05, 0.05))),
-                 box("pendant-cap", (1.5, 1.97, z - 0.05), (1.6, 2.03, z + 0.05), material(METAL, color=(0.7, 0.4, 0.2))),
-                 sphere("pendant", (1.55, 1.88, z), 0.09, material(emission=(24, 17, 9))))
-    room.add(box("board-body", (0.001, 1.7, 1.4), (0.06, 2.6, 3.9), material(METAL, color=(0.3, 0.3, 0.3))),
-             quad("board", (0.065, 1.75, 3.85), (0, 0, -2.4), (0, 0.8, 0),
-                  material(color=(0.05, 0.05, 0.05), emission=4.0 * picture(rng))),
-             quad("neon", (3.0, 2.2, 0.02), (1.6, 0, 0), (0, 0.05, 0), material(emission=(18, 1.5, 4))),
-             quad("neon", (3.0, 2.35, 0.02), (1.2, 0, 0), (0, 0.05, 0), material(emission=(1.5, 5, 16))),
-             quad("panel", (5.0, 2.995, 2.4), (1.2, 0, 0), (0, 0, 1.2), material(emission=(5, 5.2, 5.5))),
-             box("mirror-frame", (4.9, 0.9, 5.95), (6.9, 2.3, 5.999), material(SATIN, color=(0.4, 0.28, 0.08))),
-             quad("mirror", (6.85, 0.95, 5.945), (-1.9, 0, 0), (0, 1.3, 0),
-                  material(color=(0.3, 0.32, 0.33), roughness=0.08, specular=1.0)),
-             quad("brick", (4.4, 0, 5.99), (-4.4, 0, 0), (0, 3.0, 0),
-                  material(texture=tiles(rng, ((0.4, 0.13, 0.08), (0.5, 0.2, 0.12)), joint=(0.6, 0.58, 0.55))), (5, 4)))
-    for name, at, how in (
-            ("blendswap-cc-0/coffeeBrewer", (1.5, 1.05, 3.7), dict(height=0.45, turned=90)),
-            ("blendswap-cc-by/coffee_cup", (1.6, 1.05, 2.9), dict(height=0.1)),
-            ("blendswap-cc-by/breadBox", (1.5, 1.05, 1.6), dict(height=0.25, turned=80)),
-            ("blendswap-cc-by/beer_bottle", (1.7, 1.05, 2.3), dict(height=0.25)),
-            ("blendswap-cc-0/stool", (2.5, 0, 2.0), dict(height=0.75)),
-            ("blendswap-cc-0/stool", (2.5, 0, 3.2), dict(height=0.75)),
-            ("blendswap-cc-0/tableWithTablecloth", (4.2, 0, 1.4), dict(height=0.75)),
-            ("blendswap-cc-by/cafe_set_tonon_chair", (3.4, 0, 1.4), dict(height=0.85, turned=90)),
-            ("blendswap-cc-by/cafe_set_tonon_chair", (5.0, 0, 1.5), dict(height=0.85, turned=-90)),
-            ("blendswap-cc-by/table", (5.6, 0, 4.2), dict(height=0.75)),
-            ("blendswap-cc-by/leaf_chair", (4.8, 0, 4.9), dict(height=0.85, turned=150)),
-            ("blendswap-cc-0/antiqueChair", (6.4, 0, 4.0), dict(height=1.0, turned=-80)),
-            ("blendswap-cc-by/succulentPlant", (5.6, 0.76, 4.2), dict(height=0.2)),
-            ("blendswap-cc-0/bread", (4.2, 0.76, 1.4), dict(height=0.12)),
-            ("scopia/candelabre", (4.0, 0.76, 1.2), dict(height=0.3)),
-            ("blendswap-cc-by/bike", (6.9, 0, 0.5), dict(height=1.0)),
-            ("blendswap-cc-0/decorativePlant", (7.4, 0, 5.5), dict(height=1.5)),
-            ("katorlegaz/full-bookcase", (3.4, 0, 5.7), dict(height=2.0, turned=180)),
-            ("blendswap-cc-0/umbrella", (0.4, 0, 5.4), dict(height=0.9)),
-            ("blendswap-cc-0/radiator", (7.92, 0.1, 3.0), dict(height=0.55, turned=-90))):
-        room.model(name, at, **how)
-    up, around = directions()
-    room.sky = np.where(up > 0, (2.4, 2.6, 2.9) * (1 + 2 * up) / 2, (0.5, 0.5, 0.45)) * np.ones_like(around)
-    return room
-
-
-def directions(height=128, width=256):
-    """Of the pixels of a map of light: the sine of elevation [height][1][1], the azimuth [1][width][1]. The first and the
-    last row are the poles, as Mitsuba 3 reads it."""
-    up = np.cos(np.pi * np.arange(height) / (height - 1))[:, None, None]
-    return up, (2 * np.pi * (np.arange(width) + 0.5) / width)[None, :, None]
-
-
-def sun_at(sky, direction, radiance):
-    """A disc of 3 degrees around the direction."""
-    up, around = directions(*sky.shape[:2])
-    sun = np.array(direction) / np.linalg.norm(direction)
-    toward = np.sqrt(1 - up * up) * (np.sin(around) * sun[0] - np.cos(around) * sun[2]) + up * sun[1]
-    sky += np.where(toward > np.cos(np.radians(3)), radiance, (0, 0, 0))
-
-
-# --- rendering -----------------------------------------------------------------------------------
-
-
-def spectrum(color):
-    """Of a colour, or of a texture."""
-    if np.ndim(color) == 1:
-        return {"type": "rgb", "value": [float(c) for c in color]}
-    return {"type": "bitmap", "bitmap": mi.Bitmap(color.astype(np.float32)), "raw": True}
-
-
-def texture_of(of):
-    return spectrum(of.color if of.texture is None else of.texture)
-
-
-def scene_of(room, shines):
-    """The room as it is; or, where shines(number, part) gives a texture, black and shining by that."""
-    scene = {"type": "scene"}
-    if shines is None and room.sky is not None:
-        scene["sky"] = {"type": "envmap", "bitmap": mi.Bitmap(room.sky.astype(np.float32))}
-    for number, part in enumerate(room.parts):
-        of, props = part.material, mi.Properties()
-        radiance = spectrum(of.emission)
-        bsdf = {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}}
-        if shines:
-            radiance = shines(number, part)
-        else:
-            bsdf = {"type": "twosided", "bsdf": {"type": "principled", "base_color": texture_of(of),
-                                                 "roughness": of.roughness, "specular": of.specular}}
-        props["bsdf"] = mi.load_dict(bsdf)
-        if shines or np.max(of.emission) > 0:
-            props["emitter"] = mi.load_dict({"type": "area", "radiance": radiance})
-        mesh = mi.Mesh(f"part{number}", len(part.positions), len(part.faces), has_vertex_normals=True,
-                       has_vertex_texcoords=True, props=props)
-        params = mi.traverse(mesh)
-        params["vertex_positions"] = part.positions.astype(np.float32).ravel()
-        params["vertex_normals"] = part.normals.astype(np.float32).ravel()
-        params["vertex_texcoords"] = part.uv.astype(np.float32).ravel()
-        params["faces"] = part.faces.astype(np.uint32).ravel()
-        params.update()
-        scene[f"part{number}"] = mesh
-    return mi.load_dict(scene)
-
-
-def render(scene, pose, spp, integrator, seed):
-    to_world = pose.copy()
-    to_world[:3, [0, 2]] *= -1  # theirs: x left, y up, z forward
-    sensor = mi.load_dict({
-        "type": "perspective", "fov": 2 * np.degrees(np.arctan(0.5 * WIDTH / FOCAL)), "fov_axis": "x",
-        "to_world": mi.ScalarTransform4f(to_world), "near_clip": 1e-3, "far_clip": 1e4,
-        "film": {"type": "hdrfilm", "width": WIDTH, "height": HEIGHT, "rfilter": {"type": "box"},
-                 "pixel_format": "rgb", "component_format": "float32"},
-        "sampler": {"type": "independent", "sample_count": spp}})
-    return np.array(mi.render(scene, sensor=sensor, integrator=mi.load_dict(integrator), spp=spp, seed=seed))
-
-
-def choose_poses(room, scene, count):
-    """Cameras anywhere at the height of hands and eyes, that look anywhere but at what is near."""
-    poses = []
-    while len(poses) < count:
-        at = room.rng.uniform((0.4, 0.9, 0.4), (room.size[0] - 0.4, 1.9, room.size[2] - 0.4))
-        back = at - room.rng.uniform((0, 0, 0), room.size)
-        distance = np.linalg.norm(back)
-        if distance < 1.5 or abs(back[1]) > 0.75 * distance or any(
-                np.all((at > low) & (at < high)) for low, high in room.boxes):
-            continue
-        back /= distance
-        ray = mi.Ray3f(mi.Point3f(*map(float, at)), mi.Vector3f(*map(float, -back)))
-        if float(scene.ray_intersect(ray).t[0]) < 0.7:
-            continue
-        pose = np.eye(4)
-        right = np.cross((0, 1, 0), back)
-        pose[:3, 0] = right / np.linalg.norm(right)
-        pose[:3, 1] = np.cross(back, pose[:3, 0])
-        pose[:3, 2], pose[:3, 3] = back, at
-        poses.append(pose)
-    return poses
-
-
-# --- the bundle ----------------------------------------------------------------------------------
+FRAMES = {**dict.fromkeys(rooms_boxes.ROOMS, (72, 8)), **dict.fromkeys((*rooms_choice.ROOMS, *rooms_report.ROOMS), (54, 6))}
+MAKE = {**rooms_boxes.ROOMS, **rooms_choice.ROOMS, **rooms_report.ROOMS}
 
 
 def write_mesh(room, path):
@@ -432,67 +43,54 @@ def write_mesh(room, path):
         out.write("\n".join(header).encode() + vertices.tobytes() + faces.tobytes())
 
 
-def write_transforms(path, poses, folder, kind, **more):
-    frames = [{"file_path": f"{folder}/{k:03d}.{kind}", "transform_matrix": pose.tolist(),
-               "split": "train" if k < TRAIN else "test"} for k, pose in enumerate(poses)]
-    for key, values in more.pop("of_frames", {}).items():
-        for frame, value in zip(frames, values):
-            frame[key] = value
-    json.dump({"camera_model": "PINHOLE", "w": WIDTH, "h": HEIGHT, "fl_x": FOCAL, "fl_y": FOCAL, "cx": WIDTH / 2,
-               "cy": HEIGHT / 2, **more, "frames": frames}, open(path, "w"))
+def pictures_of(room, shines, test, views):
+    """Of each of the poses `test` the views (spp, integrator, seed) of the room as it shines."""
+    scene = scene_of(room, shines)
+    return [[render(scene, pose, *view) for view in views] for pose in test]
 
 
-def write_photographs(room, scene, poses, out, spp):
+def write_truth(room, test, first, out):
+    """test: poses, whose numbers begin at `first`. Base colour averaged over the pixel; all else at one random place of
+    it, the same for all."""
+    emitted = {"type": "path", "max_depth": 1}
+    colors = pictures_of(room, lambda number, part: texture_of(part.material), test, [(64, emitted, 1)])
+    # A shape whose light is black would be no emitter: numbers from 1, all else a little more than 0.
+    others = pictures_of(room, lambda number, part: spectrum((part.material.roughness, part.material.specular + 1e-9,
+                                                              number + 1)), test, [(1, emitted, 2), (1, {"type": "depth"}, 2)])
+    lights = pictures_of(room, lambda number, part: spectrum(np.array(part.material.emission) + 1e-9), test,
+                         [(1, emitted, 2)])
+    names = [f"{what}.{c}" for what in ("base_color", "emission") for c in "RGB"]
+    for k, ((color,), (other, depth), (light,)) in enumerate(zip(colors, others, lights)):
+        light[light < 1e-6] = 0.0
+        channels = np.dstack([color, light, other[..., :2], np.round(other[..., 2:]) - 1, depth[..., :1]]).astype(np.float32)
+        mi.Bitmap(channels, pixel_format=mi.Bitmap.PixelFormat.MultiChannel, channel_names=names + [
+            "roughness", "specular", "object_id", "depth"]).write(f"{out}/truth/{first + k:03d}.exr")
+    with open(out + "/truth/objects.json", "w") as file:
+        json.dump([{"id": k, "name": p.name, "roughness": p.material.roughness, "specular": p.material.specular,
+                    "emission": np.reshape(p.material.emission, (-1, 3)).mean(0).tolist(),
+                    "base_color": list(map(float, p.material.color)),
+                    "base_color_texture": None if p.material.texture is None else p.name, "triangles": len(p.faces)}
+                   for k, p in enumerate(room.parts)], file, indent=1)
+
+
+def write_bundle(room, out, spp, train, test):
+    os.makedirs(out + "/truth", exist_ok=True)
+    scene = scene_of(room)
+    poses = choose_poses(room, scene, train + test)
+    write_mesh(room, out + "/mesh.ply")
     path = {"type": "path", "max_depth": DEPTH, "rr_depth": 8}
     images = [render(scene, pose, spp, path, k) for k, pose in enumerate(poses)]
-    base = 0.7 / float(np.median(images[:TRAIN]))
-    exposures = [base * EXPOSURES[k % 3] for k in range(len(images))]
-    for k, (image, exposure) in enumerate(zip(images, exposures)):
-        mi.Bitmap(image.astype(np.float16)).write(f"{out}/images/{k:03d}.exr")
-        shown = image * exposure
-        shown = np.clip(shown + 0.01 * np.sqrt(shown) * room.rng.normal(size=shown.shape), 0, 1)
-        mi.Bitmap(shown.astype(np.float32)).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.UInt8,
-                                                    srgb_gamma=True).write(f"{out}/sdr/{k:03d}.png")
-    write_transforms(out + "/transforms.json", poses, "images", "exr")
-    write_transforms(out + "/transforms_sdr.json", poses, "sdr", "png", response="srgb",
-                     of_frames={"exposure": exposures})
-
-
-def write_truth(room, poses, out):
-    """Base colour averaged over the pixel; all else at one random place of it, the same for all."""
-    emitted = {"type": "path", "max_depth": 1}
-    colors = scene_of(room, lambda number, part: texture_of(part.material))
-    # A shape whose light is black would be no emitter: numbers from 1, all else a little more than 0.
-    others = scene_of(room, lambda number, part: spectrum((part.material.roughness, part.material.specular + 1e-9,
-                                                           number + 1)))
-    lights = scene_of(room, lambda number, part: spectrum(np.array(part.material.emission) + 1e-9))
-    for k in range(TRAIN, TRAIN + TEST):
-        color = render(colors, poses[k], 64, emitted, 1)
-        other, light = render(others, poses[k], 1, emitted, 2), render(lights, poses[k], 1, emitted, 2)
-        light[light < 1e-6] = 0.0
-        depth = render(others, poses[k], 1, {"type": "depth"}, 2)[..., :1]
-        channels = np.dstack([color, light, other[..., :2], np.round(other[..., 2:]) - 1, depth]).astype(np.float32)
-        names = [f"{what}.{c}" for what in ("base_color", "emission") for c in "RGB"]
-        mi.Bitmap(channels, pixel_format=mi.Bitmap.PixelFormat.MultiChannel,
-                  channel_names=names + ["roughness", "specular", "object_id", "depth"]).write(f"{out}/truth/{k:03d}.exr")
-    json.dump([{"id": k, "name": p.name, "roughness": p.material.roughness, "specular": p.material.specular,
-                "emission": np.reshape(p.material.emission, (-1, 3)).mean(0).tolist(), "base_color": list(map(float, p.material.color)),
-                "base_color_texture": None if p.material.texture is None else p.name, "triangles": len(p.faces)}
-               for k, p in enumerate(room.parts)], open(out + "/truth/objects.json", "w"), indent=1)
+    write_hdr(images, poses, train, out)
+    write_exposures(images, poses, train, out, room.single_exposure)
+    light_truth.write(room, scene, poses[:train], out, max(16, spp // 4))
+    write_truth(room, poses[train:], train, out)
 
 
 def main():
     kind, out, spp = sys.argv[1], sys.argv[2], int(sys.argv[3]) if len(sys.argv) > 3 else 256
-    room = {"kitchen": kitchen, "parlour": parlour, "bedroom": bedroom, "lounge": lounge,
-            "study": study, "cafe": cafe}[kind](np.random.default_rng(1))
-    for folder in ("images", "sdr", "truth"):
-        os.makedirs(f"{out}/{folder}", exist_ok=True)
+    room = MAKE[kind](np.random.default_rng(1))
     print(f"{kind}: {len(room.parts)} objects, {sum(len(p.faces) for p in room.parts)} triangles", flush=True)
-    scene = scene_of(room, None)
-    poses = choose_poses(room, scene, TRAIN + TEST)
-    write_mesh(room, out + "/mesh.ply")
-    write_photographs(room, scene, poses, out, spp)
-    write_truth(room, poses, out)
+    write_bundle(room, out, spp, *FRAMES[kind])
 
 
 if __name__ == "__main__":
