@@ -233,12 +233,54 @@ static void test_submit(void) {
     script_end(&s, "usage");
 }
 
+/* --- check --------------------------------------------------------------------------------- */
+
+#define SCENE(facts) "{\"id\":\"abcdef\",\"state\":\"ready\",\"reading\":{\"scale\":2},\"facts\":" facts "}"
+#define FITS "\"fit\":{\"verdict\":\"yes\"}"
+
+static void test_check(void) {
+    struct script s = {0};
+    /* What an older server has checked is checked again, as it is read. */
+    add_reply(&s, "200 OK", "", SCENE("{}"), "GET /v1/scenes/abcdef", NULL, NULL);
+    add_reply(&s, "200 OK", "", "{\"id\":\"abcdef\",\"state\":\"checking\"}", "PATCH /v1/scenes/abcdef", NULL, NULL);
+    add_reply(&s, "200 OK", "", SCENE("{" FITS ",\"reading\":{\"scale\":3}}"), "GET /v1/scenes/abcdef", NULL, NULL);
+    script_start(&s);
+    CHECK_EXIT(client(&s, "check --scene abcdef"), 0);
+    CHECK_PART(out_text, "fit              yes");
+    CHECK_PART(out_text, "scale=3"); /* what the check took, not what was given */
+    script_end(&s, "check, no fit");
+    /* Where that may not be, it is shown as it is. */
+    add_reply(&s, "200 OK", "", SCENE("{}"), "GET /v1/scenes/abcdef", NULL, NULL);
+    add_reply(&s, "403 Forbidden", "", "{\"detail\":\"no\"}", "PATCH /v1/scenes/abcdef", NULL, NULL);
+    script_start(&s);
+    CHECK_EXIT(client(&s, "check --scene abcdef"), 0);
+    script_end(&s, "check, not again");
+
+    /* A picture is asked for again while the server is busy; one that lies elsewhere is not asked for. */
+    add_reply(&s, "200 OK", "",
+              SCENE("{" FITS ",\"previews\":[{\"name\":\"a.png\",\"href\":\"/v1/scenes/abcdef/preview/a.png\"}]}"),
+              "GET /v1/scenes/abcdef", NULL, NULL);
+    add_reply(&s, "503 Busy", "Retry-After: 0\r\n", "", "GET /v1/scenes/abcdef/preview/a.png", NULL, NULL);
+    add_reply(&s, "200 OK", "", "PNG", "GET /v1/scenes/abcdef/preview/a.png", NULL, NULL);
+    script_start(&s);
+    CHECK_EXIT(client(&s, "check --scene abcdef --pictures %s/got", root), 0);
+    check_file("a.png", "PNG");
+    script_end(&s, "check, picture");
+    add_reply(&s, "200 OK", "", SCENE("{" FITS ",\"previews\":[{\"name\":\"b.png\",\"href\":\"//elsewhere/b.png\"}]}"),
+              "GET /v1/scenes/abcdef", NULL, NULL);
+    script_start(&s);
+    CHECK_EXIT(client(&s, "check --scene abcdef --pictures %s/got", root), 7);
+    CHECK_PART(err_text, "unsafe name");
+    script_end(&s, "check, picture elsewhere");
+}
+
 int main(void) {
     if (!mkdtemp(root))
         return 1;
     test_get_resumes();
     test_get_distrusts();
     test_submit();
+    test_check();
     file_remove_tree(root, NULL);
     return check_result();
 }

@@ -5,6 +5,7 @@
 
 #include <dirent.h>
 #include <errno.h>
+#include <fcntl.h>
 #include <signal.h>
 #include <stdbool.h>
 #include <sys/resource.h>
@@ -195,8 +196,11 @@ static void test_random(void) {
                BUDGET / 1024);
     CHECK_THAT(most >= before + BUDGET / 2, "only %zu KiB are mapped, of a budget of %zu", (most - before) / 1024,
                BUDGET / 1024);
-    /* Of a freed one, and of one in memory. */
+    /* A freed one is no memory any more, as after free() of a large block; and one in memory. */
+    int null = open("/dev/zero", O_RDONLY | O_CLOEXEC);
     spill_give(l.s, l.array[0]);
+    CHECK(read(null, l.array[0], 1) == -1 && errno == EFAULT);
+    close(null);
     l.array[0] = spill_take(NULL, 1, 4);
     spill_use(l.s, l.array[0], 4);
     spill_use(NULL, l.array[0], 4);

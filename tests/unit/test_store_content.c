@@ -102,6 +102,14 @@ static void test_share(void) {
     drop_dir(dir);
 }
 
+static int64_t changed_job;
+static int changed_count;
+static void on_change(void *user, int64_t job_id) {
+    (void)user;
+    changed_job = job_id;
+    changed_count++;
+}
+
 #define OPENCV "{\"axes\":\"opencv\"}"
 
 static enum status read_as(struct store *store, const struct caller *who, const char *reading) {
@@ -140,9 +148,13 @@ static void test_reading(void) {
 
     /* One that comes with the same content counts as well, where it is another. */
     const struct caller nobody = {.role = ROLE_USER};
+    store_on_change(store, on_change, NULL);
+    changed_count = 0;
     OK(store_scene_give_reading(store, &nobody, SCENE_A, OPENCV, &err));
+    CHECK(changed_count == 0);
     check_scene(store, SCENE_READY, OPENCV, "{\"n\":2}");
     OK(store_scene_give_reading(store, &nobody, SCENE_A, "{}", &err));
+    CHECK(changed_count == 1);
     check_scene(store, SCENE_CHECKING, "{}", "{}");
     store_close(store);
     drop_dir(dir);
@@ -152,7 +164,7 @@ static void test_reading(void) {
 static void test_reading_and_jobs(void) {
     char *dir = fresh_dir(), token[TOKEN_SIZE];
     struct store *store;
-    struct caller alice, admin = {.role = ROLE_ADMIN};
+    struct caller alice, admin = {.role = ROLE_ADMIN, .user_id = 77};
     int64_t id, job;
     int attempt;
     OK(store_open(&store, dir, &err));
@@ -163,6 +175,7 @@ static void test_reading_and_jobs(void) {
     IS(read_as(store, &alice, OPENCV), STATUS_CONFLICT);
     CHECK_THAT(strstr(err.message, "another user") && *err.hint, "%s", err.message);
     OK(read_as(store, &admin, OPENCV));
+    OK(read_as(store, &alice, OPENCV)); /* as it is about to be checked: nobody is held up by that */
     IS(store_job_start(store, job, "process", &attempt, &err), STATUS_CONFLICT); /* while it is checked */
     OK(store_scene_ready(store, SCENE_A, OPENCV, "{}", &err));
     OK(store_job_start(store, job, "process", &attempt, &err));
@@ -175,6 +188,8 @@ static void test_reading_and_jobs(void) {
     OK(store_job_cancel(store, job, &err));
     OK(read_as(store, &alice, "{}"));
     check_scene(store, SCENE_CHECKING, "{}", "{}");
+    add_job(store, SCENE_A, 0);
+    OK(store_scene_give_reading(store, &admin, SCENE_A, OPENCV, &err)); /* whoever's job waits */
     store_close(store);
     drop_dir(dir);
 }
@@ -210,20 +225,13 @@ static void test_sent_again(void) {
 
 /* --- events and outputs ------------------------------------------------------------------------ */
 
-static int64_t changed_job;
-static int changed_count;
-static void on_change(void *user, int64_t job_id) {
-    (void)user;
-    changed_job = job_id;
-    changed_count++;
-}
-
 static void test_events(void) {
     char *dir = fresh_dir();
     struct store *store;
     int attempt;
     OK(store_open(&store, dir, &err));
     store_on_change(store, on_change, NULL);
+    changed_count = 0;
     add_ready_scene(store, SCENE_A);
     CHECK(changed_job == 0 && changed_count == 2);
     int64_t id = add_job(store, SCENE_A, 0), other = add_job(store, SCENE_A, 0);
