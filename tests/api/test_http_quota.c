@@ -128,8 +128,8 @@ static void test_arrivals(void) {
     await_no_arrivals();
     rig.api->config.user_max_uploads = 0;
 
-    fds[0] = begin(room / 1000 * 6);
     rig.api->config.user_pledge_percent = 1;
+    fds[0] = begin(room / 1000 * 6);
     CHECK(answer_to(fds[0], "user_pledge_percent") == 100);
     fds[1] = begin(room / 1000 * 6);
     CHECK(answer_to(fds[1], "user_pledge_percent") == 507);
