@@ -273,3 +273,8 @@ void color_inks_free(struct color_inks *inks) {
         release_profile(inks->icc);
     mem_free(inks);
 }
+
+void color_icc_version(char text[COLOR_VERSION_SIZE]) {
+    int version = cmsGetEncodedCMMversion(); /* 2140 for 2.14 */
+    snprintf(text, COLOR_VERSION_SIZE, "%d.%d", version / 1000, version % 1000 / 10);
+}

@@ -1,5 +1,5 @@
-/* color_icc.h -- colour spaces from ICC profiles, by Little CMS (littlecms.com, its API manual), in memory. Private
- * to the picture codecs. */
+/* color_icc.h -- colour spaces from ICC profiles, by Little CMS (littlecms.com, its API manual), in memory. For
+ * the picture codecs. */
 #ifndef UNBAKE_COMMON_COLOR_ICC_H
 #define UNBAKE_COMMON_COLOR_ICC_H
 
@@ -15,5 +15,8 @@ struct color_inks;
 struct color_inks *color_inks_new(const void *profile, size_t size, char warning[COLOR_WARNING_SIZE]);
 void color_inks_convert(const struct color_inks *inks, const float *cmyk, float *rgb, size_t count);
 void color_inks_free(struct color_inks *inks);
+
+#define COLOR_VERSION_SIZE 24
+void color_icc_version(char text[COLOR_VERSION_SIZE]); /* of Little CMS: "2.14" */
 
 #endif

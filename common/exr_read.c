@@ -121,3 +121,10 @@ enum status image_read_exr(struct image_source *source, bool probe, struct image
     exr_finish(&r.context);
     return status;
 }
+
+void image_exr_version(char text[IMAGE_VERSION_SIZE]) {
+    int major, minor, patch;
+    const char *extra;
+    exr_get_library_version(&major, &minor, &patch, &extra);
+    snprintf(text, IMAGE_VERSION_SIZE, "%d.%d.%d", major, minor, patch);
+}

@@ -121,9 +121,15 @@ enum status image_probe_photograph(const char *path, struct image *image, struct
 /* Whether cameras give their raw files, many of which are TIFF, such a name. image_read refuses them. */
 bool image_is_raw_name(const char *name);
 
-/* Version of libheif; and which decoder it was installed without, as a sentence, or NULL (its decoders are packages of
- * their own since Debian 13). */
+/* Versions of the codecs' libraries, as they say themselves: "1.6.39". */
+#define IMAGE_VERSION_SIZE 24
+const char *image_png_version(void);
 const char *image_heif_version(void);
+void image_exr_version(char text[IMAGE_VERSION_SIZE]);
+void image_tiff_version(char text[IMAGE_VERSION_SIZE]);
+void image_webp_version(char text[IMAGE_VERSION_SIZE]);
+/* Which decoder libheif was installed without, as a sentence, or NULL (its decoders are packages of their own since
+ * Debian 13). */
 const char *image_heif_lacks(void);
 
 enum image_exr_type { IMAGE_HALF, IMAGE_FLOAT };

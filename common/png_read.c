@@ -179,3 +179,5 @@ enum status image_read_png(struct image_source *source, bool probe, struct image
     mem_free(kept->row);
     return kept->status;
 }
+
+const char *image_png_version(void) { return png_get_libpng_ver(NULL); }

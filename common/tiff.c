@@ -308,3 +308,10 @@ enum status image_read_tiff(struct image_source *source, bool probe, struct imag
         TIFFClose(r.tiff);
     return status;
 }
+
+/* "LIBTIFF, Version 4.5.0", and lines on whose it is. */
+void image_tiff_version(char text[IMAGE_VERSION_SIZE]) {
+    const char *said = TIFFGetVersion();
+    said += strcspn(said, "0123456789");
+    snprintf(text, IMAGE_VERSION_SIZE, "%.*s", (int)strcspn(said, "\n"), said);
+}

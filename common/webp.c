@@ -120,3 +120,8 @@ enum status image_read_webp(struct image_source *source, bool probe, struct imag
     mem_free(bytes);
     return status;
 }
+
+void image_webp_version(char text[IMAGE_VERSION_SIZE]) {
+    int version = WebPGetDecoderVersion(); /* a byte each */
+    snprintf(text, IMAGE_VERSION_SIZE, "%d.%d.%d", version >> 16, version >> 8 & 255, version & 255);
+}

@@ -3,9 +3,11 @@
 
 #include <archive.h>
 #include <cjson/cJSON.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "common/buf.h"
+#include "common/color_icc.h"
 #include "common/image.h"
 #include "common/mem.h"
 #include "server/ingest/mesh/gltf_meshopt.h"
@@ -14,23 +16,43 @@
 #include "server/render/accel.h"
 #include "server/store/store.h"
 #include "server/transport/listener.h"
+#include "server/worker/confine.h"
 
 /* Some begin their version with their name. */
 static struct library named(const char *name, const char *prefix, const char *version) {
+    struct library made = {.name = name};
     size_t length = strlen(prefix);
-    return (struct library){name, strncmp(version, prefix, length) == 0 ? version + length : version};
+    snprintf(made.version, sizeof made.version, "%s",
+             strncmp(version, prefix, length) == 0 ? version + length : version);
+    return made;
+}
+
+/* One that writes its version. */
+static struct library written(const char *name, void (*write)(char text[LIBRARY_VERSION_SIZE])) {
+    struct library made = {.name = name};
+    write(made.version);
+    return made;
 }
 
 void libraries_list(struct library list[LIBRARY_COUNT]) {
-    list[0] = named("libmicrohttpd", "", listener_library_version());
-    list[1] = named("sqlite", "", store_library_version());
-    list[2] = named("embree", "Embree ", accel_library_version());
-    list[3] = named("libarchive", "libarchive ", archive_version_string());
-    list[4] = named("cjson", "", cJSON_Version());
-    list[5] = named("libheif", "", image_heif_version());
-    list[6] = named("meshoptimizer", "", gltf_meshopt_version());
-    list[7] = named("libexpat", "expat_", xml_library_version());
-    list[8] = named("gnutls", "", tls_library_version());
+    const struct library all[LIBRARY_COUNT] = {
+        named("libmicrohttpd", "", listener_library_version()),
+        named("gnutls", "", tls_library_version()),
+        named("sqlite", "", store_library_version()),
+        named("embree", "Embree ", accel_library_version()),
+        named("libarchive", "libarchive ", archive_version_string()),
+        named("cjson", "", cJSON_Version()),
+        written("openexr", image_exr_version),
+        named("libpng", "", image_png_version()),
+        written("libtiff", image_tiff_version),
+        named("libheif", "", image_heif_version()),
+        written("libwebp", image_webp_version),
+        written("lcms2", color_icc_version),
+        named("meshoptimizer", "", gltf_meshopt_version()),
+        named("libexpat", "expat_", xml_library_version()),
+        written("libseccomp", confine_library_version),
+    };
+    memcpy(list, all, sizeof all);
 }
 
 char *libraries_text(void) {

@@ -67,7 +67,8 @@ struct daemon {
     struct collector *collector;
     char address[CONFIG_ADDRESS_SIZE]; /* the address it listens on */
     unsigned long watched_rounds;      /* the scheduler's rounds when the watchdog was last fed */
-    struct api_library libraries[LIBRARY_COUNT];
+    struct library libraries[LIBRARY_COUNT];
+    struct api_library library_names[LIBRARY_COUNT]; /* the same, for the API */
     struct proxies proxies;
 };
 
@@ -103,14 +104,13 @@ static void on_revoked(void *user) {
 static enum status build(struct daemon *d, struct error *err) {
     const struct config *c = d->config;
     bool is_loopback;
-    struct library list[LIBRARY_COUNT];
-    libraries_list(list);
+    libraries_list(d->libraries);
     for (size_t i = 0; i < LIBRARY_COUNT; i++)
-        d->libraries[i] = (struct api_library){list[i].name, list[i].version};
+        d->library_names[i] = (struct api_library){d->libraries[i].name, d->libraries[i].version};
     proxies_parse(&d->proxies, c->trusted_proxies, c->proxy_field, NULL); /* was checked with the rest */
     const struct scheduler_config work =
         daemon_options_scheduler(c, process_executor_init(&d->executor, "/proc/self/exe", c->data_dir));
-    const struct api_config limits = daemon_options_api(c, &d->proxies, d->libraries);
+    const struct api_config limits = daemon_options_api(c, &d->proxies, d->library_names);
     const struct listener_config network = daemon_options_listener(c, d->address, &is_loopback);
     enum status status = store_open(&d->store, c->data_dir, err);
     if (status == STATUS_OK)

@@ -24,6 +24,9 @@ bool confine_files(const struct sandbox *sandbox);
  * `network` adds those needed to resolve a name and talk to a server. */
 bool confine_calls(bool network);
 
+#define CONFINE_VERSION_SIZE 24
+void confine_library_version(char text[CONFINE_VERSION_SIZE]); /* of libseccomp: "2.5.4" */
+
 /* After confine_calls(true): no more sockets and no more connections. */
 bool confine_to_connection(void);
 

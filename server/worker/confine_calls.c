@@ -11,6 +11,7 @@
 #include <linux/sched.h>
 #include <netinet/in.h>
 #include <seccomp.h>
+#include <stdio.h>
 #include <sys/ioctl.h>
 #include <sys/prctl.h>
 #include <sys/socket.h>
@@ -265,4 +266,9 @@ bool confine_to_connection(void) {
     /* No datagrams to other addresses either. */
     ok = ok && done(seccomp_rule_add(filter, SCMP_ACT_ERRNO(ENOSYS), SCMP_SYS(sendto), 1, SCMP_A4(SCMP_CMP_NE, 0, 0)));
     return load(filter, ok);
+}
+
+void confine_library_version(char text[CONFINE_VERSION_SIZE]) {
+    const struct scmp_version *version = seccomp_version();
+    snprintf(text, CONFINE_VERSION_SIZE, "%u.%u.%u", version->major, version->minor, version->micro);
 }
