@@ -58,18 +58,25 @@ carl=$(unbaked token add carl --data "$data")
 wrong=unbake_4_000000000000000000000000000000000000000000000000
 from() { local address=$1; shift; as "$@" -H "X-Forwarded-For: 192.0.2.99, $address"; }
 [ "$(awk '/login failed/ && /127.0.0.1/' "$work/log" | wc -l)" -ge 4 ] || fail "failed logins of before: $(grep login "$work/log")"
-found=$(for i in $(seq 24); do from 192.0.2.1 "$wrong" GET /v1/jobs; echo "$status"; done | uniq -c | xargs)
+# By one process at a time, and then three times: every 2 s one more is taken for a mistake, and a process may take as
+# long on a machine at work.
+throttled() { "$@"; rejected=$((rejected + $(grep -o 401 <<<"$status" | wc -l))); status=${status: -3}; expect 429 "$1"; }
+rejected=20
+found=$(curl -sS -m 60 -o "$work/body" -w '%{http_code}\n' -H "Authorization: Bearer $wrong" \
+    -H "X-Forwarded-For: 192.0.2.99, 192.0.2.1" "$url/v1/jobs?limit=[1-24]" | sort | uniq -c | xargs)
 equal "$found" "20 401 4 429" "24 wrong tokens"
-from 192.0.2.1 "$wrong" GET /v1/jobs; expect 429
-[[ $(header retry-after) =~ ^[12]$ ]] || fail "Retry-After is '$(header retry-after)'"
-equal "$(header connection)" close "Connection of a throttled reply"
+throttled from 192.0.2.1 "$wrong" GET '/v1/jobs#[1-3]'
+[[ $(header retry-after | tail -n 1) =~ ^[12]$ ]] || fail "Retry-After is '$(header retry-after)'"
+equal "$(header connection | tail -n 1)" close "Connection of a throttled reply"
 equal "$(field .type)" urn:unbake:too-many-tokens "type of a throttled reply"
-call POST /v1/session -H 'Content-Type: application/json' -H 'X-Forwarded-For: 192.0.2.1' -d "{\"token\":\"$wrong\"}"; expect 429 "by the page"
+throttled call POST '/v1/session#[1-3]' -H 'Content-Type: application/json' -H 'X-Forwarded-For: 192.0.2.1' -d "{\"token\":\"$wrong\"}"
 from 192.0.2.1 "$carl" GET /v1/jobs; expect 200 "a good token, from the same address"
 call POST /v1/session -H 'Content-Type: application/json' -H 'X-Forwarded-For: 192.0.2.1' -d "{\"token\":\"$carl\"}"; expect 200 "a login, from there"
 from 192.0.2.2 "$wrong" GET /v1/jobs; expect 401 "another address"
 from 192.0.2.1 "$carl" POST /v1/jobs/7/cancel; expect 404
-equal "$(jq -s '[.[] | select((.msg | startswith("login failed")) and .client == "192.0.2.1")] | length' "$work/log")" 21 "lines of that address"
+lines() { jq -s "[.[] | select((.msg | startswith(\"login failed\")) and .client == \"192.0.2.1\") | .msg | contains(\"more of them\") | select(. == $1)] | length" "$work/log"; }
+equal "$(lines false)" "$rejected" "lines of that address"
+[ "$(lines true)" -ge 1 ] || fail "no line says that more of them are not logged"
 jq -se 'any(.msg == "answered" and .user == "carl" and .client == "192.0.2.1")' "$work/log" >/dev/null || fail "no address of the client in the log"
 grep -qF "$wrong" "$work/log" && fail "a token is in the log"
 unbaked token revoke carl --data "$data" >/dev/null
