@@ -55,7 +55,7 @@ FUZZ_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(call built,$(FUZZ_SRC)))
 # The goals that build first and then run something build on all processors, unless told otherwise.
 BUILD = echo building... && $(MAKE) -s $(if $(filter -j%,$(MAKEFLAGS)),,-j$(shell nproc))
 
-.PHONY: all help deps man deb demo test tests check check-build benches bench fidelity rooms sensitivity paper many chaos soak asan tsan asan-build tsan-build fuzz \
+.PHONY: all help deps man deb demo test tests check check-build benches bench fidelity light rooms sensitivity paper many chaos soak asan tsan asan-build tsan-build fuzz \
         fuzzers fuzz-build portable format coverage coverage-build install clean
 .SECONDARY:
 .DELETE_ON_ERROR:
@@ -152,6 +152,10 @@ bench: ## print the speed ratios and write build/bench.json; LONG=1: also what t
 fidelity: deps ## compare with the truth of known rooms, some 6 minutes each; FIDELITY_QUALITY, FIDELITY_ROOMS
 	@+$(BUILD) all $(B)/tests/bench/reconstruct_room
 	@tests/bench/fidelity.sh $(B)
+
+light: deps ## compare the light that is found with that of known rooms (make rooms); LIGHT_ROOMS, LIGHT_KINDS, LIGHT_QUALITY
+	@+$(BUILD) all $(B)/tests/bench/reconstruct_room
+	@tests/bench/light.sh $(B)
 
 rooms: ## make furnished rooms with their truth, by Mitsuba 3, under build/rooms, for FIDELITY_ROOMS and LIGHT_ROOMS; ROOM_NAMES, ROOM_SPP
 	@deploy/install-deps.sh rooms

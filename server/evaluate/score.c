@@ -76,8 +76,11 @@ void score_add(struct score *score, const struct image *found, const struct imag
             score->seen_pixels += seen;
             for (int c = 0; c < 3; c++) {
                 add_square(&score->base_color_all, f[fc.base_color[c]], t[tc.base_color[c]]);
-                if (seen)
-                    add_square(&score->base_color_seen, f[fc.base_color[c]], t[tc.base_color[c]]);
+                if (!seen)
+                    continue;
+                add_square(&score->base_color_seen, f[fc.base_color[c]], t[tc.base_color[c]]);
+                score->base_color_found += (double)clampf(f[fc.base_color[c]], 0.0f, 1.0f);
+                score->base_color_truth += (double)clampf(t[tc.base_color[c]], 0.0f, 1.0f);
             }
             if (!seen || !one_object(truth, object, x, y))
                 continue;
@@ -88,6 +91,10 @@ void score_add(struct score *score, const struct image *found, const struct imag
 }
 
 double score_mean(struct score_sum sum) { return sum.count ? sum.sum / (double)sum.count : (double)NAN; }
+
+double score_base_color_ratio(const struct score *score) {
+    return score->base_color_truth > 0.0 ? score->base_color_found / score->base_color_truth : (double)NAN;
+}
 
 double score_psnr_db(struct score_sum sum) {
     double mean = score_mean(sum);

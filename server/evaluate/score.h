@@ -6,6 +6,7 @@
  *   base colour  10 log10(1 / mean squared error) over channels and pixels without an emitter or background sample,
  *                values clamped to [0, 1]; once over pixels all of whose samples are seen by a training view (seen.h;
  *                the headline figure), once over all
+ *                and the ratio of the means of both over the seen ones: light is told from albedo only up to a factor
  *   roughness,   the same over seen pixels whose 3 x 3 neighbourhood is one object of the truth
  *   specular
  *   emission     intersection over union of the emitting pixels; mean over pixels and channels of
@@ -32,15 +33,17 @@ struct score_sum {
 
 struct score {
     struct score_sum base_color_seen, base_color_all, roughness, specular, emission_log;
-    size_t emission_both, emission_either;    /* pixels */
-    size_t pixels, plain_pixels, seen_pixels; /* seen: plain and seen */
+    double base_color_found, base_color_truth; /* sums over the terms of base_color_seen */
+    size_t emission_both, emission_either;     /* pixels */
+    size_t pixels, plain_pixels, seen_pixels;  /* seen: plain and seen */
 };
 
 /* Adds a view. Pictures are of one size; flags[height * width] as above. */
 void score_add(struct score *score, const struct image *found, const struct image *truth, const uint8_t *flags);
 
-double score_mean(struct score_sum sum);              /* NaN when empty */
-double score_psnr_db(struct score_sum sum);           /* infinite without error, NaN when empty */
-double score_emission_iou(const struct score *score); /* 1 when neither emits anywhere */
+double score_mean(struct score_sum sum);                  /* NaN when empty */
+double score_base_color_ratio(const struct score *score); /* found by truth; NaN when the truth is black or empty */
+double score_psnr_db(struct score_sum sum);               /* infinite without error, NaN when empty */
+double score_emission_iou(const struct score *score);     /* 1 when neither emits anywhere */
 
 #endif

@@ -47,6 +47,7 @@ static void test_score(void) {
     CHECK_NEAR(score_mean(score.base_color_seen), (8 * 0.01 + 0.25) / 9, 1e-8);
     CHECK_NEAR(score_mean(score.base_color_all), (11 * 0.01 + 0.25) / 12, 1e-8);
     CHECK_NEAR(score_psnr_db(score.base_color_seen), 14.3573, 1e-4);
+    CHECK_NEAR(score_base_color_ratio(&score), (8 * 0.6 + 1.0) / (9 * 0.5), 1e-7); /* pixel 3 is not seen */
     /* Pixel 3 borders on another object, pixels 0 to 2 do not. */
     CHECK(score.roughness.count == 3);
     CHECK_NEAR(score_psnr_db(score.roughness), 20.0, 1e-4);
@@ -55,6 +56,7 @@ static void test_score(void) {
     /* log 3, log 4 - log 2, log 2, squared, over 18 values */
     CHECK_NEAR(score_mean(score.emission_log), (log(3) * log(3) + log(2) * log(2) + log(2) * log(2)) / 18, 1e-7);
     struct score nothing = {0};
+    CHECK(isnan(score_base_color_ratio(&nothing)));
     CHECK(isnan(score_psnr_db(nothing.roughness)) && score_emission_iou(&nothing) == 1.0);
     image_release(&truth);
     image_release(&found);
