@@ -29,6 +29,11 @@ static const struct server_command table[] = {
      "Looks at libraries, limits, permissions, the disk and what the kernel offers for the sandbox.\n"
      "Ends with 1 when something keeps the daemon from working.\n",
      "  unbaked doctor --config /etc/unbaked.conf\n", doctor_flags, doctor_command},
+    {"usage", "", "print the CPU hours of users' jobs by month, as CSV",
+     "A line for each month (UTC) and user: month, user, cpu_hours. The user is empty for jobs that were\n"
+     "submitted without a token. Time counts in the month in which it was entered: when an attempt ended, or\n"
+     "while others waited for their turns. Jobs that were removed count, too.\n",
+     "  unbaked usage >usage.csv\n  unbaked usage --json\n", usage_flags, usage_command},
     {"backup", "FILE", "write a consistent copy of the database, also while the daemon works",
      "FILE is a whole state.db: users, scenes, jobs, events. The files of scenes never change once they\n"
      "are there, those of a job only while it runs: copy those folders after it, with rsync, say. With\n"

@@ -62,6 +62,22 @@ static enum status token_revoke(struct store *store, const cJSON *request, cJSON
     return STATUS_OK;
 }
 
+static enum status usage(struct store *store, cJSON *reply, struct error *err) {
+    struct usage_row *rows;
+    size_t count;
+    enum status status = store_usage_list(store, &rows, &count, err);
+    cJSON *items = cJSON_AddArrayToObject(reply, "items");
+    for (size_t i = 0; i < count; i++) {
+        cJSON *item = cJSON_CreateObject();
+        json_add_string(item, "user", rows[i].user);
+        json_add_string(item, "month", rows[i].month);
+        json_add_number(item, "cpu_sec", rows[i].cpu_sec);
+        cJSON_AddItemToArray(items, item);
+    }
+    store_usage_release(rows, count);
+    return status;
+}
+
 /* The copy is unlinked before its descriptor is handed over: nothing is left behind. */
 static enum status backup(const char *data_dir, struct store *store, int *fd, struct error *err) {
     char *dir = layout_trash(data_dir), *path = layout_trash_file(data_dir, "backup-" LAYOUT_RANDOM);
@@ -97,6 +113,8 @@ enum status admin_request_do(const char *data_dir, struct store *store, const cJ
         return token_list(store, reply, err);
     if (strcmp(command, "token-revoke") == 0)
         return token_revoke(store, request, reply, err);
+    if (strcmp(command, "usage") == 0)
+        return usage(store, reply, err);
     if (strcmp(command, "backup") == 0)
         return backup(data_dir, store, fd, err);
     return error_set(err, STATUS_INPUT, "the daemon knows no command \"%.80s\"", command);

@@ -1,9 +1,10 @@
-/* admin_request.h -- what can be asked of a daemon's administration, and the work: tokens, backups. The daemon does it, or
+/* admin_request.h -- what can be asked of a daemon's administration, and the work: tokens, usage, backups. The daemon does it, or
  * the command itself where none runs (admin.h).
  *
  *      {"command": "token-add", "name", "role"}   {"id", "token"}
  *      {"command": "token-list"}                  {"items": [{"id", "user", "role", "created_ms"}, ...]}
  *      {"command": "token-revoke", "which"}       {"count"}
+ *      {"command": "usage"}                       {"items": [{"user", "month", "cpu_sec"}, ...]}
  *      {"command": "backup"}                      {}, and an open file: the copy of state.db */
 #ifndef UNBAKE_ADMIN_ADMIN_REQUEST_H
 #define UNBAKE_ADMIN_ADMIN_REQUEST_H

@@ -23,6 +23,7 @@ const struct flag token_flags[] = {
     COMMAND_HELP_FLAG,
     {0},
 };
+const struct flag usage_flags[] = {{"--json", NULL, "print JSON"}, INVOCATION_FLAGS, COMMAND_HELP_FLAG, {0}};
 const struct flag check_config_flags[] = {INVOCATION_FLAGS, COMMAND_HELP_FLAG, {0}};
 
 int command_failed(const struct error *err) {
@@ -107,6 +108,60 @@ int token_command(int argc, char **argv) {
             mem_free(text);
         } else {
             print_token_reply(action, reply);
+        }
+    }
+    cJSON_Delete(request);
+    cJSON_Delete(reply);
+    invocation_release(&in);
+    return code < 0 ? EXIT_SUCCESS : code;
+}
+
+/* --- usage --------------------------------------------------------------------------------- */
+
+/* As RFC 4180 has a field. */
+static void print_field(const char *text) {
+    bool is_quoted = strpbrk(text, "\",\r\n") != NULL;
+    if (is_quoted)
+        putchar('"');
+    for (; *text; text++) {
+        if (*text == '"')
+            putchar('"');
+        putchar(*text);
+    }
+    if (is_quoted)
+        putchar('"');
+}
+
+static void print_usage(const cJSON *items) {
+    const cJSON *item;
+    puts("month,user,cpu_hours");
+    cJSON_ArrayForEach(item, items) {
+        const char *month = "", *user = "";
+        double cpu_sec = 0.0;
+        json_string(item, "month", "a row", "", &month, NULL);
+        json_string(item, "user", "a row", "", &user, NULL);
+        json_number(item, "cpu_sec", "a row", 0.0, &cpu_sec, NULL);
+        printf("%s,", month);
+        print_field(user);
+        printf(",%.4f\n", cpu_sec / 3600.0);
+    }
+}
+
+int usage_command(int argc, char **argv) {
+    struct invocation in;
+    struct error err;
+    cJSON *request = cJSON_CreateObject(), *reply = NULL;
+    int fd, code = command_begin(CONFIG_FILE_DEFAULT, &in, argc, argv, usage_flags, 0, 0);
+    if (code < 0) {
+        json_add_string(request, "command", "usage");
+        if (admin_call(in.config.data_dir, request, &reply, &fd, &err) != STATUS_OK) {
+            code = command_failed(&err);
+        } else if (invocation_has(&in, "--json")) {
+            char *text = json_text(reply);
+            printf("%s\n", text);
+            mem_free(text);
+        } else {
+            print_usage(cJSON_GetObjectItem(reply, "items"));
         }
     }
     cJSON_Delete(request);

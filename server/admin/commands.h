@@ -1,12 +1,14 @@
-/* commands.h -- commands for whoever runs a daemon: tokens, backups, diagnosis. */
+/* commands.h -- commands for whoever runs a daemon: tokens, usage, backups, diagnosis. */
 #ifndef UNBAKE_ADMIN_COMMANDS_H
 #define UNBAKE_ADMIN_COMMANDS_H
 
 #include "server/invocation.h"
 
-extern const struct flag token_flags[], backup_flags[], restore_flags[], check_config_flags[], doctor_flags[];
+extern const struct flag token_flags[], usage_flags[], backup_flags[], restore_flags[], check_config_flags[],
+    doctor_flags[];
 
 int token_command(int argc, char **argv);
+int usage_command(int argc, char **argv);
 int backup_command(int argc, char **argv);  /* backup.c */
 int restore_command(int argc, char **argv); /* restore.c */
 int check_config_command(int argc, char **argv);

@@ -32,8 +32,9 @@ struct store {
     size_t events_per_job; /* kept for each job */
     struct unpaid {        /* CPU time that could not be entered; see turns.c */
         int64_t owner_id;
-        double weight;
-    } * unpaid; /* [unpaid_count], one a user; owned */
+        char month[8]; /* as in usage.h */
+        double weight, cpu_sec;
+    } * unpaid; /* [unpaid_count], one a user and month; owned */
     size_t unpaid_count;
     atomic_bool has_users;
 };

@@ -225,6 +225,14 @@ static const char step_17[] = "CREATE TABLE attempts ("
                               " SELECT id, attempt, 'process', 0 FROM jobs WHERE attempt > 0;"
                               "UPDATE outputs SET attempt = (SELECT attempt FROM jobs WHERE id = job_id);";
 
-const char *const schema_steps[] = {step_1,  step_2,  step_3,  step_4,  step_5,  step_6,  step_7,  step_8, step_9,
-                                    step_10, step_11, step_12, step_13, step_14, step_15, step_16, step_17};
+/* CPU time by months. What was used before is not known by month. */
+static const char step_18[] = "CREATE TABLE usage_months ("
+                              "  owner_id INTEGER NOT NULL,"
+                              "  month TEXT NOT NULL," /* "2026-01", UTC */
+                              "  cpu_sec REAL NOT NULL,"
+                              "  PRIMARY KEY (owner_id, month)"
+                              ") STRICT, WITHOUT ROWID;";
+
+const char *const schema_steps[] = {step_1,  step_2,  step_3,  step_4,  step_5,  step_6,  step_7,  step_8,  step_9,
+                                    step_10, step_11, step_12, step_13, step_14, step_15, step_16, step_17, step_18};
 const int schema_version = (int)(sizeof schema_steps / sizeof schema_steps[0]);

@@ -29,6 +29,7 @@
 #include "server/store/outputs.h"
 #include "server/store/retention.h"
 #include "server/store/uploads.h"
+#include "server/store/usage.h"
 #include "server/store/users.h"
 
 struct store; /* opaque */
@@ -168,10 +169,6 @@ struct job_patch {
 enum status store_job_patch(struct store *store, int64_t id, int64_t expected_revision, const struct job_patch *patch,
                             struct error *err);
 enum status store_job_delete(struct store *store, int64_t id, struct error *err); /* not a running one */
-/* Charges CPU time to a user. Where that fails, the charge is kept in memory; store_usage_pay and the next charge
- * enter it. */
-enum status store_usage_add(struct store *store, int64_t owner_id, double cpu_sec, struct error *err);
-enum status store_usage_pay(struct store *store, struct error *err);
 /* Users' requests. For a running job the request is only recorded; the scheduler fulfils it (wake it). A request for
  * the state that the job already has is STATUS_OK and changes nothing. Resume withdraws a request to pause. Retry is
  * for failed and cancelled jobs; with `from`, a stage that job_stage_parse knows (else NULL), also for succeeded

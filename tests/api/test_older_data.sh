@@ -1,6 +1,6 @@
 #!/bin/bash
 # A data folder as versions before 17 of state.db left it, with the files of all attempts of a job in one folder: what
-# has ended is served as before, and a job that ran when that daemon was killed goes on from its checkpoint.
+# has ended is served as before, and a job that ran when that daemon was killed goes on from its checkpoint. Then, what all that has taken of the processors.
 . tests/api/client.sh "$@"
 endless="--set texture_size=64 --set texels_per_metre=2 --set iterations=1000000000 --set texels_per_iteration=64"
 said() { "$build/unbake" logs 2 2>/dev/null | grep -q "$1"; }
@@ -21,7 +21,7 @@ for job in 1 2; do
     mv "$folder"/attempt-1/checkpoint/* "$folder/attempt-1/out" "$folder/attempt-1/job.json" "$folder"
     rm -r "$folder/attempt-1"
 done
-sqlite3 "$data/state.db" "DROP TABLE attempts; UPDATE outputs SET attempt = 7; PRAGMA user_version = 16" || fail "sqlite3"
+sqlite3 "$data/state.db" "DROP TABLE attempts; DROP TABLE usage_months; UPDATE outputs SET attempt = 7; PRAGMA user_version = 16" || fail "sqlite3"
 
 daemon_start --set checkpoint_interval_sec=1
 mkdir "$work/after"; run 0 get 1 -q -o "$work/after"
@@ -37,6 +37,10 @@ wait_for 60 job_is 2 cancelled
 wait_for 60 job_is 1 succeeded
 grep -q "the files of 2 jobs now lie in folders of their attempts" "$work/log" || fail "the log: $(cat "$work/log")"
 grep -i 'warning\|error' "$work/log" | grep -v 'min_free\|low_disk' && fail "the log"
+usage() { "$build/unbaked" usage --data "$data" "$@"; }
+usage | awk -F, 'NR == 1 { ok = $0 == "month,user,cpu_hours" } NR > 1 { ok = ok && $1 ~ /^20[0-9][0-9]-[01][0-9]$/ && $2 == "" && $3 > 0 }
+    END { exit !(ok && NR > 1) }' || fail "usage: $(usage)"
+[ "$(usage --json | jq '[.items[].cpu_sec] | add > 0.1')" = true ] || fail "usage: $(usage --json)"
 daemon_end TERM
 equal "$(sqlite3 "$data/state.db" "SELECT job_id || ' ' || number || ' ' || executor || ' ' || phase || ' ' || ending FROM attempts ORDER BY 1" | tr '\n' ';')" \
     "1 1 process 2 ;1 2 process 2 succeeded;2 1 process 2 restarted;2 2 process 2 stopped;" "the attempts"

@@ -231,7 +231,7 @@ static enum status reconcile(void) {
 }
 static enum status pay(void) {
     store->unpaid = mem_realloc_array(store->unpaid, 1, sizeof *store->unpaid);
-    store->unpaid[0] = (struct unpaid){alice.user_id, 100.0};
+    store->unpaid[0] = (struct unpaid){alice.user_id, "2026-01", 100.0, 1.0};
     store->unpaid_count = 1;
     return store_usage_pay(store, &err);
 }

@@ -1,6 +1,7 @@
 /* test_turns.c -- whose turn it is between users, and their limits. */
 #include <limits.h>
 
+#include "server/store/internal.h"
 #include "tests/sql_faults.h"
 #include "tests/unit/store_rig.h"
 
@@ -75,6 +76,44 @@ static void test_unpaid(void) {
     store_close(store);
     drop_dir(dir);
     store = other;
+}
+
+/* What was charged, by month and user; a charge that failed is in it once it is entered, and counts once. */
+static void test_months(void) {
+    char *dir = fresh_dir();
+    struct store *other;
+    struct usage_row *rows;
+    size_t count;
+    int64_t token;
+    char secret[TOKEN_SIZE];
+    double nobody = 0.0, ada = 0.0;
+    OK(store_open(&other, dir, &err));
+    OK(store_usage_list(other, &rows, &count, &err));
+    CHECK(count == 0);
+    store_usage_release(rows, count);
+    OK(store_token_add(other, "ada", ROLE_USER, secret, &token, &err));
+    OK(store_usage_add(other, 1, 3600.0, &err));
+    OK(store_usage_add(other, 0, 7.0, &err));
+    sql_faults_arm_only("INSERT INTO usage_months", 1, false);
+    CHECK(store_usage_add(other, 1, 1800.0, &err) != STATUS_OK && sql_faults_lift());
+    OK(store_usage_pay(other, &err));
+    OK(store_usage_pay(other, &err));
+    store_close(other);
+    OK(store_open(&other, dir, &err));
+    OK(sql_run(&other->sql, &err, "INSERT INTO usage_months VALUES (1, '1999-12', 5.0)", ""));
+    OK(store_usage_list(other, &rows, &count, &err));
+    CHECK(count >= 3 && strcmp(rows[0].month, "1999-12") == 0 && strcmp(rows[0].user, "ada") == 0);
+    for (size_t i = 1; i < count; i++) { /* more than one month where a month ends just now */
+        CHECK(strlen(rows[i].month) == 7 && strcmp(rows[i].month, "2020-01") > 0);
+        *(strcmp(rows[i].user, "ada") == 0 ? &ada : &nobody) += rows[i].cpu_sec;
+    }
+    CHECK_NEAR(ada, 5400.0, 1e-9);
+    CHECK_NEAR(nobody, 7.0, 1e-9);
+    store_usage_release(rows, count);
+    sql_faults_arm_only("FROM usage_months", 1, false);
+    CHECK(store_usage_list(other, &rows, &count, &err) != STATUS_OK && sql_faults_lift() && count == 0 && !rows);
+    store_close(other);
+    drop_dir(dir);
 }
 
 /* What runs already counts against the limit of running jobs, the user's own only. Returns a job of user 3
@@ -221,6 +260,7 @@ int main(void) {
     test_kept();
     test_bytes(running);
     test_unpaid();
+    test_months();
     store_close(store);
     drop_dir(dir);
     return check_result();
