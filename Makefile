@@ -72,6 +72,11 @@ deps: ## install the Debian packages that are missing (root or sudo)
 KERNEL_CFLAGS =
 $(B)/obj/server/render/%.o: ALL_CFLAGS += -O3 -fno-trapping-math $(KERNEL_CFLAGS)
 
+# Tests are compiled in a hurry, as a third of the build is theirs: what they wait for is the engine. Not benches, which
+# measure, nor fuzz targets.
+TEST_CFLAGS ?= -O1 -g1
+$(foreach d,unit gradient render api chaos soak,$(B)/obj/tests/$(d)/%.o): ALL_CFLAGS += $(TEST_CFLAGS)
+
 $(B)/obj/%.o: %.c
 	@mkdir -p $(@D)
 	$(CC) $(ALL_CFLAGS) -MMD -MP -c -o $@ $<
@@ -184,7 +189,7 @@ tsan: deps ## run all tests under the thread sanitizer
 
 # Lines of calls are all that a sanitizer's report wants of -g, which takes a sixth of a build's time.
 # With SANITIZED_TESTS=quick what run.sh does not run under the sanitizer every day is not built either.
-SANITIZED = CFLAGS="-O1 -g1"
+SANITIZED = CFLAGS="-O1 -g1" TEST_CFLAGS="-O0 -g1"
 unbuilt = $(if $(SANITIZED_TESTS),UNBUILT="$(shell tests/run.sh --slow $(1))")
 asan-build:
 	@$(MAKE) --no-print-directory B=build/asan $(SANITIZED) $(call unbuilt,asan) \

@@ -19,8 +19,8 @@ UNBAKE_TOKEN=$("$build/unbaked" token add ada --role admin --data "$data" 2>/dev
 export UNBAKE_TOKEN
 daemon_start
 make_room "$work/room" 12
-run 0 submit "$work/room" --set texture_size=64 --set iterations=20 --set texels_per_iteration=64 --set report_samples=1 --watch
-run 0 submit "$work/room" --set texture_size=64 --set iterations=1000000000 --set texels_per_iteration=64 --name 'one that runs'
+run 0 submit "$work/room" --set texture_size=64 --set texels_per_metre=2 --set iterations=20 --set texels_per_iteration=64 --set report_samples=1 --watch
+run 0 submit "$work/room" --set texture_size=64 --set texels_per_metre=2 --set iterations=1000000000 --set texels_per_iteration=64 --name 'one that runs'
 run 0 get 1 report.html -q -o "$work"
 for scheme in light dark; do
     echo "$scheme" >"$work/room/notes.txt"

@@ -81,7 +81,7 @@ run 2 scenes set
 run 2 scenes set "$id" scale=big
 run 2 scenes set "$id" --pin
 run 3 scenes set ffffffff scale=2
-run 0 submit "$work/room" --set texture_size=64 --set iterations=1 --set report_samples=1 --watch
+run 0 submit "$work/room" $tiny --watch
 has "$err" "read with scale=0.5 exposures=ignored"
 run 0 submit "$work/room" --scene-set scale=0.25 --dry-run --json
 so '.dry_run and .upload_bytes == 0 and .scene_state == "ready"'

@@ -8,7 +8,7 @@ set -u
 rm -r "$work/room/truth"
 start_daemon
 export UNBAKE_SERVER=$url
-"$build/unbake" submit "$work/room" --set texture_size=128 --set iterations=2 --set gather_samples=16 \
+"$build/unbake" submit "$work/room" --set texture_size=128 --set texels_per_metre=6 --set iterations=2 --set gather_samples=16 \
     --set report_samples=1 --watch >"$work/submit.log" 2>&1 || fail "submit: $(tail -n 5 "$work/submit.log")"
 call GET /v1/jobs
 expect 200

@@ -15,7 +15,7 @@
 #define TINY_MESH "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 4 3\n"
 /* Without braces: more may follow. */
 #define TINY_SETTINGS                                                                                                  \
-    "\"texture_size\":64,\"iterations\":1,\"texels_per_iteration\":64,"                                                \
+    "\"texture_size\":64,\"texels_per_metre\":16,\"iterations\":1,\"texels_per_iteration\":64,"                        \
     "\"cameras_per_texel\":1,\"samples_per_camera\":2,\"report_samples\":1,"                                           \
     "\"gather_samples\":16,\"gloss_passes\":1,\"preview_interval_sec\":60"
 
