@@ -29,7 +29,7 @@ struct environment {
                               * in, and `spread`, the standard deviation of log radiance among them; owned */
     bool *is_bound;          /* [height][width] all of them saturate there: the map holds a lower bound; NULL after
                               * sun_draw; owned */
-    rgb brightened;          /* factor by which lower bounds were brightened since (lamps.h) */
+    rgb brightened;          /* factor by which lower bounds were brightened since (light_estimate.h) */
     size_t photograph_count; /* with open pixels */
     double seen_share;       /* of the sphere */
     double saturated_share;  /* of what was seen: directions of which only a lower bound is known */

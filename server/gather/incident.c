@@ -45,7 +45,7 @@ static vec2 place_at(const struct world *world, const struct accel_hit *hit) {
     return (vec2){b0 * c[0].x + hit->b1 * c[1].x + hit->b2 * c[2].x, b0 * c[0].y + hit->b1 * c[1].y + hit->b2 * c[2].y};
 }
 
-static size_t texel_at(const struct world *world, const struct accel_hit *hit) {
+size_t incident_texel(const struct world *world, const struct accel_hit *hit) {
     vec2 at = place_at(world, hit);
     uint32_t width = world->atlas->width, height = world->atlas->height;
     uint32_t column = at.x > 0.0f ? (uint32_t)at.x : 0, row = at.y > 0.0f ? (uint32_t)at.y : 0;
@@ -69,7 +69,7 @@ static rgb incoming_radiance(const struct light_field *field, const struct accel
     }
     const struct world_triangle *t = &world->triangle[hit->triangle];
     if (!is_light(world, t))
-        return rgb_from_half(field->radiance[texel_at(world, hit)]);
+        return rgb_from_half(field->radiance[incident_texel(world, hit)]);
     *light_pdf = lights_pdf_segment(world->lights, t->segment, hit->distance_m, -vec3_dot(t->normal, ray->direction));
     vec2 at = place_at(world, hit);
     return materials_emission(world->materials, t->segment, at.x, at.y);
@@ -121,7 +121,7 @@ static void spawn_from_back(struct wavefront *w, const struct accel_ray *ray, co
                             struct incident_path path) {
     const struct world *world = w->field->world;
     const struct world_triangle *t = &world->triangle[hit->triangle];
-    const float *base = world->materials->base_color.texel[texel_at(world, hit)];
+    const float *base = world->materials->base_color.texel[incident_texel(world, hit)];
     vec3 frame[3] = {[2] = vec3_neg(t->normal)};
     vec3_frame(frame[2], &frame[0], &frame[1]);
     vec2 random = sampler_pair(w->key, w->first_sample + path.index, PAIR_CONTINUE + w->bounce);
@@ -173,7 +173,7 @@ static void sample_light(struct wavefront *w, const struct reflection *m, struct
 /* Russian roulette: the probability to continue, small where the specular share of the reflected light is. */
 static float continuation_probability(const struct world *world, const struct incident_lobe *lobe,
                                       const struct accel_hit *hit, float cosine) {
-    const float *base = world->materials->base_color.texel[texel_at(world, hit)];
+    const float *base = world->materials->base_color.texel[incident_texel(world, hit)];
     float diffuse = (base[0] + base[1] + base[2]) * (1.0f / 3.0f);
     float fresnel = bsdf_fresnel(cosine, bsdf_eta(lobe->specular));
     return fminf(1.0f, ROULETTE_FACTOR * fresnel / (fresnel + diffuse));

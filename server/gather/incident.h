@@ -57,6 +57,9 @@ struct incident {
     uint8_t occluded[INCIDENT_CHUNK];
 };
 
+/* The texel that a ray hits. */
+size_t incident_texel(const struct world *world, const struct accel_hit *hit);
+
 /* Cosine-distributed direction about frame[2] (Malley's method), from u in [0, 1)^2. */
 vec3 incident_cosine_direction(const vec3 frame[3], vec2 u);
 

@@ -85,6 +85,13 @@ static void observe_texel(const struct evidence_job *job, uint32_t texel, struct
     }
 }
 
+static size_t outshone_count(const struct shown_values *shown) {
+    size_t count = 0;
+    for (int edge = 0; edge <= VIEWS_EDGE; edge++)
+        count += shown[edge].outshone_count;
+    return count;
+}
+
 static void observe_segment(void *user, size_t segment, int thread) {
     (void)thread;
     struct evidence_job *job = user;
@@ -108,6 +115,7 @@ static void observe_segment(void *user, size_t segment, int thread) {
         best = &shown[0]; /* mostly outshone: no value */
     struct emitter_evidence *e = &job->evidence[segment];
     e->is_seen = is_own;
+    e->is_outshone = !is_own && outshone_count(shown) >= MIN_OBSERVATIONS;
     e->only_mixed = best == &shown[VIEWS_EDGE];
     float value[3] = {0};
     for (int c = 0; c < 3; c++)
@@ -126,12 +134,14 @@ void emitters_observe(const struct reconstruction *r, const struct views *views,
     by_segment_release(&job.texels);
 }
 
+bool emitters_outshine(float radiance, float median_radiance) { return radiance > BRIGHT * median_radiance; }
+
 void emitters_light_bright(struct reconstruction *r, const struct views *views,
                            const struct emitter_evidence *evidence) {
     for (size_t i = 0; i < r->segments.count; i++) {
         rgb shown = evidence[i].radiance;
-        bool shines =
-            evidence[i].is_hidden || evidence[i].is_unbounded || rgb_mean(shown) > BRIGHT * views->median_radiance;
+        bool shines = evidence[i].is_hidden || evidence[i].is_unbounded ||
+                      emitters_outshine(rgb_mean(shown), views->median_radiance);
         r->materials.emission[i] = shines ? shown : rgb_gray(0.0f);
     }
     world_update_lights(&r->world);

@@ -10,6 +10,9 @@
  * each; not those of hidden lamps, nor `shown` of what is unbound. */
 void emitters_observe(const struct reconstruction *r, const struct views *views, struct emitter_evidence *evidence);
 
+/* Whether a segment of this radiance outshines a room of that median. */
+bool emitters_outshine(float radiance, float median_radiance);
+
 /* Makes lights of what outshines the room, before it is known what emits: its emission is what is shown of it,
  * own and reflected light together; that of all else is 0. */
 void emitters_light_bright(struct reconstruction *r, const struct views *views,

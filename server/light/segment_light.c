@@ -22,10 +22,11 @@ void segment_light_release(struct segment_light *l) {
 
 struct lighting {
     const struct accel *accel;
-    struct light_place *place;
+    const struct light_point *point;
+    float *lit;
     float area_m2; /* that a point stands for */
-    size_t point_count;
-    struct surface_point point[SEGMENT_LIGHT_POINTS];
+    size_t source_count;
+    struct surface_point source[SEGMENT_LIGHT_POINTS];
 };
 
 /* Irradiance from a point that represents a disc, with visibility. */
@@ -45,28 +46,27 @@ static bool is_between(const struct accel *accel, const struct surface_point *fr
     return !(length > 0.0f) || accel_occluded(accel, start, vec3_scale(ray, 1.0f / length), 0.0f, length);
 }
 
-static void light_place(void *user, size_t index, int thread) {
+static void light_point(void *user, size_t index, int thread) {
     (void)thread;
     const struct lighting *l = user;
-    struct light_place *p = &l->place[index];
-    p->lit = 0.0f;
-    for (size_t i = 0; i < l->point_count; i++) {
-        float light = disc_light(&l->point[i], &p->at, l->area_m2);
-        if (light > 0.0f && !is_between(l->accel, &l->point[i], &p->at))
-            p->lit += light;
+    const struct surface_point *at = &l->point[index].at;
+    for (size_t i = 0; i < l->source_count; i++) {
+        float light = disc_light(&l->source[i], at, l->area_m2);
+        if (light > 0.0f && !is_between(l->accel, &l->source[i], at))
+            l->lit[index] += light;
     }
 }
 
-void segment_light_places(const struct segment_light *l, struct light_places *places, uint32_t segment, size_t points) {
+void segment_light_add(const struct segment_light *l, const struct light_point *point, size_t count, uint32_t segment,
+                       size_t points, float *lit) {
     const struct reconstruction *r = l->r;
-    struct lighting job = {.accel = r->world.accel, .place = places->place};
-    size_t count = by_segment_count(&l->texels, segment);
-    size_t wanted = count < points ? count : points;
+    struct lighting job = {.accel = r->world.accel, .point = point, .lit = lit};
+    size_t texels = by_segment_count(&l->texels, segment), wanted = texels < points ? texels : points;
     for (size_t i = 0; i < wanted; i++) {
         uint32_t texel = by_segment_spaced(&l->texels, segment, i, wanted);
-        job.point_count +=
-            surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &job.point[job.point_count]);
+        job.source_count +=
+            surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &job.source[job.source_count]);
     }
-    job.area_m2 = l->area_m2[segment] / fmaxf((float)job.point_count, 1.0f);
-    parallel_for(r->pool, places->count, light_place, &job);
+    job.area_m2 = l->area_m2[segment] / fmaxf((float)job.source_count, 1.0f);
+    parallel_for(r->pool, count, light_point, &job);
 }

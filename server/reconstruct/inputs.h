@@ -42,6 +42,7 @@ static inline struct optimiser_input inputs_of_optimiser(struct reconstruction *
                                     .is_emitter = r->is_emitter,
                                     .evidence = r->evidence,
                                     .sky_factor = &r->sky_factor,
+                                    .light = &r->light,
                                     .sun_irradiance = &r->sun.irradiance,
                                     .world = &r->world,
                                     .report = r->report,

@@ -8,9 +8,7 @@
 #include "common/protocol.h"
 #include "server/capture/views.h"
 #include "server/light/emitters.h"
-#include "server/light/lamp_find.h"
-#include "server/light/lamps.h"
-#include "server/light/saturated_light.h"
+#include "server/light/light_estimate.h"
 #include "server/light/sun_find.h"
 #include "server/light/unseen_light.h"
 #include "server/material/emission_pattern.h"
@@ -73,8 +71,7 @@ static enum status prepare(struct stage_run *run, struct error *err) {
 
 static enum status fuse_photographs(struct stage_run *run, struct error *err) {
     fuse(&run->r->fused, &run->views, &run->r->noise, &run->r->atlas, &run->r->inverse, run->r->pool);
-    saturated_light_estimate(run->r, &run->views);
-    lamp_find(run->r, &run->views);
+    light_estimate(run->r, &run->views);
     unseen_light_estimate(run->r, &run->views);
     sun_find(run->r, &run->views);
     log_hidden_lights(run);
@@ -119,8 +116,8 @@ static enum status run_resumable(struct stage_run *run, struct error *err) {
         status = run_stage(run, "solve", solve, err);
     bool was_solved = status == STATUS_OK && solves && found;
     run->r->has_materials = status == STATUS_OK;
-    if (was_solved && rgb_mean(run->r->sky_factor) != 1.0f) /* checkpoints hold this factor instead of the map */
-        lamps_brighten_sky(run->r, run->r->sky_factor);
+    if (was_solved)
+        light_restore(run->r);
     if (was_solved)
         restore_patterns(run);
     if (run->r->sun.is_there) {
@@ -137,6 +134,7 @@ static enum status run_resumable(struct stage_run *run, struct error *err) {
 static enum status report(struct stage_run *run, struct error *err) {
     world_update_lights(&run->r->world);
     report_emitters(run->r);
+    light_report(run->r);
     report_grey_card(run->r, run->hooks);
     enum status status = report_held_out(run->r, &run->views, &run->pace, err);
     plan_close(&run->r->plan, PLAN_REPORT);

@@ -8,7 +8,7 @@
 #include "server/gather/probes.h"
 #include "server/gather/sun_caustics.h"
 #include "server/light/emitters.h"
-#include "server/light/lamps.h"
+#include "server/light/light_estimate.h"
 #include "server/light/sun_refit.h"
 #include "server/material/detail.h"
 #include "server/material/divide_outgoing.h"
@@ -18,7 +18,7 @@
 #include "server/state/pace.h"
 
 /* The first pass finds outgoing radiance, the second specular lobes in that light, the last everything. The second is
- * skipped where most light is an estimate (unseen_light.h), whose error exceeds its gain. */
+ * skipped where most light is an estimate (r->sky_is_fitted), whose error exceeds its gain. */
 enum { PASS_LIGHT, PASS_SPECULAR, PASS_ALL, PASSES };
 /* Part of gather_samples that passes before the last use: twice the noise, in what is averaged over again. */
 #define EARLY_PASS_PART 0.25
@@ -208,13 +208,13 @@ static void solve_release(struct solve *s) {
 }
 
 /* Refits hidden and saturated lamps to outgoing radiance of the last pass; to its diffuse part once lobes are known. */
-static void refit_lamps(struct solve *s, int pass) {
+static void refit_light(struct solve *s, int pass) {
     struct fused diffuse;
     if (pass == PASS_SPECULAR || is_skipped(s, PASS_SPECULAR)) {
-        lamps_refit(s->r, s->views, &s->field, NULL);
-    } else if (lamps_are_estimated(s->r)) {
+        light_estimate_again(s->r, s->views, &s->field, NULL);
+    } else if (light_is_estimated(s->r)) {
         divide_diffuse(&s->divide, &diffuse);
-        lamps_refit(s->r, s->views, &s->field, &diffuse);
+        light_estimate_again(s->r, s->views, &s->field, &diffuse);
         fused_release(&diffuse);
     }
 }
@@ -238,7 +238,7 @@ static enum status solve_pass(struct solve *s, int pass, struct error *err) {
     if (pass == PASS_LIGHT) {
         emitters_light_bright(s->r, s->views, s->r->evidence);
     } else {
-        refit_lamps(s, pass);
+        refit_light(s, pass);
         solve_emitters_light(&s->emitters);
     }
     enum status status = gather(s, pass, err);

@@ -46,6 +46,7 @@ static void keep_common(struct optimiser *o) {
     optimiser_keep(o, "emission.adam", o->emission.adam.record, adam_bytes(&o->emission.adam));
     optimiser_keep(o, "emission.evidence", in->evidence, segments * sizeof *in->evidence);
     optimiser_keep(o, "environment.factor", in->sky_factor, sizeof *in->sky_factor);
+    optimiser_keep_since(o, 3, "light", in->light, sizeof *in->light);
     optimiser_keep(o, "sun.irradiance", in->sun_irradiance, sizeof *in->sun_irradiance);
     optimiser_keep(o, "emission.is_emitter", in->is_emitter, segments * sizeof *in->is_emitter);
     optimiser_keep_since(o, 2, "plan", &o->plan, sizeof o->plan);

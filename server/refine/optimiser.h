@@ -13,6 +13,7 @@
 
 #include "server/refine/emission.h"
 #include "server/refine/pass.h"
+#include "server/state/estimated_light.h"
 #include "server/state/evidence.h"
 #include "server/state/pace.h"
 
@@ -45,6 +46,7 @@ struct optimiser_input {
     bool *is_emitter;                  /* [segment_count] */
     struct emitter_evidence *evidence; /* [segment_count] */
     rgb *sky_factor, *sun_irradiance;  /* by solve; not changed here */
+    struct estimated_light *light;     /* the same */
     /* Written. */
     struct world *world;                    /* its lights follow the materials */
     cJSON *report;                          /* object */

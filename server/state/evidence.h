@@ -14,9 +14,10 @@ struct emitter_evidence {
     rgb observed;         /* median of the photographs; a lower bound in saturated channels */
     bool is_seen;         /* some photograph shows it, and not what is beside or behind it */
     bool only_mixed;      /* observed only in pixels that mix surfaces */
-    bool is_hidden;       /* a lamp that no photograph shows: `radiance` is inferred from its light (lamp_find.h) */
+    bool is_hidden;       /* a lamp that no photograph shows: `radiance` is inferred from its light (hidden_lamps.h) */
     bool saturated[3];    /* by channel: at least half of its pixels saturate */
-    bool is_unbounded;    /* a saturated lamp whose `radiance` is inferred from its light (saturated_light.h) */
+    bool is_unbounded;    /* a saturated lamp whose `radiance` is inferred from its light (light_model.h) */
+    bool is_outshone;     /* photographs show it, but no brighter than what is beside or behind it */
     rgb lambert;          /* mean radiance that a Lambertian surface of albedo 1 would reflect there */
     float emitted_share;  /* part of `radiance` beyond `lambert`, in [0, 1] */
     float changing_share; /* part of its surface whose light changed between photographs (changing_light.h) */

@@ -17,6 +17,7 @@
 #include "server/scene/inverse_uv.h"
 #include "server/scene/materials.h"
 #include "server/scene/scene.h"
+#include "server/state/estimated_light.h"
 #include "server/state/evidence.h"
 #include "server/state/hooks.h"
 #include "server/state/plan.h"
@@ -42,10 +43,11 @@ struct reconstruction {
     struct inverse_uv inverse;
     struct materials materials;
     struct world world;
-    struct environment environment;     /* distant light; map.pixel is NULL where no photograph shows any */
-    rgb sky_factor;                     /* by which solve brightened its saturated directions, or 1 */
-    struct sun sun;                     /* a sun that no photograph shows */
-    double unseen_share;                /* part of the rays from surfaces that meet nothing observed */
+    struct environment environment; /* distant light; map.pixel is NULL where no photograph shows any */
+    rgb sky_factor;                 /* by which solve brightened its saturated directions, in checkpoints of format 2 */
+    struct estimated_light light;   /* sources that are inferred from what they light */
+    struct sun sun;                 /* a sun that no photograph shows */
+    double unseen_share;            /* part of the rays from surfaces that meet nothing observed */
     bool exposures_drift, colors_drift; /* given exposures, white balance (calibrate.h) */
     bool sky_is_fitted;                 /* unobserved sky was fitted to surfaces (unseen_light.h), not filled in */
     struct grey_card grey_card;         /* a point of known reflectance */

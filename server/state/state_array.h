@@ -7,8 +7,9 @@
 /* Format of checkpoints, independent of the program's version. It grows when an array is added, or changes meaning or
  * layout under its name; the format before must then still be read.
  *   1: the present arrays without the following two.
- *   2: adds "plan", the planned and done amounts of each part of the work, and STATE_SURFACE. */
-#define STATE_FORMAT 2
+ *   2: adds "plan", the planned and done amounts of each part of the work, and STATE_SURFACE.
+ *   3: adds "light", the estimated sources of light. */
+#define STATE_FORMAT 3
 
 /* Name of an array of eight bytes: a hash of the surface parametrisation. A checkpoint with another one cannot be used
  * (each attempt makes the atlas again, and versions of the program may differ in it). */

@@ -1,4 +1,4 @@
-/* lamp_find.h: a lamp that no photograph shows is found by what it lights, and is as bright as it is; where the lamp
+/* hidden_lamps.h: a lamp that no photograph shows is found by what it lights, and is as bright as it is; where the lamp
  * was photographed, be it thinner than a pixel, nothing else is taken for one. The same for any number of threads. */
 #include "server/state/evidence.h"
 #include "server/state/reconstruction.h"

@@ -1,0 +1,207 @@
+/* hidden_lamps.c -- see hidden_lamps.h. */
+#include "server/light/hidden_lamps.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "common/mem.h"
+#include "common/spaced.h"
+#include "server/state/evidence.h"
+
+/* A few points of the room are asked about every candidate and few points of it; all are asked about the likeliest. */
+#define FEW_POINTS 2048
+#define FEW_SOURCE_POINTS 8
+#define LIKELIEST 8
+#define FITTED 4 /* of which are fitted together with all other sources */
+#define SOLVE_STEPS 8
+/* Prior odds: lamps expected among all candidates. */
+#define LAMPS_EXPECTED 1.0
+/* Nats of evidence that remain to be asked for. */
+#define SURE 3.0
+#define NO_LIGHT (-1e3) /* the logarithm of no radiance to speak of */
+
+struct lamp_candidate {
+    uint32_t segment;
+    double gain;      /* nats */
+    float *few, *all; /* columns of the response for the few and, when it was likely, for all points; owned */
+    struct joint_source source;
+};
+
+struct lamp_search {
+    struct light_model *m;
+    size_t few_count;
+    struct light_point *few;   /* [few_count] copies */
+    struct joint_point *joint; /* [few_count] */
+    struct joint_fit fit;      /* of these */
+    size_t count;
+    struct lamp_candidate *candidate;
+    bool all; /* points are asked */
+};
+
+/* --- the few points ---------------------------------------------------------------------------------------- */
+
+static void choose_few(struct lamp_search *s) {
+    const struct light_model *m = s->m;
+    s->few_count = m->points.count < FEW_POINTS ? m->points.count : FEW_POINTS;
+    s->few = mem_array(s->few_count + 1, sizeof *s->few);
+    s->joint = mem_array(s->few_count + 1, sizeof *s->joint);
+    for (size_t i = 0; i < s->few_count; i++) {
+        size_t from = spaced(i, m->points.count, s->few_count);
+        s->few[i] = m->points.point[from];
+        s->joint[i] = m->joint[from];
+    }
+}
+
+/* Makes the fit of the few points one of the sources that there are by now. */
+static void renew_few(struct lamp_search *s) {
+    const struct light_model *m = s->m;
+    float *lit = mem_array(s->few_count + 1, sizeof *lit);
+    joint_fit_release(&s->fit);
+    joint_fit_init(&s->fit, s->joint, s->few_count, m->fit.source_count, m->r->pool);
+    s->fit.source[0] = m->fit.source[0];
+    for (size_t j = 1; j < m->fit.source_count; j++) {
+        for (size_t i = 0; i < s->few_count; i++)
+            lit[i] = m->fit.response[spaced(i, m->points.count, s->few_count) * m->fit.source_most + j];
+        joint_fit_add(&s->fit, &m->fit.source[j], lit);
+    }
+    mem_free(lit);
+}
+
+/* --- candidates -------------------------------------------------------------------------------------------- */
+
+static void find_candidates(struct lamp_search *s) {
+    const struct light_model *m = s->m;
+    s->candidate = mem_calloc(m->r->segments.count + 1, sizeof *s->candidate);
+    for (size_t i = 0; i < m->r->segments.count; i++) {
+        const struct emitter_evidence *e = &m->r->evidence[i];
+        if (e->is_seen || e->is_outshone || m->is_lamp[i] || by_segment_count(&m->light.texels, i) == 0)
+            continue;
+        struct lamp_candidate *c = &s->candidate[s->count++];
+        c->segment = (uint32_t)i;
+        c->few = mem_calloc(s->few_count + 1, sizeof *c->few);
+        segment_light_add(&m->light, s->few, s->few_count, c->segment, FEW_SOURCE_POINTS, c->few);
+    }
+}
+
+static void try_candidate(void *user, size_t index, int thread) {
+    (void)thread;
+    const struct lamp_search *s = user;
+    struct lamp_candidate *c = &s->candidate[index];
+    c->source = light_model_hidden_prior(s->m);
+    c->gain = joint_fit_try(s->all ? &s->m->fit : &s->fit, &c->source, s->all ? c->all : c->few);
+}
+
+static int by_gain(const void *a, const void *b) {
+    const struct lamp_candidate *first = a, *second = b;
+    if (first->gain != second->gain)
+        return first->gain < second->gain ? 1 : -1;
+    return (first->segment > second->segment) - (first->segment < second->segment);
+}
+
+/* Nats that a lamp must gain, as one of `count` candidates. */
+static double needed(size_t count) { return LIGHT_PATCHES_ALIKE * (log((double)count / LAMPS_EXPECTED) + SURE); }
+
+/* Gives what unseen surfaces send its prior value: it must not keep explaining what a lamp explains better. */
+static void forget_guesses(struct joint_fit *fit, size_t first) {
+    for (size_t k = first; k < first + LIGHT_REGIONS; k++)
+        fit->source[k].value = fit->source[k].mean;
+}
+
+/* Sorts the likeliest candidates to the front, by what each gains with all other sources as they are. */
+static size_t find_likeliest(struct lamp_search *s) {
+    struct light_model *m = s->m;
+    s->all = false;
+    forget_guesses(&s->fit, m->first_guess);
+    parallel_for(m->r->pool, s->count, try_candidate, s);
+    qsort(s->candidate, s->count, sizeof *s->candidate, by_gain);
+    size_t likeliest = s->count < LIKELIEST ? s->count : LIKELIEST;
+    for (size_t i = 0; i < likeliest; i++) {
+        struct lamp_candidate *c = &s->candidate[i];
+        if (c->all)
+            continue;
+        c->all = mem_calloc(m->points.count + 1, sizeof *c->all);
+        segment_light_add(&m->light, m->points.point, m->points.count, c->segment, SEGMENT_LIGHT_POINTS, c->all);
+    }
+    s->all = true;
+    forget_guesses(&m->fit, m->first_guess);
+    parallel_for(m->r->pool, likeliest, try_candidate, s);
+    qsort(s->candidate, likeliest, sizeof *s->candidate, by_gain);
+    return likeliest < FITTED ? likeliest : FITTED;
+}
+
+/* Fits the likeliest candidates each together with all sources; adds the best one if the evidence suffices. */
+static bool add_best(struct lamp_search *s) {
+    struct light_model *m = s->m;
+    size_t sources = m->fit.source_count, best = SIZE_MAX, bytes = (sources + 1) * sizeof *m->fit.source;
+    struct joint_source *kept = mem_array(sources + 1, sizeof *kept), *fitted = mem_array(sources + 1, sizeof *fitted);
+    double without = joint_fit_loss(&m->fit), least = without - needed(s->count);
+    memcpy(kept, m->fit.source, bytes - sizeof *kept);
+    size_t likeliest = find_likeliest(s);
+    for (size_t i = 0; i < likeliest && s->candidate[i].gain > 0.0; i++) {
+        joint_fit_add(&m->fit, &s->candidate[i].source, s->candidate[i].all);
+        double loss = joint_fit_solve(&m->fit, SOLVE_STEPS);
+        if (loss < least) {
+            least = loss, best = i;
+            memcpy(fitted, m->fit.source, bytes);
+        }
+        joint_fit_remove(&m->fit, sources);
+        memcpy(m->fit.source, kept, bytes - sizeof *kept);
+        forget_guesses(&m->fit, m->first_guess);
+    }
+    memcpy(m->fit.source, kept, bytes - sizeof *kept);
+    if (best < SIZE_MAX) {
+        struct lamp_candidate *c = &s->candidate[best];
+        light_model_add_hidden(m, c->segment, &c->source, c->all);
+        memcpy(m->fit.source, fitted, bytes);
+        mem_free(c->few);
+        *c = s->candidate[--s->count];
+        renew_few(s);
+    }
+    mem_free(fitted);
+    mem_free(kept);
+    return best < SIZE_MAX;
+}
+
+/* --- the whole --------------------------------------------------------------------------------------------- */
+
+/* Takes a lamp back that the others make superfluous; false where there is none. */
+static bool remove_one(struct lamp_search *s) {
+    struct light_model *m = s->m;
+    double with = joint_fit_loss(&m->fit);
+    for (size_t i = 0; i < m->lamp_count; i++) {
+        const struct light_lamp *lamp = &m->lamp[i];
+        if (lamp->kind != ESTIMATED_HIDDEN)
+            continue;
+        struct joint_source *source = &m->fit.source[lamp->source], kept = *source;
+        source->value = source->mean = NO_LIGHT;
+        double gain = joint_fit_loss(&m->fit) - with;
+        *source = kept;
+        if (gain > needed(s->count + 1))
+            continue;
+        light_model_remove_hidden(m, i);
+        joint_fit_solve(&m->fit, SOLVE_STEPS);
+        return true;
+    }
+    return false;
+}
+
+void hidden_lamps_find(struct light_model *m) {
+    struct lamp_search s = {.m = m};
+    size_t before = m->lamp_count;
+    choose_few(&s);
+    find_candidates(&s);
+    renew_few(&s);
+    while (s.count > 0 && m->lamp_count - before < LIGHT_HIDDEN_MOST && add_best(&s))
+        continue;
+    while (m->lamp_count > before && remove_one(&s))
+        continue;
+    for (size_t i = 0; i < s.count; i++) {
+        mem_free(s.candidate[i].few);
+        mem_free(s.candidate[i].all);
+    }
+    mem_free(s.candidate);
+    joint_fit_release(&s.fit);
+    mem_free(s.joint);
+    mem_free(s.few);
+}

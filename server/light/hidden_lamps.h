@@ -1,0 +1,14 @@
+/* hidden_lamps.h -- which segments that no photograph shows are lamps, by the evidence of what they light.
+ *
+ * Each is tried as a further source of the joint fit. The best is taken if it raises the posterior by more than a lamp
+ * among so many candidates needs (Occam's factor), the fit is made again with it, and so on. At the end those are taken
+ * back that later ones have made superfluous. */
+#ifndef UNBAKE_LIGHT_HIDDEN_LAMPS_H
+#define UNBAKE_LIGHT_HIDDEN_LAMPS_H
+
+#include "server/light/light_model.h"
+
+/* Adds hidden lamps to a model that was surveyed. */
+void hidden_lamps_find(struct light_model *m);
+
+#endif

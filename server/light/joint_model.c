@@ -1,0 +1,143 @@
+/* joint_model.c -- see joint_model.h. */
+#include "server/light/joint_model.h"
+
+#include <math.h>
+
+#include "common/mem.h"
+#include "common/quantile.h"
+
+/* Standard deviations of log albedo about its segment: of points about their patch, by texture; and of a patch, by
+ * texture and light that is not modelled. */
+#define POINT_DEVIATION 0.25
+#define PATCH_DEVIATION 0.15
+/* Standard deviation of a patch's mean beyond white paint. */
+#define WHITE_DEVIATION 0.15
+/* Degrees of freedom of Student's t: tails wide enough for lamps and pictures on walls. */
+#define FREEDOM 4.0
+#define SETTLE_ROUNDS 6
+#define MEDIAN_POINTS 512 /* of a segment, of which its first mean is the median */
+
+static double square(double x) { return x * x; }
+
+void joint_scratch_init(struct joint_scratch *s, const struct joint_fit *f) {
+    size_t points = 1, patches = 1;
+    for (size_t k = 0; k < f->block_count; k++) {
+        const struct joint_block *b = &f->block[k];
+        points = b->end - b->first > points ? b->end - b->first : points;
+        patches = b->end_patch - b->first_patch > patches ? b->end_patch - b->first_patch : patches;
+    }
+    s->base = mem_array(points, sizeof *s->base);
+    s->residual = mem_array(points, sizeof *s->residual);
+    s->weight = mem_array(points, sizeof *s->weight);
+    s->sorted = mem_array(points, sizeof *s->sorted);
+    s->offset = mem_array(patches, sizeof *s->offset);
+    s->stiffness = mem_array(patches, sizeof *s->stiffness);
+    s->mean = 0.0;
+}
+
+void joint_scratch_release(struct joint_scratch *s) {
+    mem_free(s->base);
+    mem_free(s->residual);
+    mem_free(s->weight);
+    mem_free(s->sorted);
+    mem_free(s->offset);
+    mem_free(s->stiffness);
+}
+
+double joint_fit_light(const struct joint_fit *f, size_t point, const double *x) {
+    const float *row = f->response + point * f->source_most;
+    double light = (double)f->point[point].known;
+    for (size_t j = 0; j < f->source_count; j++)
+        light += (double)row[j] * x[j];
+    return light;
+}
+
+/* Student's t: loss of a residual in deviations, and its weight in the reweighted least squares. */
+static double t_loss(double e) { return 0.5 * (FREEDOM + 1.0) * log1p(e * e / FREEDOM); }
+static double t_weight(double e) { return (FREEDOM + 1.0) / (FREEDOM + e * e); }
+
+struct joint_white joint_whiteness(double beyond, double variance) {
+    double deviation = sqrt(square(WHITE_DEVIATION) + variance);
+    if (!(beyond > 0.0))
+        return (struct joint_white){0.0, 0.0, 0.0};
+    double e = beyond / deviation, weight = t_weight(e) / square(deviation);
+    return (struct joint_white){t_loss(e), weight * beyond, weight};
+}
+
+static double variance_of(const struct joint_point *p) {
+    return square(POINT_DEVIATION) + square((double)p->deviation);
+}
+
+static double median_of(const struct joint_block *b, struct joint_scratch *s) {
+    size_t count = b->end - b->first, stride = (count + MEDIAN_POINTS - 1) / MEDIAN_POINTS, taken = 0;
+    for (size_t i = 0; i < count; i += stride)
+        s->sorted[taken++] = (float)s->base[i];
+    return (double)quantile(s->sorted, taken, 0.5);
+}
+
+/* Weighted sums over the points of a patch. */
+struct patch_sums {
+    double weight, base;
+};
+
+static struct patch_sums weigh_patch(const struct joint_fit *f, const struct joint_block *b, struct joint_scratch *s,
+                                     size_t patch) {
+    struct patch_sums sum = {0.0, 0.0};
+    double expected = s->mean + s->offset[patch - b->first_patch];
+    for (size_t i = f->patch[patch]; i < f->patch[patch + 1]; i++) {
+        double variance = variance_of(&f->point[i]);
+        double weight = t_weight((s->base[i - b->first] - expected) / sqrt(variance)) / variance;
+        s->weight[i - b->first] = weight;
+        sum.weight += weight;
+        sum.base += weight * s->base[i - b->first];
+    }
+    s->stiffness[patch - b->first_patch] =
+        t_weight(s->offset[patch - b->first_patch] / PATCH_DEVIATION) / square(PATCH_DEVIATION);
+    return sum;
+}
+
+/* One round of reweighting: the mean with all offsets at their best, then the offsets. */
+static void settle_round(const struct joint_fit *f, const struct joint_block *b, struct joint_scratch *s) {
+    double prior = 1.0 / square(JOINT_ALBEDO_DEVIATION), sum = prior * log(JOINT_ALBEDO), weights = prior;
+    for (size_t p = b->first_patch; p < b->end_patch; p++) {
+        struct patch_sums patch = weigh_patch(f, b, s, p);
+        double stiffness = s->stiffness[p - b->first_patch];
+        double weight = patch.weight * stiffness / (patch.weight + stiffness);
+        sum += weight * patch.base / patch.weight;
+        weights += weight;
+    }
+    s->mean = sum / weights;
+    for (size_t p = b->first_patch; p < b->end_patch; p++) {
+        struct patch_sums patch = {0.0, 0.0};
+        for (size_t i = f->patch[p]; i < f->patch[p + 1]; i++) {
+            patch.weight += s->weight[i - b->first];
+            patch.base += s->weight[i - b->first] * (s->base[i - b->first] - s->mean);
+        }
+        s->offset[p - b->first_patch] = patch.base / (patch.weight + s->stiffness[p - b->first_patch]);
+    }
+}
+
+static double loss_of(const struct joint_fit *f, const struct joint_block *b, struct joint_scratch *s) {
+    double loss = 0.5 * square((s->mean - log(JOINT_ALBEDO)) / JOINT_ALBEDO_DEVIATION);
+    for (size_t p = b->first_patch; p < b->end_patch; p++) {
+        struct patch_sums patch = weigh_patch(f, b, s, p);
+        double offset = s->offset[p - b->first_patch];
+        loss += t_loss(offset / PATCH_DEVIATION) +
+                joint_whiteness(patch.base / patch.weight - f->source[0].value, 1.0 / patch.weight).loss;
+        for (size_t i = f->patch[p]; i < f->patch[p + 1]; i++) {
+            double deviation = sqrt(variance_of(&f->point[i]));
+            s->residual[i - b->first] = s->base[i - b->first] - s->mean - offset;
+            loss += t_loss(s->residual[i - b->first] / deviation);
+        }
+    }
+    return loss;
+}
+
+double joint_settle(const struct joint_fit *f, const struct joint_block *b, struct joint_scratch *s) {
+    s->mean = median_of(b, s);
+    for (size_t p = b->first_patch; p < b->end_patch; p++)
+        s->offset[p - b->first_patch] = 0.0;
+    for (int i = 0; i < SETTLE_ROUNDS; i++)
+        settle_round(f, b, s);
+    return loss_of(f, b, s);
+}

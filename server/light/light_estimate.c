@@ -1,0 +1,109 @@
+/* light_estimate.c -- see light_estimate.h. */
+#include "server/light/light_estimate.h"
+
+#include <math.h>
+
+#include "server/light/emitters.h"
+#include "server/light/hidden_lamps.h"
+#include "server/light/light_model.h"
+#include "server/state/evidence.h"
+
+#define SOLVE_STEPS 30
+
+/* --- handing over ------------------------------------------------------------------------------------------ */
+
+static void keep_source(struct reconstruction *r, enum estimated_kind kind, uint32_t segment, rgb radiance,
+                        float deviation) {
+    struct estimated_light *light = &r->light;
+    if (light->source_count < ESTIMATED_MOST)
+        light->source[light->source_count++] = (struct estimated_source){(uint32_t)kind, segment, radiance, deviation};
+}
+
+static void hand_over_segment(struct reconstruction *r, const struct light_lamp *lamp, uint32_t segment) {
+    struct emitter_evidence *e = &r->evidence[segment];
+    rgb radiance = lamp->radiance;
+    e->is_unbounded = lamp->kind == ESTIMATED_SATURATED;
+    e->is_hidden = !e->is_unbounded;
+    for (int c = 0; c < 3; c++)
+        (&radiance.r)[c] = lamp->is_measured[c] ? (&e->observed.r)[c] : (&radiance.r)[c];
+    evidence_set_radiance(e, radiance);
+    keep_source(r, lamp->kind, segment, radiance, lamp->deviation);
+}
+
+static void hand_over(struct light_model *m) {
+    struct reconstruction *r = m->r;
+    rgb factor = rgb_gray(1.0f);
+    r->light.source_count = 0;
+    for (size_t i = 0; i < m->lamp_count; i++) {
+        const struct light_lamp *lamp = &m->lamp[i];
+        if (lamp->kind == ESTIMATED_SATURATED_SKY) {
+            factor = lamp->radiance;
+            keep_source(r, lamp->kind, 0, rgb_scale(factor, (float)r->environment.seen_luminance), lamp->deviation);
+        }
+        for (size_t k = 0; k < lamp->segment_count && lamp->kind != ESTIMATED_SEEN; k++)
+            hand_over_segment(r, lamp, lamp->segment[k]);
+    }
+    if (!m->sky.estimates_bounds)
+        return;
+    light_sky_brighten(r, factor);
+    if (r->light.factor_count < sizeof r->light.sky_factor / sizeof factor)
+        r->light.sky_factor[r->light.factor_count++] = factor;
+}
+
+/* --- the whole --------------------------------------------------------------------------------------------- */
+
+void light_estimate(struct reconstruction *r, const struct views *views) {
+    struct light_model m;
+    emitters_observe(r, views, r->evidence);
+    light_model_init(&m, r, views, false);
+    light_model_survey(&m, views, NULL, NULL);
+    joint_fit_solve(&m.fit, SOLVE_STEPS);
+    hidden_lamps_find(&m);
+    joint_fit_solve(&m.fit, SOLVE_STEPS);
+    light_model_finish(&m);
+    hand_over(&m);
+    light_model_release(&m);
+    r->light.factor_count = 0; /* on resume the environment is as it is here */
+}
+
+void light_estimate_again(struct reconstruction *r, const struct views *views, const struct light_field *field,
+                          const struct fused *diffuse) {
+    struct light_model m;
+    if (!light_is_estimated(r))
+        return;
+    light_model_init(&m, r, views, true);
+    light_model_survey(&m, views, field, diffuse);
+    joint_fit_solve(&m.fit, SOLVE_STEPS);
+    light_model_finish(&m);
+    hand_over(&m);
+    light_model_release(&m);
+}
+
+bool light_is_estimated(const struct reconstruction *r) { return r->light.source_count > 0; }
+
+void light_restore(struct reconstruction *r) {
+    if (rgb_mean(r->sky_factor) != 1.0f)
+        light_sky_brighten(r, r->sky_factor);
+    for (uint32_t i = 0; i < r->light.factor_count; i++)
+        light_sky_brighten(r, r->light.sky_factor[i]);
+}
+
+/* --- report ------------------------------------------------------------------------------------------------ */
+
+void light_report(const struct reconstruction *r) {
+    static const char *const names[] = {"hidden", "saturated", "saturated_sky", "seen"};
+    cJSON *list = cJSON_AddArrayToObject(r->report, "lights");
+    for (uint32_t i = 0; i < r->light.source_count; i++) {
+        const struct estimated_source *s = &r->light.source[i];
+        cJSON *entry = cJSON_CreateObject();
+        json_add_string(entry, "kind", names[s->kind]);
+        if (s->kind == ESTIMATED_HIDDEN || s->kind == ESTIMATED_SATURATED) {
+            json_add_int(entry, "segment", (int64_t)s->segment);
+            json_add_int(entry, "object_id", r->segments.id[s->segment]);
+        }
+        const double radiance[3] = {(double)s->radiance.r, (double)s->radiance.g, (double)s->radiance.b};
+        json_add(entry, "radiance", cJSON_CreateDoubleArray(radiance, 3));
+        json_add_number(entry, "deviation", (double)s->deviation);
+        cJSON_AddItemToArray(list, entry);
+    }
+}

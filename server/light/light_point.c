@@ -1,0 +1,242 @@
+/* light_point.c -- see light_point.h. */
+#include "server/light/light_point.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "common/mem.h"
+#include "server/gather/sun.h"
+#include "server/render/sampler.h"
+
+#define RAYS_PER_POINT 512
+#define SKY_RAYS 2048
+#define KEY_POINT 29 /* keep these random numbers apart from others of the texel */
+#define KEY_SKY 37
+/* The texels around one, each way as far as this part of the atlas's width, give its observed radiance. */
+#define AROUND 640
+/* Light that is not modelled, as a part of the room's median radiance: added everywhere, which keeps logarithms finite;
+ * and its standard deviation, by which dim places say less. */
+#define DARK 0.01f
+#define DARK_DEVIATION 0.05f
+/* A patch is a cube of this part of the square root of the room's surface: some .3 m. */
+#define PATCH_PART 0.022f
+#define PATCH_BITS 9 /* of a coordinate of a patch */
+
+struct gathering {
+    const struct survey *survey;
+    const struct light_sky *sky;
+    const struct fused *observed; /* or NULL */
+    struct light_point *point;
+    vec3 least, most; /* corners of the room */
+    float edge_m;     /* of a patch */
+};
+
+static rgb observed_at(const struct gathering *g, uint32_t texel) {
+    const struct reconstruction *r = g->survey->r;
+    uint32_t around = r->atlas.width / AROUND;
+    rgb own = g->observed ? fused_around(g->observed, &r->atlas, &r->inverse, texel, around) : rgb_gray(0.0f);
+    return rgb_is_black(own) ? fused_around(&r->fused, &r->atlas, &r->inverse, texel, around) : own;
+}
+
+static uint32_t patch_of(const struct gathering *g, const struct surface_point *at) {
+    vec3 from = vec3_scale(vec3_sub(at->position, g->least), 1.0f / g->edge_m);
+    const float along[3] = {from.x, from.y, from.z};
+    uint32_t patch =
+        (at->normal.x > 0.0f) | (uint32_t)(at->normal.y > 0.0f) << 1 | (uint32_t)(at->normal.z > 0.0f) << 2;
+    for (int i = 0; i < 3; i++)
+        patch = patch << PATCH_BITS | ((uint32_t)clampf(along[i], 0.0f, 511.0f));
+    return patch;
+}
+
+static float part_along(float x, float least, float most) { return (x - least) / fmaxf(most - least, 1e-20f); }
+
+static size_t region_of(const struct gathering *g, vec3 p) {
+    const float part[3] = {part_along(p.x, g->least.x, g->most.x), part_along(p.y, g->least.y, g->most.y),
+                           part_along(p.z, g->least.z, g->most.z)};
+    size_t region = 0;
+    for (int i = 0; i < 3; i++)
+        region = 4 * region + (size_t)clampf(4.0f * part[i], 0.0f, 3.0f);
+    return region;
+}
+
+/* Moves light of surfaces that no photograph shows from `known` to `guessed`: the rays of the last gathering again. */
+static void set_guesses_apart(const struct gathering *g, struct incident *in, struct light_point *p) {
+    const struct reconstruction *r = g->survey->r;
+    float light[LIGHT_REGIONS][3] = {{0}};
+    rgb sum = rgb_gray(0.0f);
+    for (size_t i = 0; i < RAYS_PER_POINT; i++)
+        in->ray[i] = (struct accel_ray){accel_offset(p->at.position, p->at.normal, in->direction[i]), 0.0f,
+                                        in->direction[i], INFINITY};
+    accel_intersect_many(r->world.accel, RAYS_PER_POINT, in->ray, in->hit);
+    for (size_t i = 0; i < RAYS_PER_POINT; i++) {
+        const struct accel_hit *hit = &in->hit[i];
+        if (hit->triangle == ACCEL_NONE)
+            continue;
+        const struct world_triangle *t = &r->world.triangle[hit->triangle];
+        size_t texel = incident_texel(&r->world, hit);
+        bool is_front = vec3_dot(t->normal, in->direction[i]) < 0.0f;
+        if (!is_front || r->fused.count[texel] > 0.0f || r->world.lights->area_density[t->segment] > 0.0f ||
+            (g->survey->field.specular_only && g->survey->field.specular_only[t->segment]))
+            continue;
+        rgb radiance = rgb_scale(rgb_from_half(g->survey->field.radiance[texel]), 1.0f / RAYS_PER_POINT);
+        float *of_region = light[region_of(g, vec3_mad(in->ray[i].origin, hit->distance_m, in->direction[i]))];
+        for (size_t c = 0; c < 3; c++)
+            of_region[c] += (&radiance.r)[c];
+        sum = rgb_add(sum, radiance);
+    }
+    if (rgb_is_black(sum))
+        return;
+    p->known = rgb_clamp(rgb_sub(p->known, sum), 0.0f, INFINITY);
+    p->guessed = mem_array(3 * LIGHT_REGIONS, sizeof *p->guessed);
+    memcpy(p->guessed, light, sizeof light);
+}
+
+/* The part of the sky that is seen from a point: where a ray of the last gathering escaped many more are traced. */
+static void look_at_sky(const struct gathering *g, struct incident *in, struct light_point *p, uint32_t key) {
+    const struct accel *accel = g->survey->r->world.accel;
+    float cell[SKY_CELLS] = {0};
+    bool escapes = false;
+    vec3 frame[3] = {[2] = p->at.shading};
+    for (size_t i = 0; i < RAYS_PER_POINT; i++)
+        escapes = escapes || in->escapes[i];
+    if (!escapes)
+        return;
+    vec3_frame(p->at.shading, &frame[0], &frame[1]);
+    for (uint32_t i = 0; i < SKY_RAYS; i++) {
+        vec3 d = incident_cosine_direction(frame, sampler_pair(key, i, 0));
+        in->shadow[i] = (struct accel_ray){accel_offset(p->at.position, p->at.normal, d), 0.0f, d, INFINITY};
+    }
+    accel_occluded_many(accel, SKY_RAYS, in->shadow, in->occluded);
+    for (size_t i = 0; i < SKY_RAYS; i++) {
+        if (!in->occluded[i] && vec3_dot(in->shadow[i].direction, p->at.normal) > 0.0f)
+            light_sky_add_ray(g->sky, in->shadow[i].direction, 1.0f / SKY_RAYS, cell, &p->saturated);
+    }
+    for (size_t k = 0; k < SKY_CELLS; k++)
+        p->escaping += cell[k];
+    if (p->escaping > 0.0f) {
+        p->sky = mem_array(SKY_CELLS, sizeof *p->sky);
+        memcpy(p->sky, cell, sizeof cell);
+    }
+}
+
+static void gather_point(void *user, size_t index, int thread) {
+    const struct gathering *g = user;
+    const struct reconstruction *r = g->survey->r;
+    struct incident *in = &g->survey->scratch[thread];
+    struct light_point *p = &g->point[index];
+    uint32_t texel = g->survey->texel[index];
+    struct irradiance light;
+    *p = (struct light_point){.segment = reconstruction_segment(r, texel), .observed = observed_at(g, texel)};
+    if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &p->at))
+        return;
+    p->patch = patch_of(g, &p->at);
+    memset(in->escapes, 0, RAYS_PER_POINT * sizeof *in->escapes); /* inside closed bodies no ray is traced */
+    irradiance_gather(&light, in, &g->survey->field, &p->at, sampler_key(KEY_POINT, texel, 0), RAYS_PER_POINT);
+    sun_add_light(&r->sun, r->world.accel, &p->at, &light);
+    p->known = irradiance_diffuse(&light, p->at.shading, 1.0f, p->at.shading);
+    look_at_sky(g, in, p, sampler_key(KEY_SKY, texel, 0));
+    set_guesses_apart(g, in, p);
+    float all = light.moment[0][0] + light.moment[0][1] + light.moment[0][2];
+    p->deviation = all > 0.0f ? 3.0f * rgb_mean(light.noise) / all : 0.0f; /* one draw of it */
+}
+
+static int by_patch(const void *a, const void *b) {
+    const struct light_point *first = a, *second = b;
+    if (first->segment != second->segment)
+        return first->segment < second->segment ? -1 : 1;
+    if (first->patch != second->patch)
+        return first->patch < second->patch ? -1 : 1;
+    return (first->at.triangle > second->at.triangle) - (first->at.triangle < second->at.triangle);
+}
+
+/* Replaces an array of each of the points by their mean; where all have none they keep none. */
+static void average_arrays(struct light_point *p, size_t count, size_t length,
+                           float **(*array_of)(struct light_point *)) {
+    double *sum = mem_calloc(length, sizeof *sum);
+    bool any = false;
+    for (size_t i = 0; i < count; i++) {
+        const float *own = *array_of(&p[i]);
+        any = any || own;
+        for (size_t k = 0; k < length && own; k++)
+            sum[k] += (double)own[k] / (double)count;
+    }
+    for (size_t i = 0; i < count && any; i++) {
+        float **own = array_of(&p[i]);
+        *own = *own ? *own : mem_array(length, sizeof **own);
+        for (size_t k = 0; k < length; k++)
+            (*own)[k] = (float)sum[k];
+    }
+    mem_free(sum);
+}
+
+static float **sky_of(struct light_point *p) { return &p->sky; }
+static float **guessed_of(struct light_point *p) { return &p->guessed; }
+
+/* What the rays of a patch's points found, averaged: few of a point's rays find a window, and noise of a response would
+ * make its source too faint (regression dilution). */
+static void average_patch(struct light_point *p, size_t count) {
+    double escaping = 0.0, saturated = 0.0;
+    for (size_t i = 0; i < count; i++) {
+        escaping += (double)p[i].escaping / (double)count;
+        saturated += (double)p[i].saturated / (double)count;
+    }
+    for (size_t i = 0; i < count; i++) {
+        p[i].escaping = (float)escaping;
+        p[i].saturated = (float)saturated;
+    }
+    average_arrays(p, count, SKY_CELLS, sky_of);
+    average_arrays(p, count, 3 * LIGHT_REGIONS, guessed_of);
+}
+
+/* The deviation of a patch's points: the root mean square of their draws, and of light that is not modelled. */
+static void find_deviations(struct light_points *p, float median_radiance) {
+    for (size_t first = 0, end; first < p->count; first = end) {
+        double squares = 0.0;
+        for (end = first; end < p->count && p->point[end].patch == p->point[first].patch &&
+                          p->point[end].segment == p->point[first].segment;
+             end++)
+            squares += (double)(p->point[end].deviation * p->point[end].deviation);
+        average_patch(p->point + first, end - first);
+        for (size_t i = first; i < end; i++) {
+            float dark = DARK_DEVIATION * median_radiance / fmaxf(rgb_mean(p->point[i].observed), 1e-20f);
+            p->point[i].deviation = sqrtf((float)(squares / (double)(end - first)) + dark * dark);
+        }
+    }
+}
+
+void light_points_init(struct light_points *p, const struct survey *survey, const struct light_sky *sky,
+                       const struct fused *observed, float median_radiance) {
+    const struct mesh *mesh = &survey->r->scene->mesh;
+    struct gathering g = {survey,
+                          sky,
+                          observed,
+                          mem_array(survey->count + 1, sizeof *g.point),
+                          {INFINITY, INFINITY, INFINITY},
+                          {-INFINITY, -INFINITY, -INFINITY},
+                          0.0f};
+    double area = 0.0;
+    for (size_t i = 0; i < mesh->triangle_count; i++) {
+        area += 0.5 * (double)vec3_length(mesh_cross(mesh, i));
+        vec3 at = mesh_point(mesh, i, 0.0f, 0.0f);
+        g.least = (vec3){fminf(g.least.x, at.x), fminf(g.least.y, at.y), fminf(g.least.z, at.z)};
+        g.most = (vec3){fmaxf(g.most.x, at.x), fmaxf(g.most.y, at.y), fmaxf(g.most.z, at.z)};
+    }
+    g.edge_m = PATCH_PART * (float)sqrt(area);
+    parallel_for(survey->r->pool, survey->count, gather_point, &g);
+    *p = (struct light_points){survey->count, g.point};
+    qsort(p->point, p->count, sizeof *p->point, by_patch);
+    float dark = fmaxf(DARK * median_radiance, 1e-20f);
+    for (size_t i = 0; i < p->count; i++) {
+        p->point[i].observed = rgb_add(p->point[i].observed, rgb_gray(dark));
+        p->point[i].known = rgb_add(p->point[i].known, rgb_gray(dark));
+    }
+    find_deviations(p, median_radiance);
+}
+
+void light_points_release(struct light_points *p) {
+    for (size_t i = 0; i < p->count; i++)
+        mem_free(p->point[i].sky), mem_free(p->point[i].guessed);
+    mem_free(p->point);
+    *p = (struct light_points){0};
+}

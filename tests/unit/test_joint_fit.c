@@ -1,0 +1,233 @@
+/* joint_fit.h: closed forms. Small spheres over a plane light points of known albedo; their radiances come back, with
+ * standard deviations that the errors keep to; what cannot be told apart is told together; bounds hold; a source that is
+ * not there gains nothing; the result is a minimum, and the same for any number of threads. */
+#include <math.h>
+#include <string.h>
+
+#include "common/rng.h"
+#include "server/light/joint_fit.h"
+#include "tests/check.h"
+
+#define SIDE 40 /* points along each side of a floor of 4 x 4 m */
+#define POINTS (SIDE * SIDE)
+#define PATCH 4 /* points along each side of a patch */
+
+static struct joint_point point[POINTS];
+static float albedo[POINTS], lit[2][POINTS];
+
+/* Normal deviate of a point. */
+static float deviate(uint64_t seed, uint32_t i, uint32_t k) {
+    double u = fmax((double)rng_to_float((uint32_t)rng_key(seed, i, 2 * k)), 1e-7);
+    return (float)(sqrt(-2.0 * log(u)) *
+                   cos(6.283185307 * (double)rng_to_float((uint32_t)rng_key(seed, i, 2 * k + 1))));
+}
+
+/* Radiance of a white floor below a sphere of radius r at (x, height, y): L r^2 h / (d^2)^(3/2) for r << d. */
+static float sphere_light(float x, float y, float height, float px, float py) {
+    float square = (px - x) * (px - x) + (py - y) * (py - y) + height * height;
+    return 0.01f * height / (square * sqrtf(square));
+}
+
+/* A floor of one segment: known light of `known` everywhere, and spheres of radiances x. Albedo varies by `spread` from
+ * point to point, and by a part of that from patch to patch. */
+static void make_floor(uint64_t seed, float known, const float x[2], float spread) {
+    size_t at = 0;
+    for (uint32_t patch = 0; patch < POINTS / (PATCH * PATCH); patch++) {
+        float shift = 0.5f * spread * deviate(seed, patch, 1);
+        for (uint32_t k = 0; k < PATCH * PATCH; k++, at++) {
+            uint32_t column = patch % (SIDE / PATCH) * PATCH + k % PATCH,
+                     row = patch / (SIDE / PATCH) * PATCH + k / PATCH;
+            float px = 0.1f * (float)column, py = 0.1f * (float)row;
+            lit[0][at] = sphere_light(1.0f, 1.0f, 0.8f, px, py);
+            lit[1][at] = sphere_light(3.0f, 3.0f, 1.2f, px, py);
+            albedo[at] = 0.4f * expf(shift + spread * deviate(seed, (uint32_t)at, 2));
+            float light = known + x[0] * lit[0][at] + x[1] * lit[1][at];
+            point[at] = (struct joint_point){0, patch, albedo[at] * light, known, 0.0f};
+        }
+    }
+}
+
+static struct joint_source source_about(double mean, double deviation) {
+    return (struct joint_source){mean, deviation, -INFINITY, mean, 0.0};
+}
+
+static void start(struct joint_fit *f, struct parallel *pool) { joint_fit_init(f, point, POINTS, 4, pool); }
+
+static void test_recovers(struct parallel *pool) {
+    const float x[2] = {60.0f, 25.0f};
+    struct joint_fit f;
+    struct joint_source prior = source_about(log(30.0), 1.5);
+    make_floor(1, 0.5f, x, 0.0f);
+    start(&f, pool);
+    joint_fit_add(&f, &prior, lit[0]);
+    joint_fit_add(&f, &prior, lit[1]);
+    joint_fit_solve(&f, 30);
+    CHECK_NEAR(exp(f.source[1].value), (double)x[0], 0.02 * (double)x[0]);
+    CHECK_NEAR(exp(f.source[2].value), (double)x[1], 0.02 * (double)x[1]);
+    joint_fit_release(&f);
+}
+
+/* Of 40 floors: 60 to 80 % of the errors within one deviation would be 24 to 32; binomial chance widens it by 9. */
+static void test_deviations(struct parallel *pool) {
+    const float x[2] = {60.0f, 25.0f};
+    int one = 0, two = 0, all = 0;
+    struct joint_source prior = source_about(log(30.0), 1.5);
+    for (uint64_t seed = 1; seed <= 20; seed++) {
+        struct joint_fit f;
+        make_floor(seed, 0.5f, x, 0.25f);
+        start(&f, pool);
+        joint_fit_add(&f, &prior, lit[0]);
+        joint_fit_add(&f, &prior, lit[1]);
+        joint_fit_solve(&f, 30);
+        joint_fit_errors(&f);
+        for (int k = 0; k < 2; k++, all++) {
+            double off = fabs(f.source[1 + k].value - log((double)x[k])) / f.source[1 + k].error;
+            one += off < 1.0;
+            two += off < 2.0;
+        }
+        joint_fit_release(&f);
+    }
+    CHECK_THAT(one > 15 && one < 38 && two > 33, "%d and %d of %d within one and two deviations", one, two, all);
+}
+
+/* Two sources of the same light: their sum is known, which of them it is is not. */
+static void test_alike(struct parallel *pool) {
+    const float x[2] = {60.0f, 0.0f};
+    struct joint_fit f;
+    struct joint_source prior = source_about(log(30.0), 1.5);
+    make_floor(3, 0.5f, x, 0.1f);
+    start(&f, pool);
+    joint_fit_add(&f, &prior, lit[0]);
+    joint_fit_add(&f, &prior, lit[0]);
+    joint_fit_solve(&f, 30);
+    joint_fit_errors(&f);
+    CHECK_NEAR(exp(f.source[1].value) + exp(f.source[2].value), 60.0, 6.0);
+    CHECK(f.source[1].error > 0.5 && f.source[2].error > 0.5);
+    joint_fit_release(&f);
+}
+
+static void test_bound(struct parallel *pool) {
+    const float x[2] = {60.0f, 0.0f};
+    struct joint_fit f;
+    make_floor(4, 0.5f, x, 0.1f);
+    start(&f, pool);
+    struct joint_source loose = {log(40.0), 2.0, log(40.0), log(40.0), 0.0}, tight = loose;
+    tight.mean = tight.least = tight.value = log(90.0);
+    joint_fit_add(&f, &loose, lit[0]);
+    joint_fit_solve(&f, 30);
+    CHECK_NEAR(exp(f.source[1].value), 60.0, 6.0);
+    joint_fit_remove(&f, 1);
+    joint_fit_add(&f, &tight, lit[0]);
+    joint_fit_solve(&f, 30);
+    CHECK(f.source[1].value == tight.least);
+    f.source[1].value = log(200.0); /* from above, too */
+    joint_fit_solve(&f, 30);
+    CHECK(f.source[1].value == tight.least);
+    joint_fit_release(&f);
+}
+
+/* What is whiter than white asks for light; what is darker does not ask for less. */
+static void test_white(void) {
+    CHECK(joint_whiteness(-1.0, 0.01).loss == 0.0 && joint_whiteness(-1.0, 0.01).slope == 0.0);
+    CHECK(joint_whiteness(0.3, 0.01).loss > joint_whiteness(0.2, 0.01).loss && joint_whiteness(0.2, 0.01).slope > 0.0);
+}
+
+static void test_try(struct parallel *pool) {
+    const float x[2] = {60.0f, 0.0f};
+    struct joint_fit f;
+    struct joint_source there = source_about(log(30.0), 1.5), absent = there;
+    make_floor(5, 0.5f, x, 0.2f);
+    start(&f, pool);
+    joint_fit_solve(&f, 10);
+    double without = joint_fit_loss(&f), gain = joint_fit_try(&f, &there, lit[0]);
+    CHECK_NEAR(exp(there.value), 60.0, 15.0);
+    joint_fit_add(&f, &there, lit[0]);
+    CHECK_NEAR(joint_fit_loss(&f), without - gain, 1e-6 * without);
+    joint_fit_solve(&f, 10);
+    CHECK_THAT(gain > 20.0, "%g nats", gain);
+    double other = joint_fit_try(&f, &absent, lit[1]);
+    CHECK_THAT(other < 3.0, "%g nats", other);
+    joint_fit_release(&f);
+}
+
+/* No step away from the solution lowers the loss: the gradient is that of the loss. */
+static void test_minimum(struct parallel *pool) {
+    const float x[2] = {60.0f, 25.0f};
+    struct joint_fit f;
+    struct joint_source prior = source_about(log(30.0), 1.5);
+    const struct joint_tie tie = {1, 2, 0.5, 1.0};
+    make_floor(6, 0.1f, x, 0.25f);
+    start(&f, pool);
+    joint_fit_add(&f, &prior, lit[0]);
+    joint_fit_add(&f, &prior, lit[1]);
+    f.tie = &tie;
+    f.tie_count = 1;
+    double least = joint_fit_solve(&f, 50);
+    for (size_t j = 0; j < f.source_count; j++) {
+        for (int side = -1; side <= 1; side += 2) {
+            f.source[j].value += 0.03 * side;
+            CHECK_THAT(joint_fit_loss(&f) > least - 1e-3, "source %zu", j);
+            f.source[j].value -= 0.03 * side;
+        }
+    }
+    joint_fit_release(&f);
+}
+
+/* Sixteen times the points in the same patches say less than sixteen times as much: patches have errors of their own. */
+static void test_patches(struct parallel *pool) {
+    const float x[2] = {60.0f, 25.0f};
+    static struct joint_point few[POINTS / 16];
+    static float lit_few[POINTS / 16];
+    struct joint_fit f;
+    struct joint_source prior = source_about(log(30.0), 1.5);
+    double error[2];
+    make_floor(7, 0.5f, x, 0.25f);
+    for (size_t i = 0; i < POINTS / 16; i++) {
+        few[i] = point[16 * i];
+        lit_few[i] = lit[0][16 * i];
+    }
+    for (int all = 0; all < 2; all++) {
+        joint_fit_init(&f, all ? point : few, all ? POINTS : POINTS / 16, 4, pool);
+        joint_fit_add(&f, &prior, all ? lit[0] : lit_few);
+        joint_fit_solve(&f, 30);
+        joint_fit_errors(&f);
+        error[all] = f.source[1].error;
+        joint_fit_release(&f);
+    }
+    CHECK_THAT(error[1] < error[0] && error[1] > 0.35 * error[0], "%g and %g", error[0], error[1]);
+}
+
+static void test_threads(void) {
+    const float x[2] = {60.0f, 25.0f};
+    double value[2][3];
+    make_floor(8, 0.5f, x, 0.25f);
+    for (int i = 0; i < 2; i++) {
+        struct parallel *pool = parallel_new(1 + 2 * i);
+        struct joint_source prior = source_about(log(30.0), 1.5);
+        struct joint_fit f;
+        start(&f, pool);
+        joint_fit_add(&f, &prior, lit[0]);
+        joint_fit_add(&f, &prior, lit[1]);
+        value[i][2] = joint_fit_solve(&f, 30);
+        value[i][0] = f.source[1].value;
+        value[i][1] = f.source[2].value;
+        joint_fit_release(&f);
+        parallel_free(pool);
+    }
+    CHECK(memcmp(value[0], value[1], sizeof value[0]) == 0);
+}
+
+int main(void) {
+    struct parallel *pool = parallel_new(0);
+    test_recovers(pool);
+    test_deviations(pool);
+    test_alike(pool);
+    test_bound(pool);
+    test_white();
+    test_try(pool);
+    test_minimum(pool);
+    test_patches(pool);
+    test_threads();
+    parallel_free(pool);
+    return check_result();
+}
