@@ -267,7 +267,8 @@ static enum status take_addresses(struct spill *s, struct error *err) {
         munmap(base, before);
     munmap(base + before + bytes, CHUNK - before);
     s->state = mem_calloc(bytes / CHUNK, sizeof *s->state);
-    s->file = (struct spill_file){base + before, bytes};
+    s->file.base = base + before;
+    atomic_store_explicit(&s->file.bytes, bytes, memory_order_release); /* readers may be at work already */
     return STATUS_OK;
 }
 

@@ -14,6 +14,7 @@
 #ifndef UNBAKE_COMMON_SPILL_H
 #define UNBAKE_COMMON_SPILL_H
 
+#include <stdatomic.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -43,24 +44,25 @@ void *spill_take(struct spill *s, size_t count, size_t size);
 /* Of an array from spill_take of the same s, or from mem.h; NULL is fine. */
 void spill_give(struct spill *s, void *array);
 
-/* The addresses of the file, the first member of struct spill; NULL and 0 while there is none. */
+/* The addresses of the file, the first member of struct spill. 0 bytes while there is none: only then base is not set. */
 struct spill_file {
+    _Atomic size_t bytes;
     char *base;
-    size_t bytes;
 };
 
 void spill_use_file(struct spill *s, const void *at, size_t bytes);
 
 /* Whether any array may be in the file. */
 static inline bool spill_has_file(const struct spill *s) {
-    return s && ((const struct spill_file *)(const void *)s)->bytes > 0;
+    const struct spill_file *file = (const struct spill_file *)(const void *)s;
+    return s && atomic_load_explicit(&file->bytes, memory_order_acquire) > 0;
 }
 
 /* Tells that `bytes` bytes at `at`, of one array, are looked at or written next. Costs a comparison where the array is in
  * memory; s may be NULL. */
 static inline void spill_use(struct spill *s, const void *at, size_t bytes) {
     const struct spill_file *file = (const struct spill_file *)(const void *)s;
-    if (s && (uintptr_t)at - (uintptr_t)file->base < file->bytes)
+    if (spill_has_file(s) && (uintptr_t)at - (uintptr_t)file->base < file->bytes)
         spill_use_file(s, at, bytes);
 }
 
