@@ -12,7 +12,7 @@ shift
 
 # Too slow under a sanitizer for every day, or with nothing for it to find; `make asan` and
 # `make tsan` run them all the same.
-slow_asan="render/test_conformance render/test_rooms render/test_listing1 api/test_demo_room
+slow_asan="gradient/test_path render/test_conformance render/test_rooms render/test_listing1 api/test_demo_room
 render/test_calibrate_poses render/test_emission_pattern render/test_environment render/test_specular
 render/test_held_out_light render/test_saturated_light render/test_short render/test_sky_room
 render/test_fireflies_left_out render/test_grey_card render/test_sun render/test_split api/test_resume api/test_readme
@@ -22,7 +22,7 @@ api/test_backup api/test_axe api/test_webhook_library
 chaos/test_start_faults chaos/test_worker_calls chaos/test_worker_kill"
 # The thread sanitizer has nothing to find in one thread either, nor in whole reconstructions what those of
 # api/test_webhooks, of a small room, do not tell.
-slow_tsan="$slow_asan api/test_one_job unit/test_captures api/test_client_check unit/test_many_photographs unit/test_atlas unit/test_bundle unit/test_inverse_uv unit/test_segment unit/test_worker_faults
+slow_tsan="$slow_asan api/test_one_job unit/test_attempt_faults unit/test_corrections unit/test_checkpoint unit/test_captures api/test_client_check unit/test_many_photographs unit/test_atlas unit/test_bundle unit/test_inverse_uv unit/test_segment unit/test_worker_faults
 gradient/test_path render/test_calibrate_light render/test_detail unit/test_evaluate api/test_metrics
 api/test_http_durable api/test_http_threads api/test_client_commands chaos/test_power_cut chaos/test_disk_faults
 chaos/test_memory_faults

@@ -70,12 +70,24 @@ static void renew_few(struct lamp_search *s) {
 
 /* --- candidates -------------------------------------------------------------------------------------------- */
 
+/* No photograph shows it, and it has a surface of its own. */
+static bool may_be_lamp(const struct light_model *m, size_t segment) {
+    const struct emitter_evidence *e = &m->r->evidence[segment];
+    return !e->is_seen && !e->is_outshone && !m->is_lamp[segment] && by_segment_count(&m->light.texels, segment) > 0;
+}
+
+bool hidden_lamps_any(const struct light_model *m) {
+    bool any = false;
+    for (size_t i = 0; i < m->r->segments.count; i++)
+        any = any || may_be_lamp(m, i);
+    return any;
+}
+
 static void find_candidates(struct lamp_search *s) {
     const struct light_model *m = s->m;
     s->candidate = mem_calloc(m->r->segments.count + 1, sizeof *s->candidate);
     for (size_t i = 0; i < m->r->segments.count; i++) {
-        const struct emitter_evidence *e = &m->r->evidence[i];
-        if (e->is_seen || e->is_outshone || m->is_lamp[i] || by_segment_count(&m->light.texels, i) == 0)
+        if (!may_be_lamp(m, i))
             continue;
         struct lamp_candidate *c = &s->candidate[s->count++];
         c->segment = (uint32_t)i;

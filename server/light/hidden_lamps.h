@@ -8,6 +8,9 @@
 
 #include "server/light/light_model.h"
 
+/* Whether there are segments that may be hidden lamps. */
+bool hidden_lamps_any(const struct light_model *m);
+
 /* Adds hidden lamps to a model that was surveyed. */
 void hidden_lamps_find(struct light_model *m);
 

@@ -52,16 +52,21 @@ static void hand_over(struct light_model *m) {
 
 /* --- the whole --------------------------------------------------------------------------------------------- */
 
+static void estimate(struct light_model *m, const struct views *views) {
+    light_model_survey(m, views, NULL, NULL);
+    joint_fit_solve(&m->fit, SOLVE_STEPS);
+    hidden_lamps_find(m);
+    joint_fit_solve(&m->fit, SOLVE_STEPS);
+    light_model_finish(m);
+    hand_over(m);
+}
+
 void light_estimate(struct reconstruction *r, const struct views *views) {
     struct light_model m;
     emitters_observe(r, views, r->evidence);
     light_model_init(&m, r, views, false);
-    light_model_survey(&m, views, NULL, NULL);
-    joint_fit_solve(&m.fit, SOLVE_STEPS);
-    hidden_lamps_find(&m);
-    joint_fit_solve(&m.fit, SOLVE_STEPS);
-    light_model_finish(&m);
-    hand_over(&m);
+    if (light_model_has_unknown(&m) || hidden_lamps_any(&m))
+        estimate(&m, views);
     light_model_release(&m);
     r->light.factor_count = 0; /* on resume the environment is as it is here */
 }

@@ -162,6 +162,13 @@ void light_model_init(struct light_model *m, struct reconstruction *r, const str
     choose_seen(m);
 }
 
+bool light_model_has_unknown(const struct light_model *m) {
+    bool any = false;
+    for (size_t i = 0; i < m->lamp_count; i++)
+        any = any || m->lamp[i].kind != ESTIMATED_SEEN;
+    return any;
+}
+
 void light_model_release(struct light_model *m) {
     for (size_t i = 0; i < m->lamp_count; i++)
         mem_free(m->lamp[i].lit);

@@ -50,6 +50,9 @@ struct light_model {
 void light_model_init(struct light_model *m, struct reconstruction *r, const struct views *views, bool again);
 void light_model_release(struct light_model *m);
 
+/* Whether it has lamps or sky of unknown radiance. */
+bool light_model_has_unknown(const struct light_model *m);
+
 /* Makes points and fit. The arguments are those of survey_init and light_points_init. */
 void light_model_survey(struct light_model *m, const struct views *views, const struct light_field *field,
                         const struct fused *observed);
