@@ -136,9 +136,11 @@ static void gather_point(void *user, size_t index, int thread) {
     sun_add_light(&r->sun, r->world.accel, &p->at, &light);
     p->known = irradiance_diffuse(&light, p->at.shading, 1.0f, p->at.shading);
     look_at_sky(g, in, p, sampler_key(KEY_SKY, texel, 0));
-    set_guesses_apart(g, in, p);
     float all = light.moment[0][0] + light.moment[0][1] + light.moment[0][2];
-    p->deviation = all > 0.0f ? 3.0f * rgb_mean(light.noise) / all : 0.0f; /* one draw of it */
+    if (!(all > 0.0f))
+        return; /* also inside closed bodies, where the directions in `in` are those of another point */
+    set_guesses_apart(g, in, p);
+    p->deviation = 3.0f * rgb_mean(light.noise) / all; /* one draw of it */
 }
 
 static int by_patch(const void *a, const void *b) {
