@@ -238,15 +238,15 @@ static void add_cells(struct light_model *m) {
     m->first_cell = m->fit.source_count;
     m->has_sky = true;
     m->fit.tie = m->tie;
-    for (size_t k = 0; k < SKY_CELLS; k++) {
+    for (size_t k = 0; k < UNSEEN_CELLS; k++) {
         for (size_t i = 0; i < m->points.count; i++)
             lit[i] = m->points.point[i].sky ? m->points.point[i].sky[k] : 0.0f;
         add_cell(m, k, lit);
     }
-    for (size_t k = 0; k < SKY_CELLS; k++) {
+    for (size_t k = 0; k < UNSEEN_CELLS; k++) {
         size_t below = light_sky_below(k);
         tie(m, m->first_cell + k, m->first_cell + light_sky_right(k), 0.0, SKY_SMOOTHNESS);
-        if (below < SKY_CELLS)
+        if (below < UNSEEN_CELLS)
             tie(m, m->first_cell + k, m->first_cell + below, 0.0, SKY_SMOOTHNESS);
     }
     mem_free(lit);
@@ -299,7 +299,7 @@ static void make_fit(struct light_model *m) {
             (struct joint_point){p->segment, p->patch, rgb_mean(p->observed), rgb_mean(p->known), p->deviation};
         any_escapes = any_escapes || p->escaping > 0.0f;
     }
-    joint_fit_init(&m->fit, m->joint, m->points.count, 1 + LIGHT_LAMPS_MOST + SKY_CELLS + LIGHT_REGIONS, m->r->pool);
+    joint_fit_init(&m->fit, m->joint, m->points.count, 1 + LIGHT_LAMPS_MOST + UNSEEN_CELLS + LIGHT_REGIONS, m->r->pool);
     for (size_t i = 0; i < m->lamp_count; i++) {
         struct joint_source source = prior_of(m, &m->lamp[i]);
         light_lamp(m, &m->lamp[i]);
@@ -364,7 +364,7 @@ static void fit_channel(struct light_model *m, int channel) {
     for (size_t i = 0; i < m->points.count; i++) {
         const struct light_point *p = &m->points.point[i];
         float known = (&p->known.r)[channel];
-        for (size_t k = 0; k < SKY_CELLS && m->has_sky && p->sky; k++)
+        for (size_t k = 0; k < UNSEEN_CELLS && m->has_sky && p->sky; k++)
             known += p->sky[k] * (float)exp(m->fit.source[m->first_cell + k].value);
         for (size_t k = 0; k < LIGHT_REGIONS && p->guessed; k++)
             known += p->guessed[3 * k + (size_t)channel] * (float)exp(m->fit.source[m->first_guess + k].value);

@@ -39,10 +39,10 @@ struct light_model {
     struct light_lamp lamp[LIGHT_LAMPS_MOST];
     struct joint_point *joint; /* [points.count] means of the channels; owned */
     struct joint_fit fit;
-    bool has_sky;                        /* unseen sky lights the points: */
-    size_t first_cell;                   /* its sources in the fit, SKY_CELLS of them */
-    size_t first_guess;                  /* unseen surfaces: LIGHT_REGIONS factors of their fill */
-    struct joint_tie tie[3 * SKY_CELLS]; /* between them, and with the saturated sky */
+    bool has_sky;                           /* unseen sky lights the points: */
+    size_t first_cell;                      /* its sources in the fit, UNSEEN_CELLS of them */
+    size_t first_guess;                     /* unseen surfaces: LIGHT_REGIONS factors of their fill */
+    struct joint_tie tie[3 * UNSEEN_CELLS]; /* between them, and with the saturated sky */
 };
 
 /* Chooses the lamps at which photographs saturate, by r->evidence (emitters_observe), and the sky if it does. With

@@ -6,34 +6,16 @@
 
 #include "common/mem.h"
 #include "server/capture/fill.h"
-#include "server/scene/latlong.h"
 
 /* At this many radians from what is seen 1/e of the fill is kept: 6 degrees, what a window's frame hides. */
 #define NEAR_RAD 0.1f
 
-/* The four cells around a unit direction and their weights, whose sum is 1. */
-struct corners {
-    size_t cell[4];
-    float weight[4];
-};
-
-static struct corners corners_of(vec3 d) {
-    struct latlong at = latlong_of(d); /* the centres of cells are half a cell in, both ways: this is no map */
-    double x = at.around * SKY_COLUMNS - 0.5, y = at.down * SKY_ROWS - 0.5;
-    double column = floor(x), row = floor(y);
-    float fx = (float)(x - column), fy = (float)(y - row);
-    struct corners c;
-    for (int i = 0; i < 4; i++) {
-        int at_x = ((int)column + i % 2 + SKY_COLUMNS) % SKY_COLUMNS, at_y = (int)row + i / 2;
-        at_y = at_y < 0 ? 0 : at_y >= SKY_ROWS ? SKY_ROWS - 1 : at_y;
-        c.cell[i] = (size_t)(at_y * SKY_COLUMNS + at_x);
-        c.weight[i] = (i % 2 ? fx : 1.0f - fx) * (i / 2 ? fy : 1.0f - fy);
-    }
-    return c;
+size_t light_sky_right(size_t cell) {
+    return cell % UNSEEN_COLUMNS + 1 < UNSEEN_COLUMNS ? cell + 1 : cell + 1 - UNSEEN_COLUMNS;
 }
-
-size_t light_sky_right(size_t cell) { return cell % SKY_COLUMNS + 1 < SKY_COLUMNS ? cell + 1 : cell + 1 - SKY_COLUMNS; }
-size_t light_sky_below(size_t cell) { return cell + SKY_COLUMNS < SKY_CELLS ? cell + SKY_COLUMNS : SKY_CELLS; }
+size_t light_sky_below(size_t cell) {
+    return cell + UNSEEN_COLUMNS < UNSEEN_CELLS ? cell + UNSEEN_COLUMNS : UNSEEN_CELLS;
+}
 
 static size_t pixel_count(const struct environment *e) { return (size_t)e->map.width * e->map.height; }
 
@@ -52,18 +34,18 @@ static rgb map_rgb(const struct environment *e, size_t pixel) {
 /* Means of the fill about the cells, by solid angle. */
 static void average_fill(struct light_sky *s) {
     const struct environment *e = s->environment;
-    double unseen[SKY_CELLS] = {0};
+    double unseen[UNSEEN_CELLS] = {0};
     for (size_t i = 0; i < pixel_count(e); i++) {
         size_t row = i / e->map.width;
         double angle = sin(PI * ((double)row + 0.5) / (double)e->map.height);
-        struct corners c = corners_of(environment_direction(e, i % e->map.width, row));
+        struct unseen_corners c = unseen_corners(environment_direction(e, i % e->map.width, row));
         for (int k = 0; k < 4; k++) {
             double weight = angle * (double)c.weight[k], open = is_seen(e, i) ? 0.0 : weight;
             s->fill[c.cell[k]] += open * (double)rgb_mean(map_rgb(e, i));
             unseen[c.cell[k]] += open;
         }
     }
-    for (size_t k = 0; k < SKY_CELLS; k++)
+    for (size_t k = 0; k < UNSEEN_CELLS; k++)
         s->fill[k] = unseen[k] > 0.0 ? s->fill[k] / unseen[k] : 0.0;
 }
 
@@ -95,7 +77,7 @@ bool light_sky_known(const struct light_sky *s, struct image *map) {
     return true;
 }
 
-void light_sky_add_ray(const struct light_sky *s, vec3 direction, float share, float cell[SKY_CELLS],
+void light_sky_add_ray(const struct light_sky *s, vec3 direction, float share, float cell[UNSEEN_CELLS],
                        float *saturated) {
     const struct environment *e = s->environment;
     if (e->map.pixel) {
@@ -106,7 +88,7 @@ void light_sky_add_ray(const struct light_sky *s, vec3 direction, float share, f
         }
         share *= 1.0f - kept_of_fill(s, pixel);
     }
-    struct corners c = corners_of(direction);
+    struct unseen_corners c = unseen_corners(direction);
     for (int k = 0; k < 4; k++)
         cell[c.cell[k]] += share * c.weight[k];
 }

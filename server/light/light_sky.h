@@ -1,5 +1,5 @@
-/* light_sky.h -- the parts of the environment that are sources of light to be estimated: unseen directions, in cells of
- * a coarse latitude-longitude map, and those at which every photograph that shows them saturates.
+/* light_sky.h -- the parts of the environment that are sources of light to be estimated: unseen directions, in the
+ * cells of unseen_fit.h, and those at which every photograph that shows them saturates.
  *
  * Near seen directions the fill of environment.h is kept, with a weight that falls over some degrees: what lies beside
  * an opening's edge resembles what is seen there. Cells are bilinear between their centres, and grey. */
@@ -9,17 +9,13 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+#include "server/light/unseen_fit.h"
 #include "server/state/reconstruction.h"
-
-/* A coarse map of unseen sky. */
-#define SKY_COLUMNS 12
-#define SKY_ROWS 6
-#define SKY_CELLS (SKY_COLUMNS * SKY_ROWS)
 
 struct light_sky {
     const struct environment *environment; /* borrowed */
     float *angle;                          /* [map height][map width] to what is seen; NULL: nothing is; owned */
-    double fill[SKY_CELLS];                /* mean radiance of the fill about each cell; 0: there is none */
+    double fill[UNSEEN_CELLS];             /* mean radiance of the fill about each cell; 0: there is none */
     bool estimates_bounds;                 /* saturated directions are a source; else their bounds are known light */
 };
 
@@ -32,9 +28,10 @@ bool light_sky_known(const struct light_sky *s, struct image *map);
 
 /* Shares of rays: what a ray of weight `share` that escapes in a unit direction adds to each cell, and to the saturated
  * directions, times their radiance. */
-void light_sky_add_ray(const struct light_sky *s, vec3 direction, float share, float cell[SKY_CELLS], float *saturated);
+void light_sky_add_ray(const struct light_sky *s, vec3 direction, float share, float cell[UNSEEN_CELLS],
+                       float *saturated);
 
-/* The cells beside cell k: to the right (around the horizon), and below; SKY_CELLS where there is none. */
+/* The cells beside cell k: to the right (around the horizon), and below; UNSEEN_CELLS where there is none. */
 size_t light_sky_right(size_t cell);
 size_t light_sky_below(size_t cell);
 
