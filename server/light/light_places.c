@@ -6,7 +6,6 @@
 
 #include "common/mem.h"
 #include "common/quantile.h"
-#include "common/spaced.h"
 #include "server/gather/sun.h"
 #include "server/render/sampler.h"
 
@@ -20,17 +19,8 @@
 
 struct places_gathering {
     const struct survey *survey;
-    const struct fused *shown; /* or NULL */
     struct light_place *place; /* [survey->count] */
 };
-
-/* Observed radiance of a point. */
-static rgb shown_of(const struct places_gathering *g, size_t index) {
-    const struct reconstruction *r = g->survey->r;
-    uint32_t texel = g->survey->texel[index], around = r->atlas.width / AROUND;
-    rgb shown = g->shown ? fused_around(g->shown, &r->atlas, &r->inverse, texel, around) : rgb_gray(0.0f);
-    return rgb_is_black(shown) ? fused_around(&r->fused, &r->atlas, &r->inverse, texel, around) : shown;
-}
 
 static void gather_place(void *user, size_t index, int thread) {
     const struct places_gathering *g = user;
@@ -39,7 +29,9 @@ static void gather_place(void *user, size_t index, int thread) {
     struct light_place *p = &g->place[index];
     uint32_t texel = survey->texel[index];
     struct irradiance light;
-    *p = (struct light_place){.segment = reconstruction_segment(r, texel), .shown = shown_of(g, index), .weight = 1.0f};
+    *p = (struct light_place){.segment = reconstruction_segment(r, texel),
+                              .shown = fused_around(&r->fused, &r->atlas, &r->inverse, texel, r->atlas.width / AROUND),
+                              .weight = 1.0f};
     if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &p->at))
         return;
     irradiance_gather(&light, &survey->scratch[thread], &survey->field, &p->at, sampler_key(KEY_SUN, texel, 0),
@@ -119,17 +111,10 @@ void light_places_take(struct light_places *s, struct light_place *place, size_t
     find_odd(s);
 }
 
-void light_places_init(struct light_places *s, const struct survey *survey, const struct fused *shown) {
+void light_places_init(struct light_places *s, const struct survey *survey) {
     struct light_place *place = mem_array(survey->count + 1, sizeof *place);
-    parallel_for(survey->r->pool, survey->count, gather_place, &(struct places_gathering){survey, shown, place});
+    parallel_for(survey->r->pool, survey->count, gather_place, &(struct places_gathering){survey, place});
     light_places_take(s, place, survey->count);
-}
-
-void light_places_thin(struct light_places *thin, const struct light_places *s, size_t most) {
-    size_t wanted = s->count < most ? s->count : most;
-    *thin = (struct light_places){.count = wanted, .place = mem_array(wanted + 1, sizeof *thin->place)};
-    for (size_t i = 0; i < wanted; i++)
-        thin->place[i] = s->place[spaced(i, s->count, wanted)];
 }
 
 void light_places_release(struct light_places *s) {

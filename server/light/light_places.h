@@ -29,14 +29,11 @@ struct light_places {
     struct light_place *place; /* [count] by segment; owned */
 };
 
-/* Makes the places from a survey. Observed radiance is that of `shown` around each, or fused radiance where that has
- * none or is NULL. */
+/* Makes the places from a survey; observed radiance is the mean around each. */
 #define LIGHT_PLACES 16384
-void light_places_init(struct light_places *places, const struct survey *survey, const struct fused *shown);
+void light_places_init(struct light_places *places, const struct survey *survey);
 /* From place[count] of which segment, at, shown, white and weight are known, in any order; takes it over. */
 void light_places_take(struct light_places *places, struct light_place *place, size_t count);
-/* `most` of them, evenly spread. */
-void light_places_thin(struct light_places *thin, const struct light_places *places, size_t most);
 /* Drops segments of which most is brighter than white paint could be: probably lamps. */
 void light_places_leave_out_lamps(struct light_places *places);
 void light_places_release(struct light_places *places);

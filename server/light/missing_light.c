@@ -55,8 +55,6 @@ static float part_of(const struct light_place *p, float strength, int channel) {
     return light > 0.0f ? light / (light + channel_of(p->white, channel)) : 0.0f;
 }
 
-float missing_light_part(const struct light_place *p, float strength) { return part_of(p, strength, MISSING_MEAN); }
-
 /* Robust loss in [0, 1) (Geman and McClure). */
 static double oddity(float off, float spread) {
     double e = (double)(off / spread);
@@ -117,33 +115,6 @@ static double misfit(const struct missing_light *m, float strength, int channel)
             any = any || m->places->place[i].lit > 0.0f;
         if (any)
             sum += segment_misfit(m, first, end, strength, channel);
-    }
-    return sum;
-}
-
-/* Adds the misfit of a segment's places, with the light or without. */
-static double share_misfit(const struct missing_light *m, size_t first, size_t end, float strength, float share,
-                           bool with) {
-    double sum = 0.0;
-    find_base(m, first, end, with ? strength : 0.0f, MISSING_MEAN);
-    float median = median_of(m, first, end);
-    for (size_t i = first; i < end; i++) {
-        if (missing_light_part(&m->places->place[i], strength) >= share)
-            sum += place_misfit(m, i, median, m->spread[first]);
-    }
-    return sum;
-}
-
-struct missing_share missing_light_share(const struct missing_light *m, float strength, float share) {
-    struct missing_share sum = {0.0, 0.0, 0.0};
-    for (size_t first = 0, end; first < m->places->count; first = end) {
-        end = light_places_end(m->places, first);
-        for (size_t i = first; i < end; i++) {
-            const struct light_place *p = &m->places->place[i];
-            sum.count += missing_light_part(p, strength) >= share ? (double)p->weight : 0.0;
-        }
-        sum.before += share_misfit(m, first, end, strength, share, false);
-        sum.after += share_misfit(m, first, end, strength, share, true);
     }
     return sum;
 }

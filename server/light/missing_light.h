@@ -38,15 +38,6 @@ float missing_light_strength(const struct missing_light *m, int channel, double 
  * a lamp in a corner brings a hundredth of their light, would agree about it. */
 rgb missing_light_color(struct missing_light *m);
 
-/* Part of a place's light that the hypothetical light would be. */
-float missing_light_part(const struct light_place *p, float strength);
-
-/* Misfit without and with the light, in places, over the `count` places of whose light it would be at least `share`. */
-struct missing_share {
-    double count, before, after;
-};
-struct missing_share missing_light_share(const struct missing_light *m, float strength, float share);
-
 /* Misfit of all places without it, in places. */
 double missing_light_misfit(const struct missing_light *m);
 

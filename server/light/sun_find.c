@@ -246,7 +246,7 @@ void sun_find(struct reconstruction *r, const struct views *views) {
     struct survey survey;
     survey_lights_on(r, views, NULL);
     survey_init(&survey, r, NULL, NULL, LIGHT_PLACES);
-    light_places_init(&s.places, &survey, NULL);
+    light_places_init(&s.places, &survey);
     survey_release(&survey);
     survey_lights_off(r);
     light_places_leave_out_lamps(&s.places);
