@@ -17,7 +17,7 @@
 #define SOLVE_STEPS 8
 /* Prior odds: lamps expected among all candidates. */
 #define LAMPS_EXPECTED 1.0
-/* Nats of evidence that remain to be asked for. */
+/* Odds that are asked for beyond that, as a logarithm: 20 to 1. */
 #define SURE 3.0
 #define NO_LIGHT (-1e3) /* the logarithm of no radiance to speak of */
 
@@ -36,7 +36,7 @@ struct lamp_search {
     struct joint_fit fit;      /* of these */
     size_t count;
     struct lamp_candidate *candidate;
-    bool all; /* points are asked */
+    bool all; /* all points are asked in place of the few */
 };
 
 /* --- the few points ---------------------------------------------------------------------------------------- */

@@ -25,7 +25,7 @@
 #define SKY_DEVIATION_ALONE 2.0
 #define SKY_SMOOTHNESS 0.5
 /* Colour: standard deviation of the logarithm of a channel about the mean of the channels. Black bodies of 2,700 K and
- * 6,500 K are .5 off in blue. */
+ * 6,500 K are .5 off in blue, coloured lamps twice as much. */
 #define COLOR_DEVIATION 1.0
 #define MEASURED_DEVIATION 0.02 /* of a channel that does not saturate */
 #define COLOR_STEPS 8

@@ -11,6 +11,8 @@
 #define LIGHT_SEEN_MOST 24
 #define LIGHT_LAMPS_MOST (LIGHT_SATURATED_MOST + LIGHT_HIDDEN_MOST + LIGHT_SEEN_MOST + 1)
 #define LIGHT_ALIKE_MOST 16 /* segments that are one lamp */
+_Static_assert(LIGHT_SATURATED_MOST *LIGHT_ALIKE_MOST + LIGHT_HIDDEN_MOST + 1 <= ESTIMATED_MOST,
+               "all lamps and the sky are reported");
 
 /* Errors of neighbouring patches agree: so many of them are worth one. */
 #define LIGHT_PATCHES_ALIKE 4.0

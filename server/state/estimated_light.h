@@ -9,8 +9,8 @@
 
 #include "common/vec.h"
 
-/* Segments whose radiance is estimated, at most; the sky's two parts besides. */
-#define ESTIMATED_MOST 256
+/* Sources, at most. */
+#define ESTIMATED_MOST 288
 
 enum estimated_kind {
     ESTIMATED_HIDDEN,        /* a segment that no photograph shows */
