@@ -98,12 +98,19 @@ static int present_token(struct client *c, const struct options *o) {
     return CLIENT_OK;
 }
 
+static const struct request_advice advice = {
+    .url = "an example: --server " PROTOCOL_DEFAULT_SERVER,
+    .ca = "--ca FILE names the certificates to trust",
+    .any = "is unbaked running there? --server URL or UNBAKE_SERVER names another",
+};
+
 static int run(struct client *c, const struct command *command, const struct options *o) {
     const char *server = getenv("UNBAKE_SERVER");
     server = options_text(o, "server", server && *server ? server : PROTOCOL_DEFAULT_SERVER);
     int signal_fd = block_signals();
     c->retry_sec = options_seconds(o, "retry", -1.0);
     c->request = request_new(server, c->retry_sec >= 0.0 ? c->retry_sec : CLIENT_RETRY_SEC, signal_fd);
+    request_set_advice(c->request, &advice);
     int code = present_token(c, o);
     if (code == CLIENT_OK)
         code = command->run(c, o);

@@ -79,7 +79,7 @@ own 'embree[34]/' server/render/accel.c
 own 'microhttpd\.h' server/transport/exchange.h
 own 'gnutls/' server/net/tls.c server/worker/deliver.c
 own 'sqlite3\.h' server/store/sql.h
-own 'curl/' client/request.c
+own 'curl/' common/request.c
 own 'openexr' common/exr_stream.h
 own 'png\.h' common/png_memory.h
 own 'lcms2' common/color_icc.c

@@ -1,5 +1,5 @@
 /* request.c -- see request.h. */
-#include "client/request.h"
+#include "common/request.h"
 
 #include <curl/curl.h>
 #include <math.h>
@@ -10,7 +10,6 @@
 #include <sys/signalfd.h>
 #include <unistd.h>
 
-#include "client/meter.h"
 #include "common/clock.h"
 #include "common/mem.h"
 #include "common/protocol.h"
@@ -21,11 +20,14 @@
 #define TICK_MS 200
 #define PAUSE_FIRST_SEC 0.1
 #define PAUSE_MAX_SEC 5.0
+#define UNIX_PREFIX "unix:"
 
 struct http_request {
-    char *server;        /* owned */
-    char *authorization; /* the header; owned; NULL: none */
-    char *ca_file;       /* owned; NULL: the system's */
+    char *server;                        /* owned */
+    char *socket;                        /* path of a unix socket; owned; NULL: none */
+    const struct request_advice *advice; /* borrowed; NULL: none */
+    char *authorization;                 /* the header; owned; NULL: none */
+    char *ca_file;                       /* owned; NULL: the system's */
     double retry_sec;
     int signal_fd; /* borrowed; -1: none */
     bool interrupted;
@@ -50,6 +52,8 @@ struct http_request *request_new(const char *server_url, double retry_sec, int s
     while (length > 0 && server_url[length - 1] == '/')
         length--;
     r->server = mem_strndup(server_url, length);
+    if (strncmp(r->server, UNIX_PREFIX, strlen(UNIX_PREFIX)) == 0)
+        r->socket = mem_strdup(r->server + strlen(UNIX_PREFIX));
     r->retry_sec = retry_sec;
     r->signal_fd = signal_fd;
     curl_global_init(CURL_GLOBAL_DEFAULT);
@@ -68,6 +72,8 @@ void request_set_ca(struct http_request *r, const char *path) {
     r->ca_file = mem_strdup(path);
 }
 
+void request_set_advice(struct http_request *r, const struct request_advice *advice) { r->advice = advice; }
+
 void request_free(struct http_request *r) {
     if (!r)
         return;
@@ -75,6 +81,7 @@ void request_free(struct http_request *r) {
     curl_multi_cleanup(r->multi);
     curl_global_cleanup();
     mem_free(r->server);
+    mem_free(r->socket);
     mem_free(r->authorization);
     mem_free(r->ca_file);
     mem_free(r);
@@ -185,7 +192,7 @@ static bool is_loopback(const char *server) {
     return strncmp(host, "127.", 4) == 0 || strncasecmp(host, "localhost", 9) == 0 || strncmp(host, "[::1]", 5) == 0;
 }
 
-bool request_is_loopback(const struct http_request *r) { return is_loopback(r->server); }
+bool request_is_loopback(const struct http_request *r) { return r->socket || is_loopback(r->server); }
 
 /* Configures the handle; the returned list of headers and the texts must outlive the transfer. */
 static struct curl_slist *set_up(struct request_try *a, const char *url, const char *body) {
@@ -202,8 +209,10 @@ static struct curl_slist *set_up(struct request_try *a, const char *url, const c
     curl_easy_setopt(easy, CURLOPT_HEADERDATA, a);
     curl_easy_setopt(easy, CURLOPT_WRITEFUNCTION, on_body);
     curl_easy_setopt(easy, CURLOPT_WRITEDATA, a);
-    if (is_loopback(a->request->server))
+    if (request_is_loopback(a->request))
         curl_easy_setopt(easy, CURLOPT_PROXY, "");
+    if (a->request->socket)
+        curl_easy_setopt(easy, CURLOPT_UNIX_SOCKET_PATH, a->request->socket);
     if (a->request->ca_file)
         curl_easy_setopt(easy, CURLOPT_CAINFO, a->request->ca_file);
     struct curl_slist *headers = NULL;
@@ -261,7 +270,16 @@ static bool drive(struct request_try *a, CURLcode *result) {
     return true;
 }
 
+/* Sets the hint where there is one; returns `status`, which is that of the error. */
+static enum status advise(enum status status, const char *hint, struct error *err) {
+    if (hint)
+        error_hint(err, "%s", hint);
+    return status;
+}
+
 static enum status transport_failed(struct request_try *a, CURLcode code, const char *detail) {
+    static const struct request_advice none = {0};
+    const struct request_advice *advice = a->request->advice ? a->request->advice : &none;
     struct error *err = a->err;
     const char *why = *detail ? detail : curl_easy_strerror(code);
     long number = 0; /* errno: "Connection refused" says more than curl's text */
@@ -270,16 +288,16 @@ static enum status transport_failed(struct request_try *a, CURLcode code, const 
         why = strerror((int)number);
     if (code == CURLE_URL_MALFORMAT || code == CURLE_UNSUPPORTED_PROTOCOL) {
         error_set(err, STATUS_INPUT, "%s is not the URL of a server: %s", a->request->server, why);
-        return error_hint(err, "an example: --server " PROTOCOL_DEFAULT_SERVER);
+        return advise(STATUS_INPUT, advice->url, err);
     }
     error_set(err, STATUS_UNAVAILABLE, "cannot reach %s: %s", a->request->server, why);
     if (code == CURLE_PEER_FAILED_VERIFICATION || code == CURLE_SSL_CACERT_BADFILE)
-        return error_hint(err, "--ca FILE names the certificates to trust");
+        return advise(STATUS_UNAVAILABLE, advice->ca, err);
     if (code == CURLE_SSL_CONNECT_ERROR)
         return error_hint(err, "does it speak https, or should the URL begin with http://?");
     if (code == CURLE_GOT_NOTHING && strncmp(a->request->server, "http://", 7) == 0)
         return error_hint(err, "does it want https? Then the URL begins with https://");
-    return error_hint(err, "is unbaked running there? --server URL or UNBAKE_SERVER names another");
+    return advise(STATUS_UNAVAILABLE, advice->any, err);
 }
 
 /* One try. *unsent: the server cannot have received the request. */
@@ -360,7 +378,7 @@ static enum status judge(struct request_try *a) {
 
 enum status request_run(struct http_request *r, const struct request_call *call, struct reply *reply,
                         struct error *err) {
-    char *url = mem_printf("%s%s", r->server, call->path);
+    char *url = mem_printf("%s%s", r->socket ? "http://localhost" : r->server, call->path);
     char *body = call->body ? json_text(call->body) : NULL;
     bool same_twice = call->same_twice || !call->method;
     double give_up_at = clock_sec() + r->retry_sec;

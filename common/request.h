@@ -1,14 +1,15 @@
-/* request.h -- requests to the daemon. request.c is the only include of <curl/curl.h>.
+/* request.h -- requests to the daemon, by the client and by `unbaked node`. request.c is the only include of
+ * <curl/curl.h>.
  *
  * 1. A request that cannot be sent, or that meets 502, 503 or 504, is tried again with growing
  *    pauses for `retry_sec`. One whose effect is not the same twice is tried again only when the
  *    server cannot have got it.
- * 2. SIGINT and SIGTERM (blocked by main, read from signal_fd) end a request or a pause at once
+ * 2. SIGINT and SIGTERM (blocked by main, read from signal_fd; -1: none) end a request or a pause at once
  *    with STATUS_CANCELLED.
  * 3. Redirects are not followed; a loopback address is reached without a proxy.
  * One request at a time; not thread-safe. */
-#ifndef UNBAKE_CLIENT_REQUEST_H
-#define UNBAKE_CLIENT_REQUEST_H
+#ifndef UNBAKE_COMMON_REQUEST_H
+#define UNBAKE_COMMON_REQUEST_H
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -20,7 +21,15 @@
 
 struct http_request; /* a server and the connection to it; opaque */
 
+/* `server_url` is http://, https:// or unix:PATH, a socket on which HTTP is spoken. */
 struct http_request *request_new(const char *server_url, double retry_sec, int signal_fd);
+/* What an error advises when no server could be reached; static text. */
+struct request_advice {
+    const char *url; /* it is no URL */
+    const char *ca;  /* its certificate is not trusted */
+    const char *any; /* anything else */
+};
+void request_set_advice(struct http_request *r, const struct request_advice *advice); /* borrowed */
 /* Sent with every request from now on; NULL: none. Never printed. */
 void request_set_token(struct http_request *r, const char *token);
 /* A file of certificates to trust instead of the system's. */
