@@ -70,10 +70,10 @@ static void renew_few(struct lamp_search *s) {
 
 /* --- candidates -------------------------------------------------------------------------------------------- */
 
-/* No photograph shows it, and it has a surface of its own. */
+/* No photograph shows it, and it has a surface. */
 static bool may_be_lamp(const struct light_model *m, size_t segment) {
     const struct emitter_evidence *e = &m->r->evidence[segment];
-    return !e->is_seen && !e->is_outshone && !m->is_lamp[segment] && by_segment_count(&m->light.texels, segment) > 0;
+    return !e->is_seen && !e->is_outshone && !m->is_lamp[segment] && m->light.area_m2[segment] > 0.0f;
 }
 
 bool hidden_lamps_any(const struct light_model *m) {

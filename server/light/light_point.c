@@ -22,6 +22,9 @@
 /* A patch is a cube of this part of the square root of the room's surface: some .3 m. */
 #define PATCH_PART 0.022f
 #define PATCH_BITS 9 /* of a coordinate of a patch */
+/* A texel whose centre lies beside its triangle stands for a point on that one's edge, from where rays pass between two
+ * walls. So points are moved towards the triangle's middle by this part of the way. */
+#define INSIDE 1e-3f
 
 struct gathering {
     const struct survey *survey;
@@ -120,6 +123,11 @@ static void look_at_sky(const struct gathering *g, struct incident *in, struct l
     }
 }
 
+static void move_inside(const struct mesh *mesh, struct surface_point *at) {
+    vec3 middle = mesh_point(mesh, at->triangle, 1.0f / 3.0f, 1.0f / 3.0f);
+    at->position = vec3_mad(at->position, INSIDE, vec3_sub(middle, at->position));
+}
+
 static void gather_point(void *user, size_t index, int thread) {
     const struct gathering *g = user;
     const struct reconstruction *r = g->survey->r;
@@ -130,6 +138,7 @@ static void gather_point(void *user, size_t index, int thread) {
     *p = (struct light_point){.segment = reconstruction_segment(r, texel), .observed = observed_at(g, texel)};
     if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &p->at))
         return;
+    move_inside(&r->scene->mesh, &p->at);
     p->patch = patch_of(g, &p->at);
     memset(in->escapes, 0, RAYS_PER_POINT * sizeof *in->escapes); /* inside closed bodies no ray is traced */
     irradiance_gather(&light, in, &g->survey->field, &p->at, sampler_key(KEY_POINT, texel, 0), RAYS_PER_POINT);

@@ -6,16 +6,33 @@
 #include "common/mem.h"
 #include "server/render/bsdf.h"
 
+/* Inverse powers of the plastic number: the sequence of least discrepancy of its kind in the plane. */
+#define RECURRENCE_1 0.75487766624669276
+#define RECURRENCE_2 0.56984029099805327
+
+static float triangle_area_m2(const struct mesh *mesh, size_t triangle) {
+    return 0.5f * vec3_length(mesh_cross(mesh, triangle));
+}
+
 void segment_light_init(struct segment_light *l, const struct reconstruction *r) {
     const struct mesh *mesh = &r->scene->mesh;
-    *l = (struct segment_light){.r = r, .area_m2 = mem_calloc(r->segments.count, sizeof *l->area_m2)};
-    by_segment_sort(&l->texels, &r->segments, &r->inverse);
-    for (size_t i = 0; i < mesh->triangle_count; i++)
-        l->area_m2[r->segments.of_triangle[i]] += 0.5f * vec3_length(mesh_cross(mesh, i));
+    size_t segments = r->segments.count;
+    *l = (struct segment_light){.r = r, .area_m2 = mem_calloc(segments + 1, sizeof *l->area_m2)};
+    l->first = mem_calloc(segments + 2, sizeof *l->first);
+    l->triangle = mem_array(mesh->triangle_count + 1, sizeof *l->triangle);
+    for (size_t i = 0; i < mesh->triangle_count; i++) {
+        l->area_m2[r->segments.of_triangle[i]] += triangle_area_m2(mesh, i);
+        l->first[r->segments.of_triangle[i] + 2]++;
+    }
+    for (size_t s = 0; s < segments; s++)
+        l->first[s + 2] += l->first[s + 1];
+    for (size_t i = 0; i < mesh->triangle_count; i++) /* first[s + 1] is where the next one of s goes, at last its end */
+        l->triangle[l->first[r->segments.of_triangle[i] + 1]++] = (uint32_t)i;
 }
 
 void segment_light_release(struct segment_light *l) {
-    by_segment_release(&l->texels);
+    mem_free(l->triangle);
+    mem_free(l->first);
     mem_free(l->area_m2);
     *l = (struct segment_light){0};
 }
@@ -57,16 +74,37 @@ static void light_point(void *user, size_t index, int thread) {
     }
 }
 
+/* Point `index` of a segment: in a triangle by the square-root map, by two additive recurrences (Roberts 2018). */
+static struct surface_point point_in(const struct mesh *mesh, uint32_t triangle, size_t index) {
+    double u = fmod(0.5 + RECURRENCE_1 * (double)index, 1.0), v = fmod(0.5 + RECURRENCE_2 * (double)index, 1.0);
+    float root = sqrtf((float)u), b1 = root * (1.0f - (float)v), b2 = root * (float)v;
+    vec3 normal = vec3_normalize(mesh_cross(mesh, triangle));
+    return (struct surface_point){.triangle = triangle,
+                                  .b1 = b1,
+                                  .b2 = b2,
+                                  .position = mesh_point(mesh, triangle, b1, b2),
+                                  .normal = normal,
+                                  .shading = normal};
+}
+
+/* Points of a segment that stand for equal parts of its area, `wanted` of them. */
+static void spread_points(const struct segment_light *l, uint32_t segment, size_t wanted, struct lighting *job) {
+    const struct mesh *mesh = &l->r->scene->mesh;
+    double part = (double)l->area_m2[segment] / (double)wanted, passed = 0.0;
+    for (size_t i = l->first[segment]; i < l->first[segment + 1]; i++) {
+        passed += (double)triangle_area_m2(mesh, l->triangle[i]);
+        while (job->source_count < wanted && passed > ((double)job->source_count + 0.5) * part) {
+            job->source[job->source_count] = point_in(mesh, l->triangle[i], job->source_count);
+            job->source_count++;
+        }
+    }
+}
+
 void segment_light_add(const struct segment_light *l, const struct light_point *point, size_t count, uint32_t segment,
                        size_t points, float *lit) {
     const struct reconstruction *r = l->r;
     struct lighting job = {.accel = r->world.accel, .point = point, .lit = lit};
-    size_t texels = by_segment_count(&l->texels, segment), wanted = texels < points ? texels : points;
-    for (size_t i = 0; i < wanted; i++) {
-        uint32_t texel = by_segment_spaced(&l->texels, segment, i, wanted);
-        job.source_count +=
-            surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &job.source[job.source_count]);
-    }
+    spread_points(l, segment, points, &job);
     job.area_m2 = l->area_m2[segment] / fmaxf((float)job.source_count, 1.0f);
     parallel_for(r->pool, count, light_point, &job);
 }

@@ -3,20 +3,20 @@
 #define UNBAKE_LIGHT_SEGMENT_LIGHT_H
 
 #include "server/light/light_point.h"
-#include "server/scene/by_segment.h"
 
-/* What is the same for all segments. */
+/* What is the same for all segments. Triangles [first[s], first[s + 1]) are those of segment s, in the mesh's order. */
 struct segment_light {
     const struct reconstruction *r; /* borrowed */
-    struct texels_by_segment texels;
-    float *area_m2; /* [segment_count]; owned */
+    uint32_t *first;                /* [segment_count + 1]; owned, as all below */
+    uint32_t *triangle;             /* [triangle_count] */
+    float *area_m2;                 /* [segment_count] */
 };
 
 void segment_light_init(struct segment_light *l, const struct reconstruction *r);
 void segment_light_release(struct segment_light *l);
 
 /* Adds to lit[count] what a surface of albedo 1 at each point would send of a radiance of 1 from the front of the whole
- * segment, by as many points of it as given, SEGMENT_LIGHT_POINTS at most. */
+ * segment, by as many points of it as given, SEGMENT_LIGHT_POINTS at most, evenly spread by area. */
 #define SEGMENT_LIGHT_POINTS 32
 void segment_light_add(const struct segment_light *l, const struct light_point *point, size_t count, uint32_t segment,
                        size_t points, float *lit);

@@ -106,6 +106,22 @@ static void test_alike(struct parallel *pool) {
     joint_fit_release(&f);
 }
 
+/* Once one of two lamps of the same light is there, the other one gains nothing: they are reported as one. */
+static void test_alike_is_one(struct parallel *pool) {
+    const float x[2] = {60.0f, 0.0f};
+    struct joint_fit f;
+    struct joint_source first = source_about(log(30.0), 1.5), second = first;
+    make_floor(9, 0.5f, x, 0.1f);
+    start(&f, pool);
+    CHECK(joint_fit_try(&f, &first, lit[0]) > 20.0);
+    joint_fit_add(&f, &first, lit[0]);
+    joint_fit_solve(&f, 30);
+    CHECK_NEAR(exp(f.source[1].value), 60.0, 6.0);
+    double gain = joint_fit_try(&f, &second, lit[0]);
+    CHECK_THAT(gain < 1.0, "%g nats", gain);
+    joint_fit_release(&f);
+}
+
 static void test_bound(struct parallel *pool) {
     const float x[2] = {60.0f, 0.0f};
     struct joint_fit f;
@@ -222,6 +238,7 @@ int main(void) {
     test_recovers(pool);
     test_deviations(pool);
     test_alike(pool);
+    test_alike_is_one(pool);
     test_bound(pool);
     test_white();
     test_try(pool);

@@ -1,0 +1,248 @@
+/* segment_light.h, light_point.h: what sources send to points, against closed forms. A sphere over a floor; a sky through
+ * a hole in the ceiling, all of it and by cell; nothing behind a wall; and the joint fit finds the sky's radiance from
+ * these responses, which noise would make too small. */
+#include "server/light/joint_fit.h"
+#include "server/light/segment_light.h"
+#include "server/render/bsdf.h"
+#include "tests/check.h"
+#include "tests/render/small_room.h"
+
+#define WALL 4
+#define WALL_AT 2.0f /* x of a wall across the room, from floor to ceiling */
+#define RADIUS 0.1f
+#define STACKS 12 /* of the sphere's tessellation */
+#define SLICES 24
+#define HOLE 1.0f /* side of the hole, from (.5, 3, 1) on */
+#define SKY 8.0f
+#define PARTS 40 /* of the hole along each side, in the closed form by cell */
+
+/* A reconstruction in which the floor is observed, and all that these units ask of one. */
+struct rig {
+    struct scene scene;
+    struct model model;
+    struct reconstruction r;
+    struct parallel *pool;
+};
+
+static void rig_init(struct rig *g) {
+    g->pool = parallel_new(0);
+    model_init(&g->model, &g->scene.mesh, 128, 0.5f, g->pool);
+    model_light(&g->model, &g->scene.mesh, rgb_gray(0.0f), NULL, g->pool);
+    size_t texels = (size_t)g->model.atlas.width * g->model.atlas.height;
+    g->r = (struct reconstruction){.scene = &g->scene, .pool = g->pool};
+    g->r.segments = g->model.segments, g->r.atlas = g->model.atlas, g->r.inverse = g->model.inverse;
+    g->r.materials = g->model.materials, g->r.world = g->model.world;
+    g->r.fused = (struct fused){.width = g->model.atlas.width, .height = g->model.atlas.height};
+    g->r.fused.radiance = mem_calloc(texels, sizeof *g->r.fused.radiance);
+    g->r.fused.count = mem_calloc(texels, sizeof *g->r.fused.count);
+    g->r.fused.is_bound = mem_calloc(texels, sizeof *g->r.fused.is_bound);
+    for (size_t i = 0; i < g->model.inverse.valid_count; i++) {
+        uint32_t texel = g->model.inverse.valid[i];
+        g->r.fused.count[texel] = g->r.segments.id[reconstruction_segment(&g->r, texel)] == FLOOR;
+    }
+}
+
+static void rig_release(struct rig *g) {
+    mem_free(g->r.fused.is_bound);
+    mem_free(g->r.fused.count);
+    mem_free(g->r.fused.radiance);
+    model_release(&g->model);
+    scene_release(&g->scene);
+    parallel_free(g->pool);
+}
+
+/* --- a sphere over a floor ----------------------------------------------------------------------------------- */
+
+static const vec3 centre = {1.0f, 1.0f, 1.5f};
+
+static vec3 on_sphere(uint32_t stack, uint32_t slice) {
+    float down = BSDF_PI * (float)stack / STACKS, around = 2.0f * BSDF_PI * (float)slice / SLICES;
+    vec3 d = {sinf(down) * cosf(around), cosf(down), sinf(down) * sinf(around)};
+    return vec3_mad(centre, RADIUS, d);
+}
+
+static void add_triangle(struct mesh *m, vec3 a, vec3 b, vec3 c) {
+    size_t i = m->triangle_count++;
+    const vec3 corner[3] = {a, b, c};
+    for (uint32_t k = 0; k < 3; k++) {
+        m->index[i][k] = (uint32_t)m->vertex_count;
+        m->position[m->vertex_count++] = corner[k];
+    }
+    m->face[i] = (uint32_t)i;
+    m->object_id[i] = LAMP;
+}
+
+static void add_sphere(struct mesh *m) {
+    for (uint32_t i = 0; i < STACKS; i++) {
+        for (uint32_t k = 0; k < SLICES; k++) {
+            vec3 a = on_sphere(i, k), b = on_sphere(i + 1, k), c = on_sphere(i + 1, k + 1), d = on_sphere(i, k + 1);
+            if (i > 0)
+                add_triangle(m, a, d, c);
+            if (i + 1 < STACKS)
+                add_triangle(m, a, c, b);
+        }
+    }
+    m->face_count = m->triangle_count;
+}
+
+/* Points of the floor, one for each of its texels; the caller's. */
+static struct light_point *floor_points(const struct rig *g, size_t *count) {
+    struct light_point *point = mem_calloc(g->model.inverse.valid_count, sizeof *point);
+    *count = 0;
+    for (size_t i = 0; i < g->model.inverse.valid_count; i++) {
+        uint32_t texel = g->model.inverse.valid[i];
+        if (g->r.fused.count[texel] > 0.0f &&
+            surface_at_texel(&g->scene.mesh, &g->r.atlas, &g->r.inverse, texel, &point[*count].at))
+            ++*count;
+    }
+    return point;
+}
+
+/* L r^2 h / d^3: exact for a sphere wholly above the floor. */
+static float sphere_over(vec3 p) {
+    vec3 way = vec3_sub(centre, p);
+    float square = vec3_dot(way, way);
+    return RADIUS * RADIUS * way.y / (square * sqrtf(square));
+}
+
+static void test_sphere(void) {
+    struct rig g = {0};
+    struct segment_light light;
+    double sum[2] = {0.0, 0.0}, worst = 0.0;
+    start_room(&g.scene.mesh, 6 * STACKS * SLICES);
+    add_quad(&g.scene.mesh, WALL, (vec3){WALL_AT, 0, 0}, (vec3){0, 0, 3}, (vec3){0, 3, 0});
+    add_sphere(&g.scene.mesh);
+    rig_init(&g);
+    segment_light_init(&light, &g.r);
+    size_t count, hidden = 0, lamp = 0;
+    struct light_point *point = floor_points(&g, &count);
+    float *lit = mem_calloc(count + 1, sizeof *lit);
+    for (size_t s = 0; s < g.r.segments.count; s++)
+        lamp = g.r.segments.id[s] == LAMP ? s : lamp;
+    segment_light_add(&light, point, count, (uint32_t)lamp, SEGMENT_LIGHT_POINTS, lit);
+    for (size_t i = 0; i < count; i++) {
+        if (point[i].at.position.x > WALL_AT) {
+            CHECK_THAT(lit[i] == 0.0f, "%g behind the wall", (double)lit[i]);
+            hidden++;
+            continue;
+        }
+        double wanted = (double)sphere_over(point[i].at.position);
+        sum[0] += (double)lit[i], sum[1] += wanted;
+        worst = fmax(worst, fabs((double)lit[i] / wanted - 1.0));
+    }
+    CHECK(hidden > 100 && count - hidden > 100);
+    printf("sphere: %.3f of the closed form, at worst off by %.2f\n", sum[0] / sum[1], worst);
+    CHECK_NEAR(sum[0] / sum[1], 1.0, 0.03);
+    CHECK_THAT(worst < 0.15, "off by %g", worst);
+    mem_free(lit);
+    mem_free(point);
+    segment_light_release(&light);
+    rig_release(&g);
+}
+
+/* --- a sky through a hole ------------------------------------------------------------------------------------ */
+
+/* The ceiling but for the hole; the other walls are those of start_room. */
+static void make_room_with_hole(struct mesh *m) {
+    start_room(m, 16);
+    m->vertex_count -= 12, m->triangle_count -= 6; /* all but the floor again */
+    vec3 x = {4, 0, 0}, y = {0, 3, 0}, z = {0, 0, 3};
+    add_quad(m, 2, (vec3){0, 0, 0}, y, z);
+    add_quad(m, 3, x, z, y);
+    add_quad(m, 5, (vec3){0, 0, 0}, x, y);
+    add_quad(m, 5, z, y, x);
+    add_quad(m, 1, y, (vec3){0.5f, 0, 0}, z);
+    add_quad(m, 1, (vec3){0.5f + HOLE, 3, 0}, (vec3){3.5f - HOLE, 0, 0}, z);
+    add_quad(m, 1, (vec3){0.5f, 3, 0}, (vec3){HOLE, 0, 0}, (vec3){0, 0, 1});
+    add_quad(m, 1, (vec3){0.5f, 3, 1.0f + HOLE}, (vec3){HOLE, 0, 0}, (vec3){0, 0, 2.0f - HOLE});
+    add_quad(m, WALL, (vec3){WALL_AT, 0, 0}, z, y);
+    add_lamp(m);
+    for (size_t i = 0; i < 4; i++) /* out of the way */
+        m->position[m->vertex_count - 1 - i].y = -1.0f;
+}
+
+/* Adds the form factors from a floor point to the parts of the hole that lie in each cell; returns their sum. */
+static double hole_factors(vec3 p, double cell[UNSEEN_CELLS]) {
+    double sum = 0.0, area = (double)(HOLE * HOLE) / (PARTS * PARTS);
+    for (int i = 0; i < PARTS * PARTS; i++) {
+        vec3 at = {0.5f + HOLE * ((float)(i % PARTS) + 0.5f) / PARTS, 3.0f,
+                   1.0f + HOLE * ((float)(i / PARTS) + 0.5f) / PARTS};
+        vec3 way = vec3_sub(at, p);
+        double square = (double)vec3_dot(way, way);
+        double factor = area * (double)(way.y * way.y) / (PI * square * square);
+        struct unseen_corners c = unseen_corners(vec3_normalize(way));
+        for (int k = 0; k < 4; k++)
+            cell[c.cell[k]] += factor * (double)c.weight[k];
+        sum += factor;
+    }
+    return sum;
+}
+
+/* The sky's radiance, from what a floor of albedo .5 shows under the closed form's light. */
+static double fit_sky(const struct rig *g, const struct light_points *points) {
+    struct joint_point *joint = mem_array(points->count, sizeof *joint);
+    float *lit = mem_array(points->count, sizeof *lit);
+    struct joint_fit fit;
+    for (size_t i = 0; i < points->count; i++) {
+        const struct light_point *p = &points->point[i];
+        double cell[UNSEEN_CELLS] = {0};
+        float light = p->at.position.x > WALL_AT ? 0.0f : SKY * (float)hole_factors(p->at.position, cell);
+        joint[i] = (struct joint_point){p->segment, p->patch, 0.5f * (0.1f + light), 0.1f, 0.05f};
+        lit[i] = p->escaping;
+    }
+    joint_fit_init(&fit, joint, points->count, 2, g->pool);
+    joint_fit_add(&fit, &(struct joint_source){log(1.0), 2.0, -INFINITY, log(1.0), 0.0}, lit);
+    joint_fit_solve(&fit, 30);
+    double found = exp(fit.source[1].value);
+    joint_fit_release(&fit);
+    mem_free(lit);
+    mem_free(joint);
+    return found;
+}
+
+static void compare_sky(const struct light_points *points) {
+    double cell[2][UNSEEN_CELLS] = {{0}}, sum[2] = {0.0, 0.0};
+    for (size_t i = 0; i < points->count; i++) {
+        const struct light_point *p = &points->point[i];
+        if (p->at.position.x > WALL_AT + 0.3f) {
+            CHECK_THAT(p->escaping == 0.0f, "%g behind the wall", (double)p->escaping);
+            continue;
+        }
+        sum[0] += (double)p->escaping;
+        for (size_t k = 0; k < UNSEEN_CELLS && p->sky; k++)
+            cell[0][k] += (double)p->sky[k];
+        if (p->at.position.x < WALL_AT)
+            sum[1] += hole_factors(p->at.position, cell[1]);
+    }
+    CHECK_NEAR(sum[0] / sum[1], 1.0, 0.02);
+    for (size_t k = 0; k < UNSEEN_CELLS; k++)
+        CHECK_THAT(fabs(cell[0][k] - cell[1][k]) < 0.03 * cell[1][k] + 0.003 * sum[1], "cell %zu: %g, %g", k,
+                   cell[0][k], cell[1][k]);
+}
+
+static void test_sky(void) {
+    struct rig g = {0};
+    struct survey survey;
+    struct light_sky sky;
+    struct light_points points;
+    make_room_with_hole(&g.scene.mesh);
+    rig_init(&g);
+    light_sky_init(&sky, &g.r.environment);
+    survey_init(&survey, &g.r, NULL, NULL, 1600);
+    light_points_init(&points, &survey, &sky, NULL, 0.1f);
+    survey_release(&survey);
+    CHECK(points.count > 300);
+    compare_sky(&points);
+    double found = fit_sky(&g, &points);
+    printf("sky of %g: %.2f\n", (double)SKY, found);
+    CHECK_NEAR(found, (double)SKY, 0.05 * (double)SKY);
+    light_points_release(&points);
+    light_sky_release(&sky);
+    rig_release(&g);
+}
+
+int main(void) {
+    test_sphere();
+    test_sky();
+    return check_result();
+}
