@@ -37,7 +37,7 @@ for folder in $engine_order; do
 done
 # A function says what it reads and what it writes: only the stages and server/light (which fits light to everything)
 # have the whole state in hand.
-forbid server/refine 'server/state/reconstruction\.h' 'refine sees parts of the state, not the whole'
+forbid "server/material server/refine" 'server/state/reconstruction\.h' 'material and refine see parts of the state, not the whole'
 forbid "server/ingest server/export" "server/($(echo "$engine_order" | cut -d' ' -f2- | tr ' ' '|'))/" \
     'ingest and export see only scene'
 forbid server/ingest 'server/export/' 'ingest does not see export'

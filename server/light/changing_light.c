@@ -38,7 +38,7 @@ enum light_kind { TELLS_NOTHING, TELLS_BLACK, TELLS_LIT };
 /* Classifies a photograph's observation of a place whose Lambert radiance at albedo 1 is `white`. */
 static enum light_kind kind_of(const struct divide *d, const struct view *view, uint32_t triangle, float white,
                                float *shown) {
-    const struct photograph *photo = &d->r->scene->photograph[d->views->train[view->train]];
+    const struct photograph *photo = &d->views->scene->photograph[d->views->train[view->train]];
     struct photograph_sample s;
     if (views_edge(d->views, view, triangle) > 0 || !photograph_sample(photo, view->x, view->y, &s))
         return TELLS_NOTHING;
@@ -73,7 +73,7 @@ static float drawn_weight(uint32_t texel, uint32_t train) {
 
 /* Whether some photographs show the texel black, and others lit and not by a highlight. */
 static bool changed(const struct divide *d, uint32_t texel, int thread) {
-    const struct reconstruction *r = d->r;
+    const struct surface *s = &d->surface;
     struct surface_point at;
     rgb white;
     struct {
@@ -84,7 +84,7 @@ static bool changed(const struct divide *d, uint32_t texel, int thread) {
     struct best_item item[OBSERVATIONS_TESTED];
     size_t black_count = 0, own = 0;
     best_init(&drawn, item, OBSERVATIONS_TESTED);
-    if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at) || !divide_lambert(d, texel, &white))
+    if (!surface_at_texel(s->mesh, s->atlas, s->inverse, texel, &at) || !divide_lambert(d, texel, &white))
         return false;
     for (uint32_t t = 0; t < d->views->train_count; t++) {
         struct view view;
@@ -105,7 +105,7 @@ static bool changed(const struct divide *d, uint32_t texel, int thread) {
 }
 
 float changing_light(const struct divide *d, const uint32_t *texel, size_t count, int thread) {
-    const struct fused *fused = &d->r->fused;
+    const struct fused *fused = d->fused;
     uint32_t place[PLACES];
     size_t places = 0, spread = 0, changes = 0;
     for (size_t i = 0; i < PLACES && count >= PLACES; i++) {

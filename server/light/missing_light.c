@@ -27,19 +27,16 @@ static void ask_all(struct missing_light *m) {
         m->weight[i] = 1.0f;
 }
 
-void missing_light_init(struct missing_light *m, const struct light_places *places, float white, bool in_patches) {
-    *m = (struct missing_light){.places = places, .max_albedo = white, .in_patches = in_patches};
+void missing_light_init(struct missing_light *m, const struct light_places *places, float white) {
+    *m = (struct missing_light){.places = places, .max_albedo = white};
     m->base = mem_array(places->count + 1, sizeof *m->base);
     m->sorted = mem_array(places->count + 1, sizeof *m->sorted);
-    m->spread = mem_array(places->count + 1, sizeof *m->spread);
     m->weight = mem_array(places->count + 1, sizeof *m->weight);
     ask_all(m);
-    missing_light_renew(m);
 }
 
 void missing_light_release(struct missing_light *m) {
     mem_free(m->weight);
-    mem_free(m->spread);
     mem_free(m->sorted);
     mem_free(m->base);
     *m = (struct missing_light){0};
@@ -80,14 +77,6 @@ static void find_base(const struct missing_light *m, size_t first, size_t end, f
 /* Spread of base colours about a median. */
 static float spread_about(float median) { return SPREAD_WITHIN + HIGHLIGHT_ALLOWANCE * expf(-median); }
 
-void missing_light_renew(struct missing_light *m) {
-    for (size_t first = 0, end; first < m->places->count; first = end) {
-        end = light_places_end(m->places, first);
-        find_base(m, first, end, 0.0f, MISSING_MEAN);
-        m->spread[first] = spread_about(median_of(m, first, end));
-    }
-}
-
 /* Misfit of place i, given the median base colour of its segment. */
 static double place_misfit(const struct missing_light *m, size_t i, float median, float spread) {
     double within = oddity(m->base[i] - median, spread);
@@ -99,7 +88,7 @@ static double place_misfit(const struct missing_light *m, size_t i, float median
 static double segment_misfit(const struct missing_light *m, size_t first, size_t end, float strength, int channel) {
     double sum = 0.0;
     find_base(m, first, end, strength, channel);
-    float median = median_of(m, first, end), spread = m->in_patches ? spread_about(median) : m->spread[first];
+    float median = median_of(m, first, end), spread = spread_about(median);
     for (size_t i = first; i < end; i++)
         sum += place_misfit(m, i, median, spread);
     return sum;
@@ -115,15 +104,6 @@ static double misfit(const struct missing_light *m, float strength, int channel)
             any = any || m->places->place[i].lit > 0.0f;
         if (any)
             sum += segment_misfit(m, first, end, strength, channel);
-    }
-    return sum;
-}
-
-double missing_light_misfit(const struct missing_light *m) {
-    double sum = 0.0;
-    for (size_t first = 0, end; first < m->places->count; first = end) {
-        end = light_places_end(m->places, first);
-        sum += segment_misfit(m, first, end, 0.0f, MISSING_MEAN);
     }
     return sum;
 }

@@ -14,20 +14,14 @@
 struct missing_light {
     const struct light_places *places; /* borrowed */
     float max_albedo;                  /* base colours beyond it are odd */
-    bool in_patches;                   /* see missing_light_init */
-    float *spread;                     /* [places->count] of a segment, at its first place; owned */
     float *weight;                     /* [places->count] 1, or how far a place is asked; owned */
     float *base, *sorted;              /* [places->count] scratch; owned */
 };
 
-/* Base colours beyond `white` are odd. Light that falls `in_patches` leaves most of a segment as it is: how dark that
- * is, and thus how much a highlight may add, is judged with the light that is tried. Light that may fall everywhere
- * would make all dark, and explain anything: there it is judged without. */
-void missing_light_init(struct missing_light *m, const struct light_places *places, float white, bool in_patches);
+/* Base colours beyond `white` are odd. The light falls in patches and leaves most of a segment as it is: how dark that
+ * is, and thus how much a highlight may add, is judged with the light that is tried. */
+void missing_light_init(struct missing_light *m, const struct light_places *places, float white);
 void missing_light_release(struct missing_light *m);
-
-/* To be called after the places changed. */
-void missing_light_renew(struct missing_light *m);
 
 /* Strength of the light with which misfit is least, `lit` times strength being added to a place's light; 0: no strength
  * helps. *explained: reduction of misfit over all lit segments, in places. */
@@ -37,8 +31,5 @@ float missing_light_strength(const struct missing_light *m, int channel, double 
  * that it would be: what else is wrong with the light is alike over a whole wall, and a thousand places of it, to which
  * a lamp in a corner brings a hundredth of their light, would agree about it. */
 rgb missing_light_color(struct missing_light *m);
-
-/* Misfit of all places without it, in places. */
-double missing_light_misfit(const struct missing_light *m);
 
 #endif

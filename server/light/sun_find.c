@@ -250,7 +250,7 @@ void sun_find(struct reconstruction *r, const struct views *views) {
     survey_release(&survey);
     survey_lights_off(r);
     light_places_leave_out_lamps(&s.places);
-    missing_light_init(&s.missing, &s.places, PLACE_WHITE, true);
+    missing_light_init(&s.missing, &s.places, PLACE_WHITE);
     if (light_places_above(&s.places, PLACE_BRIGHT) >= LEAST_BRIGHT)
         look_for_sun(&s, &explains);
     r->sun = s.sun;

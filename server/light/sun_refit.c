@@ -13,14 +13,13 @@
 #define CHANGE_MOST 2.0f
 
 static bool tells(const struct divide *d, uint32_t texel) {
-    const struct reconstruction *r = d->r;
-    return r->fused.count[texel] > 0.0f && !r->fused.is_bound[texel] &&
-           !r->is_emitter[reconstruction_segment(r, texel)];
+    return d->fused->count[texel] > 0.0f && !d->fused->is_bound[texel] &&
+           !d->is_emitter[surface_segment(&d->surface, texel)];
 }
 
 /* Evenly spread; returns their number. */
 static size_t choose_texels(const struct divide *d, uint32_t texel[LIGHT_PLACES]) {
-    const struct inverse_uv *inverse = &d->r->inverse;
+    const struct inverse_uv *inverse = d->surface.inverse;
     size_t all = 0, met = 0, count = 0;
     for (size_t i = 0; i < inverse->valid_count; i++)
         all += tells(d, inverse->valid[i]);
@@ -43,22 +42,23 @@ struct placing {
 static void place_texel(void *user, size_t index, int thread) {
     (void)thread;
     const struct placing *job = user;
-    const struct reconstruction *r = job->divide->r;
-    const struct measured *m = &job->divide->measured[job->texel[index]];
+    const struct divide *d = job->divide;
+    const struct surface *s = &d->surface;
+    const struct measured *m = &d->measured[job->texel[index]];
     struct light_place *p = &job->place[index];
     struct irradiance light = {0};
     rgb white;
-    *p = (struct light_place){.segment = reconstruction_segment(r, job->texel[index])};
-    if (!(m->weight > 0.0f) || !divide_lambert(job->divide, job->texel[index], &white) ||
-        !surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, job->texel[index], &p->at))
+    *p = (struct light_place){.segment = surface_segment(s, job->texel[index])};
+    if (!(m->weight > 0.0f) || !divide_lambert(d, job->texel[index], &white) ||
+        !surface_at_texel(s->mesh, s->atlas, s->inverse, job->texel[index], &p->at))
         return;
-    sun_add_light(&r->sun, r->world.accel, &p->at, &light);
+    sun_add_light(d->sun, d->accel, &p->at, &light);
     rgb of_sun = irradiance_diffuse(&light, p->at.shading, 1.0f, p->at.shading);
     p->weight = 1.0f;
     p->shown = rgb_clamp(rgb_mul(measured_value(m), white), 0.0f, INFINITY);
     p->white = rgb_clamp(rgb_sub(white, of_sun), 0.0f, INFINITY);
-    p->open = sun_visibility(&r->sun, r->world.accel, &p->at, 0);
-    p->lit = p->open * vec3_dot(r->sun.direction, p->at.shading);
+    p->open = sun_visibility(d->sun, d->accel, &p->at, 0);
+    p->lit = p->open * vec3_dot(d->sun->direction, p->at.shading);
 }
 
 static void find_places(struct divide *d, struct light_places *places) {
@@ -66,7 +66,7 @@ static void find_places(struct divide *d, struct light_places *places) {
     size_t count = choose_texels(d, texel), known = 0;
     struct light_place *place = mem_array(count + 1, sizeof *place);
     divide_texels(d, texel, count);
-    parallel_for(d->r->pool, count, place_texel, &(struct placing){d, texel, place});
+    parallel_for(d->pool, count, place_texel, &(struct placing){d, texel, place});
     for (size_t i = 0; i < count; i++) {
         if (place[i].weight > 0.0f)
             place[known++] = place[i];
@@ -75,17 +75,17 @@ static void find_places(struct divide *d, struct light_places *places) {
     mem_free(texel);
 }
 
-void sun_refit(struct divide *d) {
+void sun_refit(struct divide *d, struct sun *sun) {
     struct light_places places;
     struct missing_light missing;
-    if (!d->r->sun.is_there)
+    if (!sun->is_there)
         return;
     find_places(d, &places);
-    missing_light_init(&missing, &places, PLACE_WHITE, true);
-    rgb fitted = rgb_scale(missing_light_color(&missing), BSDF_PI), *sun = &d->r->sun.irradiance;
+    missing_light_init(&missing, &places, PLACE_WHITE);
+    rgb fitted = rgb_scale(missing_light_color(&missing), BSDF_PI);
     for (int c = 0; c < 3; c++) {
-        float before = (&sun->r)[c];
-        (&sun->r)[c] = clampf((&fitted.r)[c], before / CHANGE_MOST, before * CHANGE_MOST);
+        float *irradiance = &(&sun->irradiance.r)[c], before = *irradiance;
+        *irradiance = clampf((&fitted.r)[c], before / CHANGE_MOST, before * CHANGE_MOST);
     }
     missing_light_release(&missing);
     light_places_release(&places);

@@ -9,8 +9,8 @@
 
 #include "server/material/divide.h"
 
-/* Gives r->sun, if it is there, the irradiance by which base colours are most alike, highlights taken off, within
- * a factor of what it has. Measures some texels (divide.h). The same for any number of threads. */
-void sun_refit(struct divide *d);
+/* Gives the sun, if it is there, the irradiance by which base colours are most alike, highlights taken off, within a
+ * factor of what it has; d->sun is the same. Measures some texels (divide.h). The same for any number of threads. */
+void sun_refit(struct divide *d, struct sun *sun);
 
 #endif

@@ -20,7 +20,6 @@
 #include "server/material/denoise.h"
 #include "server/scene/materials.h"
 #include "server/scene/surface.h"
-#include "server/state/reconstruction.h" /* for `r` below */
 
 /* Borrowed, all pointers. */
 struct divide {
@@ -35,7 +34,6 @@ struct divide {
     const bool *is_emitter;      /* [segment_count] */
     struct materials *materials; /* base_color is written, roughness and specular are read */
     struct parallel *pool;
-    struct reconstruction *r;  /* for changing_light.h and sun_refit.h; not used here */
     bool denoises;             /* else base colour is as measured */
     size_t highlight_samples;  /* directions of one highlight (divide_highlight_samples) */
     uint32_t stride;           /* one texel of each chart is measured in every stride x stride */

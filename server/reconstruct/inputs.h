@@ -28,8 +28,7 @@ static inline struct divide inputs_of_divide(struct reconstruction *r, const str
                            .accel = r->world.accel,
                            .is_emitter = r->is_emitter,
                            .materials = &r->materials,
-                           .pool = r->pool,
-                           .r = r};
+                           .pool = r->pool};
 }
 
 static inline struct optimiser_input inputs_of_optimiser(struct reconstruction *r, const struct views *views,

@@ -227,7 +227,7 @@ static enum status fit(struct solve *s, int pass, struct error *err) {
                                               &s->isotropic, &s->r->sun},
                      s->r->is_emitter, &s->r->materials, s->r->pool);
         s->divide.stride = 1;
-        sun_refit(&s->divide);
+        sun_refit(&s->divide, &s->r->sun);
         s->mirrored_share = sun_caustics_add(&s->probes, &s->r->sun, &s->r->world, &s->r->scene->mesh, &s->r->inverse,
                                              (uint64_t)settings_number(s->r->settings, "seed"), s->r->pool);
     }

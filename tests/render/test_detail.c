@@ -5,6 +5,7 @@
 #include "server/material/detail.h"
 #include "server/material/divide.h"
 #include "server/scene/surface.h"
+#include "server/state/reconstruction.h"
 #define PAINTED_WIDTH 40 /* pixels larger than texels */
 #define PAINTED_HEIGHT 30
 #define PAINTED_SIDE 8
