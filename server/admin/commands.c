@@ -44,6 +44,28 @@ int command_begin(const char *file, struct invocation *in, int argc, char **argv
     return code;
 }
 
+/* Asks the daemon, and prints its reply as JSON where that is asked for, else by print(action, reply). The end of a
+ * command, whose `code` is not below 0 where it has failed already: frees `request` and *in, returns the exit status. */
+static int ask(int code, struct invocation *in, cJSON *request, void print(const char *action, const cJSON *reply),
+               const char *action) {
+    struct error err;
+    cJSON *reply = NULL;
+    int fd;
+    if (code < 0 && admin_call(in->config.data_dir, request, &reply, &fd, &err) != STATUS_OK) {
+        code = command_failed(&err);
+    } else if (code < 0 && invocation_has(in, "--json")) {
+        char *text = json_text(reply);
+        printf("%s\n", text);
+        mem_free(text);
+    } else if (code < 0) {
+        print(action, reply);
+    }
+    cJSON_Delete(request);
+    cJSON_Delete(reply);
+    invocation_release(in);
+    return code < 0 ? EXIT_SUCCESS : code;
+}
+
 /* --- token --------------------------------------------------------------------------------- */
 
 static void print_tokens(const cJSON *items) {
@@ -76,9 +98,8 @@ static void print_token_reply(const char *action, const cJSON *reply) {
 
 int token_command(int argc, char **argv) {
     struct invocation in;
-    struct error err;
-    cJSON *request = cJSON_CreateObject(), *reply = NULL;
-    int fd, code = command_begin(CONFIG_FILE_DEFAULT, &in, argc, argv, token_flags, 1, 2);
+    cJSON *request = cJSON_CreateObject();
+    int code = command_begin(CONFIG_FILE_DEFAULT, &in, argc, argv, token_flags, 1, 2);
     const char *action = code < 0 ? in.arguments.words[0] : "";
     bool is_add = strcmp(action, "add") == 0, is_revoke = strcmp(action, "revoke") == 0;
     if (code < 0 && !is_add && !is_revoke && strcmp(action, "list") != 0) {
@@ -100,20 +121,8 @@ int token_command(int argc, char **argv) {
         if (is_revoke)
             json_add_string(request, "which", in.arguments.words[1]);
         json_add_string(request, "role", invocation_value(&in, "--role", "user"));
-        if (admin_call(in.config.data_dir, request, &reply, &fd, &err) != STATUS_OK) {
-            code = command_failed(&err);
-        } else if (invocation_has(&in, "--json")) {
-            char *text = json_text(reply);
-            printf("%s\n", text);
-            mem_free(text);
-        } else {
-            print_token_reply(action, reply);
-        }
     }
-    cJSON_Delete(request);
-    cJSON_Delete(reply);
-    invocation_release(&in);
-    return code < 0 ? EXIT_SUCCESS : code;
+    return ask(code, &in, request, print_token_reply, action);
 }
 
 /* --- usage --------------------------------------------------------------------------------- */
@@ -132,10 +141,11 @@ static void print_field(const char *text) {
         putchar('"');
 }
 
-static void print_usage(const cJSON *items) {
+static void print_usage(const char *action, const cJSON *reply) {
     const cJSON *item;
+    (void)action;
     puts("month,user,cpu_hours");
-    cJSON_ArrayForEach(item, items) {
+    cJSON_ArrayForEach(item, cJSON_GetObjectItem(reply, "items")) {
         const char *month = "", *user = "";
         double cpu_sec = 0.0;
         json_string(item, "month", "a row", "", &month, NULL);
@@ -149,25 +159,10 @@ static void print_usage(const cJSON *items) {
 
 int usage_command(int argc, char **argv) {
     struct invocation in;
-    struct error err;
-    cJSON *request = cJSON_CreateObject(), *reply = NULL;
-    int fd, code = command_begin(CONFIG_FILE_DEFAULT, &in, argc, argv, usage_flags, 0, 0);
-    if (code < 0) {
-        json_add_string(request, "command", "usage");
-        if (admin_call(in.config.data_dir, request, &reply, &fd, &err) != STATUS_OK) {
-            code = command_failed(&err);
-        } else if (invocation_has(&in, "--json")) {
-            char *text = json_text(reply);
-            printf("%s\n", text);
-            mem_free(text);
-        } else {
-            print_usage(cJSON_GetObjectItem(reply, "items"));
-        }
-    }
-    cJSON_Delete(request);
-    cJSON_Delete(reply);
-    invocation_release(&in);
-    return code < 0 ? EXIT_SUCCESS : code;
+    cJSON *request = cJSON_CreateObject();
+    int code = command_begin(CONFIG_FILE_DEFAULT, &in, argc, argv, usage_flags, 0, 0);
+    json_add_string(request, "command", "usage");
+    return ask(code, &in, request, print_usage, "");
 }
 
 /* --- check-config -------------------------------------------------------------------------- */

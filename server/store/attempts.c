@@ -38,12 +38,8 @@ enum status store_attempt_list(struct store *store, int64_t job_id, size_t limit
                                    "SELECT number, executor, phase, ending FROM attempts WHERE job_id = ? AND part = 0"
                                    " ORDER BY number DESC LIMIT ?",
                                    "ii", job_id, (int64_t)limit);
-    bool row = status == STATUS_OK;
-    while (row) {
-        status = sql_step(&store->sql, stmt, &row, err);
-        if (row)
-            fill(&rows[(*count)++], stmt);
-    }
+    while (sql_next(&store->sql, stmt, &status, err))
+        fill(&rows[(*count)++], stmt);
     store_unlock(store);
     if (status != STATUS_OK)
         *count = 0;

@@ -11,9 +11,8 @@
 
 static enum status read_scenes(struct contents *c, struct sql *sql, struct error *err) {
     sqlite3_stmt *stmt;
-    bool row = true;
     enum status status = sql_query(sql, &stmt, err, "SELECT id, state FROM scenes ORDER BY id", "");
-    while (status == STATUS_OK && (status = sql_step(sql, stmt, &row, err)) == STATUS_OK && row) {
+    while (sql_next(sql, stmt, &status, err)) {
         c->scenes = mem_realloc_array(c->scenes, c->scene_count + 1, sizeof *c->scenes);
         struct contents_scene *scene = &c->scenes[c->scene_count++];
         snprintf(scene->id, sizeof scene->id, "%s", sql_text(stmt, 0));
@@ -24,9 +23,8 @@ static enum status read_scenes(struct contents *c, struct sql *sql, struct error
 
 static enum status read_jobs(struct contents *c, struct sql *sql, struct error *err) {
     sqlite3_stmt *stmt;
-    bool row = true;
     enum status status = sql_query(sql, &stmt, err, "SELECT id, state, attempt FROM jobs ORDER BY id", "");
-    while (status == STATUS_OK && (status = sql_step(sql, stmt, &row, err)) == STATUS_OK && row) {
+    while (sql_next(sql, stmt, &status, err)) {
         enum job_state state = (enum job_state)sqlite3_column_int(stmt, 1);
         c->jobs = mem_realloc_array(c->jobs, c->job_count + 1, sizeof *c->jobs);
         c->jobs[c->job_count++] = (struct contents_job){.id = sqlite3_column_int64(stmt, 0),
@@ -39,11 +37,10 @@ static enum status read_jobs(struct contents *c, struct sql *sql, struct error *
 
 static enum status read_outputs(struct contents *c, struct sql *sql, struct error *err) {
     sqlite3_stmt *stmt;
-    bool row = true;
     size_t job = 0;
     enum status status = sql_query(
         sql, &stmt, err, "SELECT job_id, name, bytes, sha256, attempt FROM outputs ORDER BY job_id, name", "");
-    while (status == STATUS_OK && (status = sql_step(sql, stmt, &row, err)) == STATUS_OK && row) {
+    while (sql_next(sql, stmt, &status, err)) {
         int64_t id = sqlite3_column_int64(stmt, 0);
         while (job < c->job_count && c->jobs[job].id < id)
             job++;

@@ -137,13 +137,9 @@ enum status store_event_list(struct store *store, int64_t job_id, int64_t after,
                                    "SELECT id, at_ms, attempt, type, data FROM events"
                                    " WHERE job_id = ? AND id > ? ORDER BY id LIMIT ?",
                                    "iii", job_id, after, (int64_t)limit);
-    bool row = status == STATUS_OK;
-    while (row) {
-        status = sql_step(&store->sql, stmt, &row, err);
-        if (row)
-            each(user, sqlite3_column_int64(stmt, 0), sqlite3_column_int64(stmt, 1), sqlite3_column_int(stmt, 2),
-                 sql_text(stmt, 3), sql_text(stmt, 4));
-    }
+    while (sql_next(&store->sql, stmt, &status, err))
+        each(user, sqlite3_column_int64(stmt, 0), sqlite3_column_int64(stmt, 1), sqlite3_column_int(stmt, 2),
+             sql_text(stmt, 3), sql_text(stmt, 4));
     store_unlock(store);
     return status;
 }
@@ -202,11 +198,7 @@ enum status store_event_page(struct store *store, const struct caller *who, int6
     enum status status = job_id > 0 ? page_of_job(store, who, job_id, page, err) : page_of_all(store, page, err);
     if (status == STATUS_OK)
         status = page_query(store, who, job_id, after, limit, &stmt, err);
-    bool row = status == STATUS_OK;
-    while (row) {
-        status = sql_step(&store->sql, stmt, &row, err);
-        if (!row)
-            break;
+    while (sql_next(&store->sql, stmt, &status, err)) {
         struct event_row event = {.id = sqlite3_column_int64(stmt, 0),
                                   .job_id = sqlite3_column_int64(stmt, 5),
                                   .at_ms = sqlite3_column_int64(stmt, 1),

@@ -190,12 +190,8 @@ enum status store_job_list(struct store *store, const struct caller *who, int st
                         "SELECT " COLUMNS " FROM jobs WHERE id < ? AND state = ?"
                         " AND (? OR owner_id = ? OR shared) ORDER BY id DESC LIMIT ?",
                         "innii", before, state_filter, (int)sees_all, sees_all ? 0 : who->user_id, (int64_t)limit);
-    bool row = status == STATUS_OK;
-    while (row) {
-        status = sql_step(&store->sql, stmt, &row, err);
-        if (row)
-            fill(&jobs[(*count)++], stmt);
-    }
+    while (sql_next(&store->sql, stmt, &status, err))
+        fill(&jobs[(*count)++], stmt);
     store_unlock(store);
     while (status != STATUS_OK && *count > 0)
         job_release(&jobs[--*count]);
@@ -297,11 +293,7 @@ enum status store_job_running(struct store *store, size_t limit, int64_t *ids, e
                                    "SELECT id, wanted FROM jobs WHERE state = ?"
                                    " ORDER BY id LIMIT ?",
                                    "ni", (int)JOB_RUNNING, (int64_t)limit);
-    bool row = status == STATUS_OK;
-    while (row) {
-        status = sql_step(&store->sql, stmt, &row, err);
-        if (!row)
-            break;
+    while (sql_next(&store->sql, stmt, &status, err)) {
         ids[*count] = sqlite3_column_int64(stmt, 0);
         wanted[(*count)++] = (enum job_wanted)sqlite3_column_int(stmt, 1);
     }

@@ -118,11 +118,7 @@ enum status store_output_list(struct store *store, int64_t job_id, struct output
     store_lock(store);
     enum status status = sql_query(&store->sql, &stmt, err,
                                    "SELECT " COLUMNS " FROM outputs WHERE job_id = ? ORDER BY name", "i", job_id);
-    bool row = status == STATUS_OK;
-    while (row) {
-        status = sql_step(&store->sql, stmt, &row, err);
-        if (!row)
-            break;
+    while (sql_next(&store->sql, stmt, &status, err)) {
         if (*count == capacity) {
             capacity = capacity ? capacity * 2 : 16;
             *rows = mem_realloc_array(*rows, capacity, sizeof **rows);

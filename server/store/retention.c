@@ -40,11 +40,7 @@ enum status store_expired_list(struct store *store, int64_t now_ms, size_t limit
                   "  ORDER BY created_ms, user_id LIMIT 1), ''), " SCENE_EXPIRES " FROM scenes)"
                   " WHERE expires BETWEEN 1 AND ? ORDER BY kind, expires LIMIT ?",
                   "ii", now_ms, (int64_t)limit);
-    bool row = status == STATUS_OK;
-    while (row) {
-        status = sql_step(&store->sql, stmt, &row, err);
-        if (!row)
-            break;
+    while (sql_next(&store->sql, stmt, &status, err)) {
         struct expired *e = &(*list)[(*count)++];
         e->kind = (enum expired_kind)sqlite3_column_int(stmt, 0);
         snprintf(e->id, sizeof e->id, "%s", sql_text(stmt, 1));

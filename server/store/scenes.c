@@ -218,11 +218,7 @@ enum status store_scene_list(struct store *store, const struct caller *who, cons
                   "SELECT " COLUMNS " FROM " SCENES " WHERE (" CREATED ", scenes.id) < (?3, ?4) AND " IS_READABLE
                   " ORDER BY " CREATED " DESC, scenes.id DESC LIMIT ?5",
                   "niiti", (int)sees_all(who), user_of(who), (int64_t)before_ms, before_id, (int64_t)limit + 1);
-    bool row = status == STATUS_OK;
-    while (row && *count <= limit) {
-        status = sql_step(&store->sql, stmt, &row, err);
-        if (!row)
-            break;
+    while (sql_next(&store->sql, stmt, &status, err)) {
         if (*count == limit) { /* one more than asked for: there is another page */
             if (limit > 0)
                 snprintf(next_cursor, 128, "%lld-%s", (long long)rows[limit - 1].created_ms, rows[limit - 1].id);
@@ -336,11 +332,7 @@ enum status store_scene_unchecked(struct store *store, const struct unchecked *s
                   "  WHERE state = ? AND problems = '[]' AND id NOT IN (SELECT value FROM json_each(?)))"
                   " GROUP BY owner ORDER BY oldest, id LIMIT ?",
                   "nti", (int)SCENE_CHECKING, skipped, (int64_t)limit);
-    bool row = status == STATUS_OK;
-    while (row) {
-        status = sql_step(&store->sql, stmt, &row, err);
-        if (!row)
-            break;
+    while (sql_next(&store->sql, stmt, &status, err)) {
         struct unchecked *u = &list[(*count)++];
         snprintf(u->id, sizeof u->id, "%s", sql_text(stmt, 0));
         u->owner_id = sqlite3_column_int64(stmt, 1);

@@ -135,11 +135,7 @@ enum status store_disk_unknown(struct store *store, size_t skip, size_t limit, s
                                    " UNION ALL SELECT 0, id FROM scenes WHERE disk_bytes < 0 AND state = ?"
                                    " ORDER BY job, scene LIMIT ? OFFSET ?",
                                    "nii", (int)SCENE_READY, (int64_t)limit, (int64_t)skip);
-    bool row = status == STATUS_OK;
-    while (row) {
-        status = sql_step(&store->sql, stmt, &row, err);
-        if (!row)
-            break;
+    while (sql_next(&store->sql, stmt, &status, err)) {
         struct disk_use *use = &list[(*count)++];
         *use = (struct disk_use){.job_id = sqlite3_column_int64(stmt, 0), .bytes = -1};
         snprintf(use->scene_id, sizeof use->scene_id, "%s", sql_text(stmt, 1));

@@ -145,17 +145,20 @@ enum status sql_step(struct sql *sql, sqlite3_stmt *stmt, bool *row, struct erro
     return status;
 }
 
+bool sql_next(struct sql *sql, sqlite3_stmt *stmt, enum status *status, struct error *err) {
+    bool row = false;
+    if (*status == STATUS_OK)
+        *status = sql_step(sql, stmt, &row, err);
+    return row;
+}
+
 enum status sql_run(struct sql *sql, struct error *err, const char *text, const char *types, ...) {
     sqlite3_stmt *stmt;
     va_list args;
     va_start(args, types);
     enum status status = query(sql, &stmt, text, types, args, err);
     va_end(args);
-    bool row = status == STATUS_OK;
-    while (row) {
-        status = sql_step(sql, stmt, &row, err);
-        if (status != STATUS_OK)
-            break;
+    while (sql_next(sql, stmt, &status, err)) {
     }
     return status;
 }

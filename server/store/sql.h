@@ -49,11 +49,14 @@ enum status sql_script(struct sql *sql, const char *text, struct error *err);
 /* Binds values and runs the statement to its end. `types` has one letter a value: i int64_t, n int, d double, t const
  * char * (NULL: null), b const void * and size_t (a blob, borrowed until the return). */
 enum status sql_run(struct sql *sql, struct error *err, const char *text, const char *types, ...);
-/* As sql_run, but stops before the first row: continue with sql_step. */
+/* As sql_run, but stops before the first row: continue with sql_next or sql_step. */
 enum status sql_query(struct sql *sql, sqlite3_stmt **stmt, struct error *err, const char *text, const char *types,
                       ...);
 /* *row: there is another row; after the last one the statement is reset. */
 enum status sql_step(struct sql *sql, sqlite3_stmt *stmt, bool *row, struct error *err);
+/* For loops over all rows: whether there is another one. False as well where *status is not STATUS_OK, before or after
+ * the step. Who leaves the loop early calls sqlite3_reset. */
+bool sql_next(struct sql *sql, sqlite3_stmt *stmt, enum status *status, struct error *err);
 /* As sql_query, and steps to the first row; *row: there is one. The caller then calls sqlite3_reset. */
 enum status sql_first(struct sql *sql, sqlite3_stmt **stmt, bool *row, struct error *err, const char *text,
                       const char *types, ...);

@@ -46,12 +46,8 @@ static enum status check_tables(struct store *store, struct error *err) {
                                    "SELECT name FROM sqlite_schema WHERE type = 'table'"
                                    " AND name NOT IN ('events', 'outputs') LIMIT ?",
                                    "n", TABLES_MAX);
-    bool row = status == STATUS_OK;
-    while (row) {
-        status = sql_step(&store->sql, stmt, &row, err);
-        if (row)
-            names[count++] = sql_dup(stmt, 0);
-    }
+    while (sql_next(&store->sql, stmt, &status, err))
+        names[count++] = sql_dup(stmt, 0);
     for (size_t i = 0; i < count; i++) {
         if (status == STATUS_OK)
             status = sql_check(&store->sql, names[i], err);
@@ -136,10 +132,8 @@ static enum status count_by_state(struct store *store, const char *text, int64_t
                                   struct error *err) {
     sqlite3_stmt *stmt;
     enum status status = sql_query(&store->sql, &stmt, err, text, "");
-    bool row = status == STATUS_OK;
-    while (row) {
-        status = sql_step(&store->sql, stmt, &row, err);
-        if (row && (uint64_t)sqlite3_column_int64(stmt, 0) < limit)
+    while (sql_next(&store->sql, stmt, &status, err)) {
+        if ((uint64_t)sqlite3_column_int64(stmt, 0) < limit)
             counts[sqlite3_column_int64(stmt, 0)] = sqlite3_column_int64(stmt, 1);
     }
     return status;

@@ -120,16 +120,13 @@ enum status store_upload_list(struct store *store, const struct caller *who, con
                                    " ORDER BY created_ms DESC, id DESC LIMIT ?6",
                                    "ittnii", (int64_t)before_ms, before_id, sha256, (int)sees_all,
                                    sees_all ? 0 : who->user_id, (int64_t)limit + 1);
-    bool row = status == STATUS_OK;
-    while (row) {
-        status = sql_step(&store->sql, stmt, &row, err);
-        if (row && *count == limit) { /* one row more than asked for: there is another page */
+    while (sql_next(&store->sql, stmt, &status, err)) {
+        if (*count == limit) { /* one row more than asked for: there is another page */
             snprintf(next_cursor, 128, "%lld-%s", (long long)rows[limit - 1].created_ms, rows[limit - 1].id);
             sqlite3_reset(stmt);
             break;
         }
-        if (row)
-            fill(&rows[(*count)++], stmt);
+        fill(&rows[(*count)++], stmt);
     }
     store_unlock(store);
     while (status != STATUS_OK && *count > 0)

@@ -103,11 +103,7 @@ enum status store_usage_list(struct store *store, struct usage_row **rows, size_
                                    "SELECT ifnull(users.name, ''), month, cpu_sec FROM usage_months"
                                    " LEFT JOIN users ON users.id = owner_id ORDER BY month, 1, owner_id",
                                    "");
-    bool row = status == STATUS_OK;
-    while (row) {
-        status = sql_step(&store->sql, stmt, &row, err);
-        if (!row)
-            break;
+    while (sql_next(&store->sql, stmt, &status, err)) {
         *rows = mem_realloc_array(*rows, *count + 1, sizeof **rows);
         struct usage_row *added = &(*rows)[(*count)++];
         *added = (struct usage_row){.user = sql_dup(stmt, 0), .cpu_sec = sqlite3_column_double(stmt, 2)};

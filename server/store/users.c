@@ -228,11 +228,7 @@ enum status store_token_list(struct store *store, struct token_row **rows, size_
                                    "SELECT tokens.id, tokens.created_ms, role, name FROM tokens"
                                    " JOIN users ON users.id = user_id ORDER BY tokens.id",
                                    "");
-    bool row = status == STATUS_OK;
-    while (row) {
-        status = sql_step(&store->sql, stmt, &row, err);
-        if (!row)
-            break;
+    while (sql_next(&store->sql, stmt, &status, err)) {
         *rows = mem_realloc_array(*rows, *count + 1, sizeof **rows);
         struct token_row *at = &(*rows)[(*count)++];
         *at = (struct token_row){.id = sqlite3_column_int64(stmt, 0),

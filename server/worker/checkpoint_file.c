@@ -74,11 +74,7 @@ enum status checkpoint_file_damaged(struct checkpoint_file *f, const char *what,
 static enum status read_arrays(struct checkpoint_file *f, struct error *err) {
     sqlite3_stmt *stmt;
     enum status status = sql_query(&f->sql, &stmt, err, "SELECT number, name, bytes FROM arrays ORDER BY number", "");
-    bool row = status == STATUS_OK;
-    while (row) {
-        status = sql_step(&f->sql, stmt, &row, err);
-        if (!row)
-            break;
+    while (sql_next(&f->sql, stmt, &status, err)) {
         int64_t bytes = sqlite3_column_int64(stmt, 2);
         if (sqlite3_column_int64(stmt, 0) != (int64_t)f->array_count || bytes < 0 ||
             (uint64_t)bytes > (uint64_t)1 << 44) {
@@ -101,11 +97,7 @@ static enum status read_arrays(struct checkpoint_file *f, struct error *err) {
 static enum status read_tiles(struct checkpoint_file *f, struct error *err) {
     sqlite3_stmt *stmt;
     enum status status = sql_query(&f->sql, &stmt, err, "SELECT id, array, number, hash, data FROM tiles", "");
-    bool row = status == STATUS_OK;
-    while (row) {
-        status = sql_step(&f->sql, stmt, &row, err);
-        if (!row)
-            break;
+    while (sql_next(&f->sql, stmt, &status, err)) {
         uint64_t a = (uint64_t)sqlite3_column_int64(stmt, 1);
         uint64_t t = (uint64_t)sqlite3_column_int64(stmt, 2);
         struct checkpoint_tile found = {.row = sqlite3_column_int64(stmt, 0),
