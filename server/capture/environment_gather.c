@@ -22,8 +22,6 @@
 /* Weight of a look-up within a pixel of the opening's rim, where slightly wrong poses mix light and frame: one off the
  * rim outweighs ten on it. */
 #define RIM_WEIGHT 0.1f /* +25 %: no change */
-/* Standard deviations of normal values in their median absolute deviation. */
-#define DEVIATIONS_PER_MAD 1.4826f
 /* Outliers: standard deviations from the median. Normal errors are beyond in one of 370. */
 #define OUTLIER_DEVIATIONS 3.0f /* +25 %: no change */
 /* Least standard deviation, as a share of the median: when two photographs agree by chance, a third that differs by
@@ -127,7 +125,8 @@ static float combine(struct censored *value, size_t count, bool *is_bound) {
         removed += far->is_bound ? 0.0f : far->weight;
         deviation = fabsf(far->value - median);
     }
-    float limit = OUTLIER_DEVIATIONS * fmaxf(DEVIATIONS_PER_MAD * deviation, MIN_DEVIATION * fabsf(median));
+    float limit =
+        OUTLIER_DEVIATIONS * fmaxf((float)QUANTILE_DEVIATIONS_PER_MAD * deviation, MIN_DEVIATION * fabsf(median));
     for (size_t i = 0; i < count; i++) {
         if (value[i].is_bound || fabsf(value[i].value - median) > limit)
             continue;

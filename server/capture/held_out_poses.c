@@ -6,8 +6,6 @@
 #include "common/mem.h"
 #include "common/quantile.h"
 
-/* Standard deviations of normal residuals in their median absolute deviation, about; +25 %: no change. */
-#define DEVIATIONS_PER_MAD 1.5
 /* An occluder is nearer than the point by this share of its distance: 2 cm at 2 m. Poses are not known well yet. */
 #define OCCLUSION_MARGIN 0.01f /* +25 %: no change */
 
@@ -97,7 +95,7 @@ static double offset_of(const struct track_sample *sample, size_t count, double 
 static double scale_of(const struct track_sample *sample, size_t count, double offset, double *scratch) {
     for (size_t k = 0; k < count; k++)
         scratch[k] = fabs(sample[k].residual - offset);
-    return fmax(POSE_MIN_SCALE, DEVIATIONS_PER_MAD * quantile_double(scratch, count, 0.5));
+    return fmax(POSE_MIN_SCALE, QUANTILE_DEVIATIONS_PER_MAD * quantile_double(scratch, count, 0.5));
 }
 
 /* One step of the robust least squares, from which the offset is eliminated. */

@@ -30,10 +30,8 @@
 
 /* Rounds of reweighting, and the first of them, whose weights are those of a convex cost: it has one minimum, and the
  * others start near it. */
-#define ROUNDS 12       /* +25 %: no change */
-#define CONVEX_ROUNDS 4 /* +25 %: no change */
-/* Standard deviations of normal residuals in their median absolute deviation; +25 %: no change. */
-#define DEVIATIONS_PER_MAD 1.48
+#define ROUNDS 12         /* +25 %: no change */
+#define CONVEX_ROUNDS 4   /* +25 %: no change */
 #define CG_STEPS 60       /* of conjugate gradients a round, at most */
 #define CG_TOLERANCE 1e-7 /* of the residual's norm, over that of the right-hand side */
 
@@ -219,7 +217,7 @@ static void reweight(struct light_fit *f, const double *x, bool is_convex) {
                 known[used++] = square[first + i];
         }
     }
-    f->scale = fmax(1.0, DEVIATIONS_PER_MAD * sqrt(quantile_double(known, used, 0.5)));
+    f->scale = fmax(1.0, QUANTILE_DEVIATIONS_PER_MAD * sqrt(quantile_double(known, used, 0.5)));
     for (size_t i = 0; i < observations; i++) {
         double e = square[i] / (f->scale * f->scale);
         double robust = is_convex ? 1.0 / sqrt(1.0 + e) : 1.0 / (1.0 + LIGHT_CAUCHY * e);

@@ -30,10 +30,9 @@
 #define MIN_SHARE 0.01f /* +25 %: no change */
 /* Blocks: least number of differences, for an error of a seventh of their median; bounds of the factor, since a block
  * has no more than 768 differences and its texture is not always smooth: what is beyond is taken for an error. */
-#define MIN_DIFFERENCES 64        /* +25 %: 0 dB */
-#define MEDIAN_DEVIATIONS 0.6745f /* median of |x| for standard normal x; +25 %: +0.04 dB */
-#define SCALE_MIN 0.5f            /* +25 %: +0.05 dB */
-#define SCALE_MAX 4.0f            /* +25 %: no change */
+#define MIN_DIFFERENCES 64 /* +25 %: 0 dB */
+#define SCALE_MIN 0.5f     /* +25 %: +0.05 dB */
+#define SCALE_MAX 4.0f     /* +25 %: no change */
 
 /* Differences of one octave: an even sample of those offered (reservoir sampling, Vitter 1985). */
 struct octave {
@@ -160,7 +159,7 @@ static float block_variance(const struct noise *noise, const struct photograph *
     }
     if (count < MIN_DIFFERENCES)
         return 0.0f;
-    float median = quantile(ratio, count, 0.5) / MEDIAN_DEVIATIONS;
+    float median = (float)QUANTILE_DEVIATIONS_PER_MAD * quantile(ratio, count, 0.5);
     return median * median / DIFFERENCE_VARIANCE;
 }
 

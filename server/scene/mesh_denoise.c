@@ -18,7 +18,6 @@
 #define SHAPE_SIGMA 0.4f         /* of noise: a mean displacement of a neighbourhood below this may be chance */
 #define EXCESS_FACTOR 2.5f       /* times the noise variance: a mean square displacement below this may be chance */
 #define SAME_SURFACE_COSINE 0.8f /* between normals of neighbours on one surface */
-#define MAD_PER_SIGMA 0.6745f    /* of a normal distribution: median absolute deviation over standard deviation */
 
 struct denoising {
     const struct face_normals *faces;
@@ -95,7 +94,7 @@ static float displacement_sigma(const struct denoising *d) {
         if (d->faces->first[v + 1] > d->faces->first[v])
             modulus[count++] = fabsf(d->displacement[v]);
     }
-    float noise = quantile(modulus, count, 0.5) / MAD_PER_SIGMA;
+    float noise = (float)QUANTILE_DEVIATIONS_PER_MAD * quantile(modulus, count, 0.5);
     mem_free(modulus);
     return noise;
 }
