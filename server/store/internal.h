@@ -37,6 +37,15 @@ struct store {
     } * unpaid; /* [unpaid_count], one a user and month; owned */
     size_t unpaid_count;
     atomic_bool has_users;
+    struct remote_table { /* remote.h */
+        atomic_ullong changes;
+        struct remote_writer {
+            int64_t job_id;
+            int number;
+            size_t count; /* writing at this moment; more than 0 */
+        } * writer;       /* [writer_count], one an attempt; owned */
+        size_t writer_count;
+    } remote;
 };
 
 #define STORE_NOTHING_CHANGED (-1)
@@ -112,5 +121,13 @@ enum status store_scene_is_overtaken(struct store *store, const char *id, const 
                                      struct error *err);
 /* Inside a transaction: STATUS_CONFLICT unless the job runs its attempt `attempt`. */
 enum status store_fence(struct store *store, int64_t job_id, int attempt, struct error *err);
+
+/* remote.c, for remote_node.c; inside a transaction, or under the mutex. */
+struct remote_row; /* remote.h */
+enum status remote_row_read(struct store *store, int64_t job_id, int number, struct remote_row *row, struct error *err);
+/* The job waits no more: it shows no reason. */
+enum status remote_tell_begun(struct store *store, int64_t job_id, struct error *err);
+/* remote_node.c, for remote.c. */
+size_t remote_writer_count(const struct store *store, int64_t job_id, int number);
 
 #endif

@@ -233,6 +233,48 @@ static const char step_18[] = "CREATE TABLE usage_months ("
                               "  PRIMARY KEY (owner_id, month)"
                               ") STRICT, WITHOUT ROWID;";
 
-const char *const schema_steps[] = {step_1,  step_2,  step_3,  step_4,  step_5,  step_6,  step_7,  step_8,  step_9,
-                                    step_10, step_11, step_12, step_13, step_14, step_15, step_16, step_17, step_18};
+/* Attempts that run elsewhere (remote.h), what their nodes have reported and nobody has read yet, and where a job is to
+ * run ("": wherever there is a place). */
+static const char step_19[] = "CREATE TABLE remote ("
+                              "  job_id INTEGER NOT NULL REFERENCES jobs (id) ON DELETE CASCADE,"
+                              "  part INTEGER NOT NULL DEFAULT 0,"
+                              "  number INTEGER NOT NULL,"
+                              "  executor TEXT NOT NULL,"
+                              "  name TEXT NOT NULL UNIQUE," /* the site's name of it */
+                              "  phase INTEGER NOT NULL CHECK (phase BETWEEN 0 AND 3),"
+                              "  external_id TEXT NOT NULL DEFAULT '',"
+                              "  external_reason TEXT NOT NULL DEFAULT '',"
+                              "  token_sha256 TEXT NOT NULL,"
+                              "  claimant TEXT NOT NULL DEFAULT ''," /* the one that claimed it */
+                              "  host TEXT NOT NULL DEFAULT '',"
+                              "  lease_sec INTEGER NOT NULL,"
+                              "  begun_ms INTEGER NOT NULL,"             /* Unix time; 0: not yet, likewise below */
+                              "  claimed_ms INTEGER NOT NULL DEFAULT 0," /* from here on it runs, before it waits */
+                              "  heard_ms INTEGER NOT NULL DEFAULT 0,"
+                              "  heard_count INTEGER NOT NULL DEFAULT 0,"
+                              "  refused_count INTEGER NOT NULL DEFAULT 0," /* claims by others */
+                              "  last_seq INTEGER NOT NULL DEFAULT 0,"
+                              "  wanted INTEGER NOT NULL DEFAULT 0,"
+                              "  told_seq INTEGER NOT NULL DEFAULT 0," /* whose reply carried `wanted` first; 0: none */
+                              "  cpu_sec REAL NOT NULL DEFAULT 0,"
+                              "  end_way TEXT NOT NULL DEFAULT '',"
+                              "  end_code INTEGER NOT NULL DEFAULT 0,"
+                              "  end_reason TEXT NOT NULL DEFAULT '',"
+                              "  end_words TEXT NOT NULL DEFAULT '',"
+                              "  PRIMARY KEY (job_id, part, number)"
+                              ") STRICT, WITHOUT ROWID;"
+                              "CREATE INDEX remote_by_phase ON remote (executor, phase) WHERE phase < 3;"
+                              "CREATE TABLE attempt_lines ("
+                              "  job_id INTEGER NOT NULL REFERENCES jobs (id) ON DELETE CASCADE,"
+                              "  part INTEGER NOT NULL DEFAULT 0,"
+                              "  number INTEGER NOT NULL,"
+                              "  seq INTEGER NOT NULL,"
+                              "  lines TEXT NOT NULL," /* of one report, each with its newline */
+                              "  PRIMARY KEY (job_id, part, number, seq)"
+                              ") STRICT;"
+                              "ALTER TABLE jobs ADD COLUMN executor TEXT NOT NULL DEFAULT '';";
+
+const char *const schema_steps[] = {step_1,  step_2,  step_3,  step_4,  step_5,  step_6,  step_7,
+                                    step_8,  step_9,  step_10, step_11, step_12, step_13, step_14,
+                                    step_15, step_16, step_17, step_18, step_19};
 const int schema_version = (int)(sizeof schema_steps / sizeof schema_steps[0]);

@@ -92,6 +92,7 @@ void store_close(struct store *store) {
     reserve_close(store);
     pthread_mutex_destroy(&store->mutex);
     mem_free(store->unpaid);
+    mem_free(store->remote.writer);
     mem_free(store);
 }
 

@@ -67,8 +67,14 @@ enum status transition_tell(struct store *store, const struct present *now, cons
     return status;
 }
 
-/* The attempt ends with its job's run. */
+/* The attempt ends with its job's run, and what its node may still say of it is not wanted. */
 static enum status end_attempt(struct store *store, const struct present *now, struct error *err) {
+    enum status status =
+        sql_run(&store->sql, err, "UPDATE remote SET phase = 3 WHERE job_id = ? AND phase < 3", "i", now->id);
+    if (status == STATUS_OK)
+        status = sql_run(&store->sql, err, "DELETE FROM attempt_lines WHERE job_id = ?", "i", now->id);
+    if (status != STATUS_OK)
+        return status;
     return sql_run(
         &store->sql, err,
         "UPDATE attempts SET phase = ?, ending = ? WHERE job_id = ? AND part = 0 AND number = ? AND phase = ?", "ntinn",

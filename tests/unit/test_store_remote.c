@@ -1,0 +1,228 @@
+/* test_store_remote.c -- attempts on other machines, as the store sees them: the fence, what is repeated, who comes second,
+ * and that there is one end. */
+#include <string.h>
+
+#include "server/store/remote.h"
+#include "tests/unit/store_rig.h"
+
+#define TOKEN_A "1111111111111111111111111111111111111111111111111111111111111111"
+#define TOKEN_B "2222222222222222222222222222222222222222222222222222222222222222"
+
+static struct remote_row row;
+static struct remote_reply reply;
+
+/* A job whose attempt has begun to be submitted. */
+static struct remote_key begin_attempt(struct store *store) {
+    struct remote_key key = {.token_sha256 = TOKEN_A, .claimant = "aa"};
+    key.job_id = add_job(store, SCENE_A, 0);
+    OK(store_job_start(store, key.job_id, "slurm", &key.number, &err));
+    struct remote_row new = {.job_id = key.job_id, .number = key.number, .executor = "slurm", .lease_sec = 60};
+    snprintf(new.name, sizeof new.name, "unbake-%d-%d-abc", (int)key.job_id, key.number);
+    OK(store_remote_begin(store, &new, TOKEN_A, &err));
+    return key;
+}
+
+static int count_lines(struct store *store, const struct remote_key *key, const char *wanted) {
+    int64_t seq;
+    char *lines;
+    int count = 0;
+    while (store_remote_next(store, key->job_id, key->number, &seq, &lines, &err) == STATUS_OK) {
+        for (const char *c = lines; *c; c++)
+            count += *c == '\n';
+        if (wanted)
+            CHECK_THAT(strstr(wanted, lines) != NULL, "%s", lines);
+        mem_free(lines);
+        OK(store_remote_read(store, key->job_id, key->number, seq, &err));
+    }
+    return count;
+}
+
+static void check_life(struct store *store) {
+    struct remote_key key = begin_attempt(store);
+    OK(store_remote_submitted(store, key.job_id, key.number, "4711", &err));
+    OK(store_remote_explain(store, key.job_id, key.number, "Priority", &err));
+    struct job job;
+    OK(store_job_get(store, key.job_id, &job, &err));
+    CHECK(strcmp(job.reason, "waiting in slurm: Priority") == 0);
+    int64_t revision = job.revision;
+    job_release(&job);
+    OK(store_remote_explain(store, key.job_id, key.number, "Priority", &err));
+    OK(store_job_get(store, key.job_id, &job, &err));
+    CHECK(job.revision == revision);
+    job_release(&job);
+
+    uint64_t changes = store_remote_changes(store);
+    OK(store_remote_claim(store, &key, "node7", &row, &err));
+    CHECK(row.phase == REMOTE_CLAIMED && strcmp(row.host, "node7") == 0 && strcmp(row.external_id, "4711") == 0);
+    CHECK(row.claimed_ms >= row.begun_ms && row.begun_ms > 0 && store_remote_changes(store) > changes);
+    OK(store_job_get(store, key.job_id, &job, &err));
+    CHECK(job.state == JOB_RUNNING && !job.reason[0]);
+    job_release(&job);
+    OK(store_remote_submitted(store, key.job_id, key.number, "4711", &err)); /* its reply came late */
+    OK(store_remote_get(store, key.job_id, key.number, &row, &err));
+    CHECK(row.phase == REMOTE_CLAIMED);
+
+    OK(store_remote_report(store, &key, 1, "one\ntwo\n", 1.5, &reply, &err));
+    CHECK(reply.last_seq == 1 && reply.wanted == REMOTE_GO_ON && reply.lease_sec == 60);
+    OK(store_remote_report(store, &key, 2, "", 2.5, &reply, &err));
+    OK(store_remote_report(store, &key, 3, "three\n", 2.0, &reply, &err));
+    CHECK(count_lines(store, &key, "one\ntwo\nthree\n") == 3);
+    OK(store_remote_get(store, key.job_id, key.number, &row, &err));
+    CHECK(row.last_seq == 3 && row.cpu_sec == 2.5 && row.heard_count == 4);
+    struct remote_end end = {.way = "exit", .code = 0, .words = "bye"};
+    OK(store_remote_end(store, &key, 4, &end, 3.0, &err));
+    OK(store_remote_get(store, key.job_id, key.number, &row, &err));
+    CHECK(row.phase == REMOTE_ENDED && strcmp(row.end.way, "exit") == 0 && strcmp(row.end.words, "bye") == 0);
+    OK(store_job_succeed(store, key.job_id, key.number, &err));
+}
+
+/* The reply was lost, and the node says it again: the same reply, and nothing twice. */
+static void check_repeated(struct store *store) {
+    struct remote_key key = begin_attempt(store);
+    OK(store_remote_claim(store, &key, "node7", &row, &err));
+    OK(store_remote_claim(store, &key, "node7", &row, &err));
+    CHECK(row.refused_count == 0);
+    for (int i = 0; i < 3; i++) {
+        OK(store_remote_report(store, &key, 1, "one\n", 1.0, &reply, &err));
+        CHECK(reply.last_seq == 1);
+    }
+    OK(store_remote_report(store, &key, 2, "two\n", 1.0, &reply, &err));
+    OK(store_remote_report(store, &key, 1, "one\n", 1.0, &reply, &err));
+    CHECK(reply.last_seq == 2);
+    IS(store_remote_report(store, &key, 4, "four\n", 1.0, &reply, &err), STATUS_INPUT);
+    IS(store_remote_report(store, &key, 0, "none\n", 1.0, &reply, &err), STATUS_INPUT);
+    IS(store_remote_report(store, &key, 3, "broken", 1.0, &reply, &err), STATUS_INPUT);
+    CHECK(count_lines(store, &key, NULL) == 2);
+    struct remote_end end = {.way = "signal", .code = 11}, other = {.way = "exit"}, odd = {.way = "whim"};
+    IS(store_remote_end(store, &key, 2, &end, 1.0, &err), STATUS_INPUT);
+    IS(store_remote_end(store, &key, 3, &odd, 1.0, &err), STATUS_INPUT);
+    OK(store_remote_end(store, &key, 3, &end, 1.0, &err));
+    OK(store_remote_end(store, &key, 3, &end, 1.0, &err));
+    OK(store_remote_end(store, &key, 3, &other, 1.0, &err)); /* accepted as the same, without effect */
+    OK(store_remote_get(store, key.job_id, key.number, &row, &err));
+    CHECK(strcmp(row.end.way, "signal") == 0 && row.end.code == 11);
+    IS(store_remote_end(store, &key, 4, &other, 1.0, &err), STATUS_CONFLICT);
+    IS(store_remote_report(store, &key, 4, "late\n", 1.0, &reply, &err), STATUS_CONFLICT);
+    CHECK(count_lines(store, &key, NULL) == 0);
+    OK(store_job_crash(store, key.job_id, key.number, "x", "", 0, &err));
+}
+
+static void check_fence(struct store *store) {
+    struct remote_key key = begin_attempt(store), wrong = key, second = key;
+    wrong.token_sha256 = TOKEN_B;
+    second.claimant = "bb";
+    IS(store_remote_claim(store, &wrong, "x", &row, &err), STATUS_NOT_FOUND);
+    IS(store_remote_report(store, &key, 1, "early\n", 0.0, &reply, &err), STATUS_CONFLICT);
+    IS(store_remote_may_read(store, &key, &err), STATUS_CONFLICT);
+    OK(store_remote_claim(store, &key, "node7", &row, &err));
+    IS(store_remote_claim(store, &second, "node8", &row, &err), STATUS_CONFLICT);
+    IS(store_remote_report(store, &second, 1, "two\n", 0.0, &reply, &err), STATUS_CONFLICT);
+    IS(store_remote_report(store, &wrong, 1, "two\n", 0.0, &reply, &err), STATUS_NOT_FOUND);
+    IS(store_remote_refuse(store, &second, "another version", &err), STATUS_CONFLICT);
+    OK(store_remote_get(store, key.job_id, key.number, &row, &err));
+    CHECK(row.refused_count == 2 && strcmp(row.host, "node7") == 0 && row.phase == REMOTE_CLAIMED);
+    OK(store_remote_may_read(store, &key, &err));
+
+    /* A writer that is at it when the attempt is given up is waited for; nobody begins to write after. */
+    size_t writers;
+    OK(store_remote_enter(store, &key, &err));
+    OK(store_remote_enter(store, &key, &err));
+    OK(store_remote_close(store, key.job_id, key.number, &writers, &err));
+    CHECK(writers == 2);
+    IS(store_remote_enter(store, &key, &err), STATUS_CONFLICT);
+    store_remote_leave(store, &key);
+    store_remote_leave(store, &key);
+    OK(store_remote_close(store, key.job_id, key.number, &writers, &err));
+    CHECK(writers == 0);
+    IS(store_remote_report(store, &key, 1, "late\n", 0.0, &reply, &err), STATUS_CONFLICT);
+    OK(store_job_lose(store, key.job_id, key.number, "silent", &err));
+
+    /* The job goes on as another attempt: the former one's node has no say in it. */
+    int number;
+    OK(store_job_start(store, key.job_id, "slurm", &number, &err));
+    struct remote_row new = {.job_id = key.job_id, .number = number, .executor = "slurm", .name = "n2", .lease_sec = 9};
+    OK(store_remote_begin(store, &new, TOKEN_B, &err));
+    IS(store_remote_report(store, &key, 1, "late\n", 0.0, &reply, &err), STATUS_CONFLICT);
+    struct remote_end end = {.way = "exit"};
+    IS(store_remote_end(store, &key, 1, &end, 0.0, &err), STATUS_CONFLICT);
+    struct remote_key mixed = key;
+    mixed.number = number; /* with the token of the first */
+    IS(store_remote_claim(store, &mixed, "node7", &row, &err), STATUS_NOT_FOUND);
+    /* However the attempt ends, its row ends with it. */
+    OK(store_job_block(store, key.job_id, number, "full", "", &err));
+    OK(store_remote_get(store, key.job_id, number, &row, &err));
+    CHECK(row.phase == REMOTE_ENDED);
+    new.number = number + 1;
+    IS(store_remote_begin(store, &new, TOKEN_A, &err), STATUS_CONFLICT); /* it does not run */
+}
+
+static void check_wishes(struct store *store) {
+    struct remote_key key = begin_attempt(store);
+    OK(store_remote_claim(store, &key, "node7", &row, &err));
+    OK(store_remote_wish(store, key.job_id, key.number, REMOTE_PREVIEW, &err));
+    OK(store_remote_report(store, &key, 1, "", 0.0, &reply, &err));
+    CHECK(reply.wanted == REMOTE_PREVIEW);
+    OK(store_remote_report(store, &key, 1, "", 0.0, &reply, &err)); /* that reply was lost */
+    CHECK(reply.wanted == REMOTE_PREVIEW);
+    OK(store_remote_report(store, &key, 2, "", 0.0, &reply, &err));
+    CHECK(reply.wanted == REMOTE_GO_ON);
+    OK(store_remote_wish(store, key.job_id, key.number, REMOTE_STOP, &err));
+    OK(store_remote_wish(store, key.job_id, key.number, REMOTE_PREVIEW, &err));
+    for (int64_t seq = 3; seq < 5; seq++) {
+        OK(store_remote_report(store, &key, seq, "", 0.0, &reply, &err));
+        CHECK(reply.wanted == REMOTE_STOP);
+    }
+    OK(store_remote_wish(store, key.job_id, key.number, REMOTE_CANCEL, &err));
+    OK(store_remote_report(store, &key, 5, "", 0.0, &reply, &err));
+    CHECK(reply.wanted == REMOTE_CANCEL && strcmp(remote_wish_name(reply.wanted), "cancel") == 0);
+    OK(store_job_stop(store, key.job_id, key.number, "", &err));
+}
+
+static void check_refused(struct store *store) {
+    struct remote_key key = begin_attempt(store);
+    OK(store_remote_refuse(store, &key, "the node has version 1", &err));
+    OK(store_remote_get(store, key.job_id, key.number, &row, &err));
+    CHECK(row.phase == REMOTE_ENDED && strcmp(row.end.way, "refused") == 0 && row.end.reason[0]);
+    IS(store_remote_claim(store, &key, "node7", &row, &err), STATUS_CONFLICT);
+    OK(store_job_block(store, key.job_id, key.number, "refused", "", &err));
+}
+
+static void check_limit_and_list(struct store *store) {
+    struct remote_key key = begin_attempt(store);
+    struct remote_row *rows;
+    size_t count;
+    OK(store_remote_list(store, "slurm", &rows, &count, &err));
+    CHECK(count == 1 && rows[0].job_id == key.job_id && rows[0].phase == REMOTE_SUBMITTING);
+    mem_free(rows);
+    OK(store_remote_list(store, "pbs", &rows, &count, &err));
+    CHECK(count == 0 && !rows);
+    OK(store_remote_claim(store, &key, "node7", &row, &err));
+    int64_t seq = 1;
+    while (store_remote_report(store, &key, seq, "line\n", 0.0, &reply, &err) == STATUS_OK)
+        seq++;
+    CHECK(err.status == STATUS_LIMIT && seq == REMOTE_REPORTS_MAX + 1);
+    OK(store_remote_report(store, &key, seq, "", 0.0, &reply, &err)); /* without lines it lives on */
+    CHECK(count_lines(store, &key, NULL) == REMOTE_REPORTS_MAX);
+    OK(store_job_cancel(store, key.job_id, &err));
+    OK(store_job_stop(store, key.job_id, key.number, "", &err));
+    OK(store_remote_list(store, NULL, &rows, &count, &err));
+    CHECK(count == 0);
+    OK(store_job_delete(store, key.job_id, &err));
+    IS(store_remote_report(store, &key, seq + 1, "late\n", 0.0, &reply, &err), STATUS_NOT_FOUND);
+}
+
+int main(void) {
+    struct store *store;
+    char *dir = fresh_dir();
+    OK(store_open(&store, dir, &err));
+    add_ready_scene(store, SCENE_A);
+    check_life(store);
+    check_repeated(store);
+    check_fence(store);
+    check_wishes(store);
+    check_refused(store);
+    check_limit_and_list(store);
+    store_close(store);
+    drop_dir(dir);
+    return check_result();
+}
