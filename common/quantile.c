@@ -3,6 +3,8 @@
 
 #include <stdlib.h>
 
+#define STEPS_MAX 100 /* of a selection: on average each leaves half, and 2^64 values are more than there can be */
+
 static int ascending(const void *a, const void *b) {
     float x = *(const float *)a, y = *(const float *)b;
     return (x > y) - (x < y);
@@ -18,11 +20,55 @@ static size_t index_of(size_t count, double share) {
     return at < count ? at : count - 1;
 }
 
-float quantile(float *value, size_t count, double share) {
-    if (count == 0)
-        return 0.0f;
+static void swap(float *a, float *b) {
+    float kept = *a;
+    *a = *b;
+    *b = kept;
+}
+
+static float median_of_three(float a, float b, float c) {
+    return a < b ? (b < c ? b : a < c ? c : a) : (a < c ? a : b < c ? c : b);
+}
+
+/* Moves values below the pivot to the front and those above it to the back; those equal to it end up in
+ * value[*from, *to). */
+static void partition(float *value, size_t count, float pivot, size_t *from, size_t *to) {
+    size_t below = 0, above = count;
+    for (size_t i = 0; i < above;) {
+        if (value[i] < pivot)
+            swap(&value[i++], &value[below++]);
+        else if (value[i] > pivot)
+            swap(&value[i], &value[--above]);
+        else
+            i++;
+    }
+    *from = below;
+    *to = above;
+}
+
+/* The value that would be at index `at` in ascending order (Hoare 1961, Algorithm 65: Find). Samples on which the
+ * halving fails, which only somebody who wants it can make, are sorted. */
+static float select_value(float *value, size_t count, size_t at) {
+    for (int step = 0; step < STEPS_MAX; step++) {
+        size_t from, to;
+        float pivot = median_of_three(value[0], value[count / 2], value[count - 1]);
+        partition(value, count, pivot, &from, &to);
+        if (at >= from && at < to)
+            return pivot;
+        if (at < from) {
+            count = from;
+        } else {
+            value += to;
+            at -= to;
+            count -= to;
+        }
+    }
     qsort(value, count, sizeof *value, ascending);
-    return value[index_of(count, share)];
+    return value[at];
+}
+
+float quantile(float *value, size_t count, double share) {
+    return count == 0 ? 0.0f : select_value(value, count, index_of(count, share));
 }
 
 double quantile_double(double *value, size_t count, double share) {

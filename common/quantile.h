@@ -9,8 +9,8 @@
  * distribution, .67449. (capture/noise.c: a quarter less, +.04 dB on the demo room.) */
 #define QUANTILE_DEVIATIONS_PER_MAD 1.4826
 
-/* value[share x count] in ascending order, share in [0, 1]: 0.5 is the (upper) median. 0 for an empty sample. Sorts
- * the values; none may be NaN. */
+/* value[share x count] in ascending order, share in [0, 1]: 0.5 is the (upper) median. 0 for an empty sample.
+ * Reorders the values; none may be NaN. In time proportional to their number; doubles are sorted. */
 float quantile(float *value, size_t count, double share);
 double quantile_double(double *value, size_t count, double share);
 

@@ -2,6 +2,7 @@
 #include "server/capture/noise.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "common/image.h"
 #include "common/mem.h"
@@ -9,10 +10,15 @@
 #include "common/rng.h"
 
 #define MIN_EXPONENT (-24) /* first octave: from 2^-24, the smallest half */
-/* Differences kept for each octave, and least number: with fewer it takes the share of the octave below. The standard
- * error of a lower quartile of n half-normal values is 1.8 / sqrt(n) of it: 2 % and 8 %. */
-#define SAMPLES 8192    /* +25 %: 0 dB */
+/* Least number of differences of an octave: with fewer it takes the share of the octave below. The standard error of a
+ * lower quartile of n half-normal values is 1.8 / sqrt(n) of it: 8 %. */
 #define MIN_SAMPLES 512 /* +25 %: no change */
+/* Differences are counted in buckets: 64 to an octave, from 2^-14, a tenth of a half's rounding, to above 3, the
+ * largest that there is. */
+#define BUCKET_BITS 6
+#define BUCKET_OCTAVES 16
+#define BUCKETS (BUCKET_OCTAVES << BUCKET_BITS)
+#define BUCKET_LOWEST (-14)
 /* Quantile of the differences that is read. Lower ones see less texture, but need more samples, and of 8-bit pictures
  * they are 0 where neighbours are equal. */
 #define QUANTILE 0.25               /* +25 %: +0.05 dB */
@@ -34,10 +40,9 @@
 #define SCALE_MIN 0.5f     /* +25 %: +0.05 dB */
 #define SCALE_MAX 4.0f     /* +25 %: no change */
 
-/* Differences of one octave: an even sample of those offered (reservoir sampling, Vitter 1985). */
-struct octave {
-    uint64_t offered;
-    float sample[SAMPLES];
+/* How often differences occur, for each octave of the value: integers, so sums of them do not depend on their order. */
+struct counts {
+    uint64_t count[NOISE_OCTAVES][BUCKETS];
 };
 
 static int octave_of(float value) {
@@ -50,12 +55,30 @@ static int octave_of(float value) {
 
 static float middle_of(int octave) { return ldexpf(0.75f, octave + MIN_EXPONENT); }
 
-static void offer(struct octave *octave, float difference) {
-    uint64_t at = octave->offered++;
-    if (at >= SAMPLES)
-        at = rng_mix64(at) % (at + 1);
-    if (at < SAMPLES)
-        octave->sample[at] = difference;
+/* The first holds all that is smaller. */
+static size_t bucket_of(float difference) {
+    uint32_t bits, lowest = (uint32_t)(127 + BUCKET_LOWEST) << BUCKET_BITS;
+    memcpy(&bits, &difference, sizeof bits);
+    bits >>= 23 - BUCKET_BITS;
+    return bits < lowest ? 0 : bits - lowest < BUCKETS ? bits - lowest : BUCKETS - 1;
+}
+
+/* Smallest difference of a bucket; that of the first counts as 0. */
+static float bucket_start(size_t bucket) {
+    uint32_t octave = (uint32_t)bucket >> BUCKET_BITS, part = (uint32_t)bucket & ((1u << BUCKET_BITS) - 1u);
+    return bucket == 0 ? 0.0f : ldexpf(1.0f + ldexpf((float)part, -BUCKET_BITS), (int)octave + BUCKET_LOWEST);
+}
+
+/* Quantile of the counted differences, interpolated within its bucket; 0 in the first. */
+static float counted_quantile(const uint64_t count[BUCKETS], uint64_t total, double share) {
+    double at = share * (double)total, below = 0.0;
+    size_t bucket = 0;
+    while (bucket + 1 < BUCKETS && below + (double)count[bucket] <= at)
+        below += (double)count[bucket++];
+    if (bucket == 0)
+        return 0.0f;
+    float start = bucket_start(bucket), end = bucket_start(bucket + 1);
+    return start + (float)((at - below) / (double)count[bucket]) * (end - start);
 }
 
 /* Deviation of rounding to 8-bit sRGB, as a share of the linear value: equal neighbouring pixels do not mean that there
@@ -65,46 +88,36 @@ static float rounding_share(float value) {
     return slope / (255.0f * sqrtf(12.0f) * value);
 }
 
-/* Differences of pixel (x, y) from the mean of those `lag` to its left and right, as shares of the mean of the three,
- * for each usable channel; returns how many. None where a pixel mixes surfaces, is masked or clipped. */
-static int differences(const struct photograph *photo, const uint8_t *edge, uint32_t x, uint32_t y, uint32_t lag,
-                       float mean[3], float difference[3]) {
-    size_t at = (size_t)y * photo->camera.width + x;
-    if (x < lag || x + lag >= photo->camera.width)
-        return 0;
-    const size_t pixel[3] = {at - lag, at, at + lag};
-    for (int k = 0; k < 3; k++) {
-        if (edge[pixel[k]] == VIEWS_EDGE || (photo->mask && !photo->mask[pixel[k]]))
-            return 0;
+/* A row's values; NAN where a pixel mixes surfaces, is masked or clipped. */
+static void read_row(const struct photograph *photo, const uint8_t *edge, uint32_t y, float (*row)[3]) {
+    size_t width = photo->camera.width, first = y * width;
+    photograph_use(photo, first, width);
+    spill_use(photo->spill, edge + first, width);
+    for (size_t x = 0; x < width; x++) {
+        size_t at = first + x;
+        bool is_usable = edge[at] != VIEWS_EDGE && (!photo->mask || photo->mask[at]);
+        for (int c = 0; c < 3; c++) {
+            float value = is_usable ? image_float_from_half(photo->pixel[at][c]) : NAN;
+            row[x][c] = value < photo->clip ? value : NAN;
+        }
     }
+}
+
+/* Differences of pixel x of a row from the mean of those `lag` to its left and right, as shares of the mean of the
+ * three, for each usable channel; returns how many. */
+static int differences(float (*row)[3], uint32_t width, uint32_t x, uint32_t lag, float mean[3], float difference[3]) {
     int count = 0;
+    if (x < lag || x + lag >= width)
+        return 0;
     for (int c = 0; c < 3; c++) {
-        float value[3];
-        for (int k = 0; k < 3; k++)
-            value[k] = image_float_from_half(photo->pixel[pixel[k]][c]);
-        float m = (value[0] + value[1] + value[2]) / 3.0f;
-        if (!(m > 0.0f) || !isfinite(m) || fmaxf(value[0], fmaxf(value[1], value[2])) >= photo->clip)
+        float left = row[x - lag][c], middle = row[x][c], right = row[x + lag][c];
+        float m = (left + middle + right) / 3.0f;
+        if (!(m > 0.0f) || !isfinite(m))
             continue;
         mean[count] = m;
-        difference[count++] = fabsf(value[1] - 0.5f * (value[0] + value[2])) / m;
+        difference[count++] = fabsf(middle - 0.5f * (left + right)) / m;
     }
     return count;
-}
-
-static void use_row(const struct photograph *photo, const uint8_t *edge, uint32_t y) {
-    size_t width = photo->camera.width;
-    photograph_use(photo, y * width, width);
-    spill_use(photo->spill, edge + y * width, width);
-}
-
-static void add_row(struct octave *octaves, const struct photograph *photo, const uint8_t *edge, uint32_t y) {
-    use_row(photo, edge, y);
-    for (uint32_t x = 0; x < photo->camera.width; x++) {
-        float mean[3], difference[3];
-        int count = differences(photo, edge, x, y, 1, mean, difference);
-        for (int i = 0; i < count; i++)
-            offer(&octaves[octave_of(mean[i])], difference[i]);
-    }
 }
 
 /* Deviation of the darkest 8-bit values that are not lost in noise. */
@@ -115,21 +128,59 @@ static float darkest_deviation(const struct noise *noise) {
     return 0.0f;
 }
 
-static void measure_shares(struct noise *noise, const struct views *v) {
-    struct octave *octaves = mem_calloc(NOISE_OCTAVES, sizeof *octaves);
-    bool rounded = false;
-    for (size_t t = 0; t < v->train_count; t++) {
-        const struct photograph *photo = &v->scene->photograph[v->train[t]];
-        for (uint32_t y = 0; y < photo->camera.height; y++)
-            add_row(octaves, photo, v->edge[t], y);
-        rounded |= !photo->is_hdr;
+struct noise_job {
+    struct noise *noise;
+    const struct views *views;
+    struct counts *counts; /* [thread] */
+};
+
+static void count_photograph(void *user, size_t train, int thread) {
+    const struct noise_job *job = user;
+    const struct photograph *photo = &job->views->scene->photograph[job->views->train[train]];
+    struct counts *counts = &job->counts[thread];
+    uint32_t width = photo->camera.width;
+    float(*row)[3] = mem_array(width, sizeof *row);
+    for (uint32_t y = 0; y < photo->camera.height; y++) {
+        read_row(photo, job->views->edge[train], y, row);
+        for (uint32_t x = 0; x < width; x++) {
+            float mean[3], difference[3];
+            int count = differences(row, width, x, 1, mean, difference);
+            for (int i = 0; i < count; i++)
+                counts->count[octave_of(mean[i])][bucket_of(difference[i])]++;
+        }
     }
+    mem_free(row);
+}
+
+/* Adds up what the threads have counted, in the first one's place; returns the number of an octave's differences. */
+static uint64_t merge_counts(struct counts *counts, int thread_count, int octave) {
+    uint64_t total = 0;
+    for (size_t k = 0; k < BUCKETS; k++) {
+        for (int t = 1; t < thread_count; t++)
+            counts->count[octave][k] += counts[t].count[octave][k];
+        total += counts->count[octave][k];
+    }
+    return total;
+}
+
+static bool any_rounded(const struct views *v) {
+    for (size_t t = 0; t < v->train_count; t++)
+        if (!v->scene->photograph[v->train[t]].is_hdr)
+            return true;
+    return false;
+}
+
+static void measure_shares(struct noise *noise, const struct views *v, struct parallel *pool) {
+    int threads = parallel_thread_count(pool);
+    struct noise_job job = {noise, v, mem_calloc((size_t)threads, sizeof *job.counts)};
+    bool rounded = any_rounded(v);
     float share = MAX_SHARE;
+    parallel_for(pool, v->train_count, count_photograph, &job);
     for (int k = 0; k < NOISE_OCTAVES; k++) {
-        struct octave *o = &octaves[k];
-        size_t count = o->offered < SAMPLES ? (size_t)o->offered : SAMPLES;
-        if (count >= MIN_SAMPLES) {
-            float here = quantile(o->sample, count, QUANTILE) / (QUANTILE_DEVIATIONS * sqrtf(DIFFERENCE_VARIANCE));
+        uint64_t total = merge_counts(job.counts, threads, k);
+        if (total >= MIN_SAMPLES) {
+            float here = counted_quantile(job.counts->count[k], total, QUANTILE) /
+                         (QUANTILE_DEVIATIONS * sqrtf(DIFFERENCE_VARIANCE));
             if (rounded)
                 here = fmaxf(here, rounding_share(middle_of(k)));
             share = fminf(share, here);
@@ -137,22 +188,28 @@ static void measure_shares(struct noise *noise, const struct views *v) {
         noise->share[k] = share;
     }
     noise->black = rounded ? BLACK_DEVIATIONS * darkest_deviation(noise) : 0.0f;
-    mem_free(octaves);
+    mem_free(job.counts);
 }
 
 /* --- from place to place ------------------------------------------------------------------------ */
 
 static uint32_t blocks(uint32_t pixels) { return (pixels + NOISE_BLOCK - 1) / NOISE_BLOCK; }
 
-/* Squared median of the differences at a lag, over that expected from the octaves; 0 where there are too few. */
-static float block_variance(const struct noise *noise, const struct photograph *photo, const uint8_t *edge, uint32_t x0,
-                            uint32_t y0, uint32_t lag) {
+/* Rows of a photograph that blocks are measured in, from their values (read_row). */
+struct band {
+    float (*value)[3]; /* [NOISE_BLOCK][width]; owned */
+    uint32_t width, height;
+};
+
+/* Squared median of the differences at a lag in the band's block from column x0 on, over that expected from the
+ * octaves; 0 where there are too few. */
+static float block_variance(const struct noise *noise, const struct band *band, uint32_t x0, uint32_t lag) {
     float ratio[3 * NOISE_BLOCK * NOISE_BLOCK];
     size_t count = 0;
-    for (uint32_t y = y0; y < y0 + NOISE_BLOCK && y < photo->camera.height; y++) {
-        for (uint32_t x = x0; x < x0 + NOISE_BLOCK && x < photo->camera.width; x++) {
+    for (uint32_t y = 0; y < band->height; y++) {
+        for (uint32_t x = x0; x < x0 + NOISE_BLOCK && x < band->width; x++) {
             float mean[3], difference[3];
-            int n = differences(photo, edge, x, y, lag, mean, difference);
+            int n = differences(band->value + (size_t)y * band->width, band->width, x, lag, mean, difference);
             for (int i = 0; i < n; i++)
                 ratio[count++] = difference[i] / noise->share[octave_of(mean[i])];
         }
@@ -163,30 +220,37 @@ static float block_variance(const struct noise *noise, const struct photograph *
     return median * median / DIFFERENCE_VARIANCE;
 }
 
-static float *measure_blocks(const struct noise *noise, const struct photograph *photo, const uint8_t *edge) {
-    uint32_t columns = blocks(photo->camera.width), rows = blocks(photo->camera.height);
-    float *scale = mem_array((size_t)columns * rows, sizeof *scale);
-    for (uint32_t row = 0; row < rows; row++) {
-        for (uint32_t y = row * NOISE_BLOCK; y < (row + 1) * NOISE_BLOCK && y < photo->camera.height; y++)
-            use_row(photo, edge, y);
-        for (uint32_t column = 0; column < columns; column++) {
-            uint32_t x = column * NOISE_BLOCK, y = row * NOISE_BLOCK;
-            float near = block_variance(noise, photo, edge, x, y, 1);
-            float far = block_variance(noise, photo, edge, x, y, 2);
-            float nugget = far > near ? fmaxf(2.0f * near - far, 0.0f) : near;
-            scale[row * columns + column] =
-                near > 0.0f && far > 0.0f ? clampf(sqrtf(nugget), SCALE_MIN, SCALE_MAX) : 1.0f;
-        }
-    }
-    return scale;
+static float block_scale(const struct noise *noise, const struct band *band, uint32_t x0) {
+    float near = block_variance(noise, band, x0, 1), far = block_variance(noise, band, x0, 2);
+    float nugget = far > near ? fmaxf(2.0f * near - far, 0.0f) : near;
+    return near > 0.0f && far > 0.0f ? clampf(sqrtf(nugget), SCALE_MIN, SCALE_MAX) : 1.0f;
 }
 
-void noise_measure(struct noise *noise, const struct views *v) {
+static void measure_blocks(void *user, size_t train, int thread) {
+    const struct noise_job *job = user;
+    const struct photograph *photo = &job->views->scene->photograph[job->views->train[train]];
+    uint32_t width = photo->camera.width, height = photo->camera.height;
+    uint32_t columns = blocks(width), rows = blocks(height);
+    float *scale = mem_array((size_t)columns * rows, sizeof *scale);
+    struct band band = {mem_array((size_t)NOISE_BLOCK * width, sizeof *band.value), width, 0};
+    (void)thread;
+    for (uint32_t row = 0; row < rows; row++) {
+        uint32_t first = row * NOISE_BLOCK;
+        band.height = height - first < NOISE_BLOCK ? height - first : NOISE_BLOCK;
+        for (uint32_t y = 0; y < band.height; y++)
+            read_row(photo, job->views->edge[train], first + y, band.value + (size_t)y * width);
+        for (uint32_t column = 0; column < columns; column++)
+            scale[row * columns + column] = block_scale(job->noise, &band, column * NOISE_BLOCK);
+    }
+    job->noise->scale[train] = scale;
+    mem_free(band.value);
+}
+
+void noise_measure(struct noise *noise, const struct views *v, struct parallel *pool) {
     *noise = (struct noise){.train_count = v->train_count};
-    measure_shares(noise, v);
+    measure_shares(noise, v, pool);
     noise->scale = mem_array(v->train_count, sizeof *noise->scale);
-    for (size_t t = 0; t < v->train_count; t++)
-        noise->scale[t] = measure_blocks(noise, &v->scene->photograph[v->train[t]], v->edge[t]);
+    parallel_for(pool, v->train_count, measure_blocks, &(struct noise_job){noise, v, NULL});
 }
 
 void noise_set_black(const struct noise *noise, struct scene *scene) {

@@ -12,6 +12,7 @@
 #ifndef UNBAKE_CAPTURE_NOISE_H
 #define UNBAKE_CAPTURE_NOISE_H
 
+#include "common/parallel.h"
 #include "common/vec.h"
 #include "server/capture/views.h"
 
@@ -26,7 +27,7 @@ struct noise {
     float **scale; /* [train_count][rows][columns] factor to the share in each block of a photograph; owned */
 };
 
-void noise_measure(struct noise *noise, const struct views *views);
+void noise_measure(struct noise *noise, const struct views *views, struct parallel *pool);
 /* Sets `black` of the 8-bit training photographs. */
 void noise_set_black(const struct noise *noise, struct scene *scene);
 void noise_release(struct noise *noise);

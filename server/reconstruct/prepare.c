@@ -257,7 +257,7 @@ static enum status make_surface(struct prepare *p, struct error *err) {
 static void measure_photographs(struct prepare *p) {
     struct reconstruction *r = p->r;
     calibrate(r, p->views, p->pace->hooks);
-    noise_measure(&r->noise, p->views);
+    noise_measure(&r->noise, p->views, r->pool);
     noise_set_black(&r->noise, r->scene);
     clip_mark(r->scene, p->views, &r->noise, r->pool);
     fireflies_mark(r->scene, p->views, &r->noise, r->pool);

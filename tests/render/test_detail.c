@@ -95,7 +95,7 @@ static void capture_init(struct capture *s, bool tiles, int threads, float offse
     s->measured = mem_calloc(s->texels, sizeof *s->measured);
     s->white = mem_calloc(s->texels, sizeof *s->white);
     s->r.is_emitter = mem_calloc(s->r.segments.count, sizeof *s->r.is_emitter);
-    noise_measure(&s->r.noise, &s->room.views);
+    noise_measure(&s->r.noise, &s->room.views, s->room.pool);
     for (size_t i = 0; i < s->r.inverse.valid_count; i++) {
         uint32_t texel = s->r.inverse.valid[i];
         struct surface_point at;

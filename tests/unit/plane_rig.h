@@ -93,7 +93,7 @@ static inline struct photograph *plane_rig_add(struct plane_rig *rig, vec3 from,
 static inline void plane_rig_look(struct plane_rig *rig, float noise) {
     struct reconstruction *r = &rig->r;
     views_init(&rig->views, &rig->scene, &r->segments, r->world.accel, rig->pool);
-    noise_measure(&r->noise, &rig->views);
+    noise_measure(&r->noise, &rig->views, rig->pool);
     for (size_t k = 0; k < NOISE_OCTAVES; k++)
         r->noise.share[k] = noise;
     fuse(&r->fused, &rig->views, &r->noise, &r->atlas, &r->inverse, rig->pool);

@@ -1,6 +1,8 @@
 /* noise.h: the noise of made-up photographs is found, and their texture is not taken for it. */
 #include "server/capture/noise.h"
 
+#include <string.h>
+
 #include "common/image.h"
 #include "common/mem.h"
 #include "tests/check.h"
@@ -9,11 +11,13 @@
 #define SIDE 128
 #define PIXELS (SIDE * SIDE)
 #define PHOTOGRAPHS 4
+#define BLOCKS ((SIDE / NOISE_BLOCK) * (SIDE / NOISE_BLOCK))
 
 static struct photograph photograph[PHOTOGRAPHS];
 static struct scene scene = {.photograph = photograph, .photograph_count = PHOTOGRAPHS};
 static uint32_t train[PHOTOGRAPHS] = {0, 1, 2, 3};
 static uint8_t edge_pixels[PIXELS], *edge[PHOTOGRAPHS];
+static struct parallel *pool;
 static struct views views = {.scene = &scene, .train_count = PHOTOGRAPHS, .train = train, .edge = edge};
 
 /* Pictures of value(x, y) with noise of deviation(value, x). */
@@ -55,7 +59,7 @@ static float photons(float value, uint32_t x) {
 static void test_photons(void) {
     struct noise noise;
     take(bright_and_dark, photons);
-    noise_measure(&noise, &views);
+    noise_measure(&noise, &views, pool);
     CHECK(noise.black == 0.0f);
     CHECK_NEAR(share_at(&noise, 64.0f, 100.0f, 1.6f), 0.05 / sqrt(1.6), 0.006);
     CHECK_NEAR(share_at(&noise, 64.0f, 20.0f, 0.1f), 0.05 / sqrt(0.1), 0.025);
@@ -76,7 +80,7 @@ static float twice_as_much_on_the_right(float value, uint32_t x) { return value 
 static void test_places_and_texture(void) {
     struct noise noise;
     take(waves, twice_as_much_on_the_right);
-    noise_measure(&noise, &views);
+    noise_measure(&noise, &views, pool);
     float left = share_at(&noise, 20.0f, 40.0f, 1.0f), right = share_at(&noise, 100.0f, 40.0f, 1.0f);
     CHECK_NEAR(left, 0.05, 0.015);
     CHECK_NEAR(right, 0.1, 0.03);
@@ -111,7 +115,7 @@ static void test_black(void) {
         }
     }
     photograph[2].is_hdr = photograph[3].is_test = true;
-    noise_measure(&noise, &views);
+    noise_measure(&noise, &views, pool);
     noise_set_black(&noise, &scene);
     CHECK(photograph[0].black == noise.black && photograph[1].black == noise.black && photograph[2].black == 0.0f &&
           photograph[3].black == 0.0f);
@@ -152,12 +156,31 @@ static void test_draw(void) {
     CHECK_NEAR(cubic, 0.41, 0.03); /* (2 x 9^2 + 2)^2 / 16^4 */
 }
 
+/* The same bytes on any number of threads; and as sure as so many pixels make it. */
+static void test_threads(void) {
+    struct parallel *three = parallel_new(3);
+    struct noise one, other;
+    take(bright_and_dark, photons);
+    noise_measure(&one, &views, pool);
+    noise_measure(&other, &views, three);
+    CHECK(memcmp(one.share, other.share, sizeof one.share) == 0);
+    for (uint32_t t = 0; t < PHOTOGRAPHS; t++)
+        CHECK(memcmp(one.scale[t], other.scale[t], BLOCKS * sizeof *one.scale[t]) == 0);
+    CHECK_NEAR(one.share[25] / (0.05 / sqrt(1.6)), 1.0, 0.02); /* 1 to 2; .6 % is one standard error */
+    noise_release(&one);
+    noise_release(&other);
+    parallel_free(three);
+}
+
 int main(void) {
+    pool = parallel_new(1);
+    test_threads();
     test_photons();
     test_places_and_texture();
     test_black();
     test_draw();
     for (int t = 0; t < PHOTOGRAPHS; t++)
         mem_free(photograph[t].pixel);
+    parallel_free(pool);
     return check_result();
 }
