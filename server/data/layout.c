@@ -45,14 +45,16 @@ char *layout_attempt(const char *data_dir, int64_t job_id, int number) {
     return in_folder(data_dir, "jobs", mem_printf("%lld/" ATTEMPT "%d", (long long)job_id, number));
 }
 
-int layout_attempt_number(const char *name) {
-    static const char prefix[] = ATTEMPT;
-    const char *digits = name + (sizeof prefix - 1);
-    if (strncmp(name, prefix, sizeof prefix - 1) != 0 || *digits < '1' || *digits > '9' || strlen(digits) > 9 ||
+/* N of "PREFIXN", as this file writes it; 0: it is no such name. */
+static int number_after(const char *prefix, const char *name) {
+    const char *digits = name + strlen(prefix);
+    if (strncmp(name, prefix, strlen(prefix)) != 0 || *digits < '1' || *digits > '9' || strlen(digits) > 9 ||
         strspn(digits, "0123456789") != strlen(digits))
         return 0;
     return (int)strtol(digits, NULL, 10);
 }
+
+int layout_attempt_number(const char *name) { return number_after(ATTEMPT, name); }
 
 char *layout_uploads(const char *data_dir) { return in(data_dir, "uploads"); }
 
@@ -92,6 +94,16 @@ char *layout_checkpoint_folder(const char *work_dir) { return in(work_dir, "chec
 char *layout_checkpoint(const char *work_dir) { return in(work_dir, "checkpoint/" CHECKPOINT); }
 
 char *layout_checkpoint_journal(const char *work_dir) { return in(work_dir, "checkpoint/" CHECKPOINT_JOURNAL); }
+
+#define PART "part-"
+
+char *layout_part(const char *checkpoint_folder, int number) {
+    char *name = mem_printf(PART "%d", number), *path = in(checkpoint_folder, name);
+    mem_free(name);
+    return path;
+}
+
+int layout_part_number(const char *name) { return number_after(PART, name); }
 
 char *layout_former_checkpoint(const char *job_dir) { return in(job_dir, CHECKPOINT); }
 

@@ -9,26 +9,53 @@
 #include "common/mem.h"
 #include "common/protocol.h"
 #include "server/worker/checkpoint_file.h"
+#include "server/worker/checkpoint_parts.h"
 
 struct checkpoint {
     struct checkpoint_file file;
+    char *dir;                      /* the file's */
+    int next_part;                  /* number of the next part */
+    struct checkpoint_parts *parts; /* NULL: none are written */
     char note[512];
 };
 
 enum status checkpoint_open(struct checkpoint **out, const char *path, const char *fingerprint, char note[512],
                             struct error *err) {
     struct checkpoint *checkpoint = mem_calloc(1, sizeof *checkpoint);
+    char remark[512];
     enum status status = checkpoint_file_open(&checkpoint->file, path, fingerprint, note, err);
+    if (status == STATUS_OK) {
+        const char *slash = strrchr(path, '/');
+        checkpoint->dir = slash ? mem_strndup(path, (size_t)(slash - path)) : mem_strdup(".");
+        status = checkpoint_parts_take(&checkpoint->file, checkpoint->dir, &checkpoint->next_part, remark, err);
+        if (status == STATUS_OK && !note[0])
+            memcpy(note, remark, sizeof remark);
+    }
     *out = status == STATUS_OK ? checkpoint : NULL;
     if (status != STATUS_OK)
-        mem_free(checkpoint);
+        checkpoint_close(checkpoint);
     return status;
 }
 
 void checkpoint_close(struct checkpoint *checkpoint) {
-    if (checkpoint)
-        checkpoint_file_close(&checkpoint->file);
+    if (!checkpoint)
+        return;
+    checkpoint_file_close(&checkpoint->file);
+    checkpoint_parts_free(checkpoint->parts);
+    mem_free(checkpoint->dir);
     mem_free(checkpoint);
+}
+
+void checkpoint_send_parts(struct checkpoint *checkpoint) {
+    checkpoint->parts = checkpoint_parts_new(checkpoint->dir, checkpoint->next_part);
+}
+
+enum status checkpoint_write_part(struct checkpoint *checkpoint, const struct state_array *array, size_t count,
+                                  bool must, struct written_part *part, struct error *err) {
+    *part = (struct written_part){0};
+    return checkpoint->parts
+               ? checkpoint_parts_write(checkpoint->parts, &checkpoint->file, array, count, must, part, err)
+               : STATUS_OK;
 }
 
 /* --- saving --------------------------------------------------------------------------------- */

@@ -13,7 +13,8 @@
  *    then starts from the beginning, never from a state that is half wrong.
  * 4. The file has the format of the state in it (STATE_FORMAT), not the program's version. One of an older format is
  *    read, array by array by their names; the next save makes it one of today's.
- * 5. One connection, holding an exclusive lock while it is open: of a stale and a new worker only
+ * 5. Parts (checkpoint_parts.h) that another machine has sent lie beside the file: opening takes them into it.
+ * 6. One connection, holding an exclusive lock while it is open: of a stale and a new worker only
  *    one can ever write.
  *
  * Not thread-safe. */
@@ -28,6 +29,7 @@
 #include "server/state/state_array.h"
 
 struct checkpoint; /* opaque */
+struct written_part;
 
 /* Opens or creates the file. `fingerprint` identifies what the state depends on (scene, settings): a checkpoint with
  * another one is removed. note[0] is 0, or a sentence for the user on why an existing checkpoint is not used.
@@ -35,6 +37,8 @@ struct checkpoint; /* opaque */
 enum status checkpoint_open(struct checkpoint **checkpoint, const char *path, const char *fingerprint, char note[512],
                             struct error *err);
 void checkpoint_close(struct checkpoint *checkpoint);
+/* From now on checkpoint_write_part works. */
+void checkpoint_send_parts(struct checkpoint *checkpoint);
 
 struct checkpoint_cost {
     size_t tile_count, written_tile_count;
@@ -45,6 +49,11 @@ struct checkpoint_cost {
 /* Commits the arrays (names unique) as the newest checkpoint. cost may be NULL. */
 enum status checkpoint_save(struct checkpoint *checkpoint, long iteration, const struct state_array *array,
                             size_t count, struct checkpoint_cost *cost, struct error *err);
+
+/* Writes a part of the arrays, which have just been saved, for another machine; part->number 0: none, as the one before
+ * has not been taken away yet (`must`: in spite of that), or none are wanted. */
+enum status checkpoint_write_part(struct checkpoint *checkpoint, const struct state_array *array, size_t count,
+                                  bool must, struct written_part *part, struct error *err);
 
 /* Fills the arrays. Without a checkpoint *found is false and nothing changes. With one of an older format, arrays
  * that it cannot have keep their content. STATUS_CORRUPT, and nothing changes, when other arrays are missing, sizes

@@ -54,6 +54,8 @@ static enum status read_reconstruct(struct order *o, struct error *err) {
         status = read_whole(o, "attempt", 0.0, INT_MAX, &attempt, err);
     if (status == STATUS_OK)
         status = json_number(o->json, "checkpoint_interval_sec", WHAT, 60.0, &o->checkpoint_interval_sec, err);
+    if (status == STATUS_OK)
+        status = json_bool(o->json, "parts", WHAT, false, &o->parts, err);
     if (status != STATUS_OK)
         return status;
     o->job_id = (int64_t)job_id;

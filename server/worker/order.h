@@ -3,7 +3,7 @@
  *   {"kind":"reconstruct","scene":"DATA/scenes/ID/files","scene_id":"…","reading":{…},"settings":{…},
  *    "name":"my room","job_id":17,"attempt":2,"thread_count":4,"memory_bytes":0,"sandbox":true,
  *    "checkpoint_interval_sec":60,"photograph_memory_bytes":0,"memory_step":0,"keep_free_bytes":671088640,
- *    "disk_bytes":0}
+ *    "disk_bytes":0,"parts":false}
  *   {"kind":"check","scene_id":"…","reading":{…},"thread_count":4,"memory_bytes":0,"photograph_memory_bytes":0,
  *    "keep_free_bytes":671088640,"sandbox":true}
  *   {"kind":"deliver","url":"https://…","secret":"…","body":"…","message_id":"msg_7",
@@ -40,6 +40,7 @@ struct order {
     int64_t job_id;
     int attempt;
     double checkpoint_interval_sec;
+    bool parts; /* checkpoints leave parts for another machine (checkpoint_parts.h) */
     /* kind "deliver" */
     const char *url, *secret, *body, *message_id;
     bool allow_private;

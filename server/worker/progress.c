@@ -106,6 +106,14 @@ void progress_checkpoint(struct progress *p, long iteration, uint64_t bytes, dou
     send_line(p, object);
 }
 
+void progress_part(struct progress *p, int number, int first, uint64_t bytes) {
+    cJSON *object = line("part");
+    json_add_int(object, "number", number);
+    json_add_int(object, "first", first);
+    json_add_int(object, "bytes", (int64_t)bytes);
+    send_line(p, object);
+}
+
 void progress_space(struct progress *p, uint64_t bytes) {
     cJSON *object = line("space");
     json_add_int(object, "bytes", (int64_t)bytes);

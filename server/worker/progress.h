@@ -7,6 +7,7 @@
  *   {"type":"output","name":"base_color.exr","bytes":123,"sha256":"…","content_type":"image/x-exr"}
  *   {"type":"log","level":"info","message":"…"}
  *   {"type":"checkpoint","iteration":120,"bytes":…,"seconds":…}
+ *   {"type":"part","number":7,"first":3,"bytes":…}   of a checkpoint, for another machine: only a node is told
  *   {"type":"space","bytes":…}   what it takes of the disk besides the files in its folder
  *   {"type":"problem","file":"images/003.png","reason":"…","hint":"…"}   (scene checks)
  *   {"type":"scene","facts":{"triangle_count":…,"frame_count":…,…}}  (scene checks, last)
@@ -46,6 +47,7 @@ void progress_file(struct progress *p, const char *type, const char *name, uint6
                    const char *content_type);
 void progress_log(struct progress *p, const char *level, const char *message);
 void progress_checkpoint(struct progress *p, long iteration, uint64_t bytes, double seconds);
+void progress_part(struct progress *p, int number, int first, uint64_t bytes);
 void progress_space(struct progress *p, uint64_t bytes);
 /* hint may be NULL. */
 void progress_problem(struct progress *p, const char *file, const char *reason, const char *hint);

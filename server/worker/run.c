@@ -28,6 +28,7 @@
 #include "server/export/outputs.h"
 #include "server/reconstruct/reconstruct.h"
 #include "server/worker/checkpoint.h"
+#include "server/worker/checkpoint_parts.h"
 #include "server/worker/load.h"
 #include "server/worker/pixel_memory.h"
 #include "server/worker/read_back.h"
@@ -189,9 +190,16 @@ static enum status save_checkpoint(void *user, long iteration, const struct stat
                                    struct error *err) {
     struct worker_run *run = user;
     struct checkpoint_cost cost;
+    struct written_part part;
+    double start = clock_sec();
     enum status status = checkpoint_save(run->checkpoint, iteration, array, count, &cost, err);
+    if (status == STATUS_OK)
+        status = checkpoint_write_part(run->checkpoint, array, count, run->stop, &part, err);
     if (status != STATUS_OK)
         return status;
+    if (part.number > 0)
+        progress_part(run->progress, part.number, part.first, part.bytes);
+    cost.seconds = clock_sec() - start;
     double interval = run->order->checkpoint_interval_sec;
     double wait = fmin(fmax(cost.seconds / CHECKPOINT_SHARE, interval), interval * CHECKPOINT_STRETCH);
     run->next_checkpoint = clock_sec() + wait;
@@ -296,6 +304,8 @@ static enum status open_checkpoint(struct worker_run *run, struct error *err) {
         status = checkpoint_open(&run->checkpoint, path, fingerprint, note, err);
     if (status == STATUS_OK && note[0])
         progress_log(run->progress, "warning", note);
+    if (status == STATUS_OK && run->order->parts)
+        checkpoint_send_parts(run->checkpoint);
     mem_free(fingerprint);
     mem_free(path);
     mem_free(folder);
