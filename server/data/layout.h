@@ -49,7 +49,7 @@ char *layout_preview(const char *work_dir, const char *name);
 char *layout_checkpoint_folder(const char *work_dir); /* what lies in it moves together */
 char *layout_checkpoint(const char *work_dir);
 char *layout_checkpoint_journal(const char *work_dir);
-char *layout_part(const char *checkpoint_folder, int number); /* server/worker/checkpoint_part.h */
+char *layout_part(const char *checkpoint_folder, int number); /* DIR/part-N, of a checkpoint that travels */
 int layout_part_number(const char *name);                     /* N of "part-N"; 0: it is no such name */
 /* The names that a checkpoint had in a job's folder before attempts had folders of their own, and that of a
  * checkpoint's folder to which they are being moved. */

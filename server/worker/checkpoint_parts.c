@@ -60,7 +60,7 @@ static bool may_refer(const struct checkpoint_parts *p, const struct checkpoint_
     }
     for (size_t i = 0; i < p->kept_count; i++)
         kept += p->kept[i].bytes;
-    return is_same && kept <= PARTS_STRETCH * state && p->next - p->newest.first < PARTS_MAX;
+    return is_same && kept <= PARTS_STRETCH * state && p->next - p->newest.first < PARTS_KEPT_MAX;
 }
 
 /* The head of the next part; *data_bytes: of the tiles that it holds itself. */

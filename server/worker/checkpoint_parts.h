@@ -4,7 +4,7 @@
  * 1. A part has what has changed since the part before; the first one of a process has all.
  * 2. A part still lies there as long as it has not been carried away. Until then no further one is written, unless it
  *    must be: a slow network makes parts rarer, and there are two at the most.
- * 3. Where the parts that are needed take more than PARTS_STRETCH times the state, or are PARTS_MAX, the next has all of
+ * 3. Where the parts that are needed take more than PARTS_STRETCH times the state, or are PARTS_KEPT_MAX, the next has all of
  *    it again: whoever keeps them needs room for that much and two parts more.
  *
  * Not thread-safe. */
@@ -18,7 +18,7 @@
 #include "server/worker/checkpoint_file.h"
 
 #define PARTS_STRETCH 2
-#define PARTS_MAX 64 /* open files of a reader */
+#define PARTS_KEPT_MAX 64 /* open files of a reader */
 
 struct checkpoint_parts; /* the writer; opaque */
 

@@ -63,8 +63,8 @@ static enum status open_part(const struct taking *t, int number, struct part_hea
 static enum status begin(struct taking *t, int newest, struct error *err) {
     struct open_part part = {.fd = -1};
     enum status status = open_part(t, newest, &t->head, &part, err);
-    if (status == STATUS_OK && newest - t->head.first >= PARTS_MAX)
-        status = error_set(err, STATUS_CORRUPT, "it has more than %d parts", PARTS_MAX);
+    if (status == STATUS_OK && newest - t->head.first >= PARTS_KEPT_MAX)
+        status = error_set(err, STATUS_CORRUPT, "it has more than %d parts", PARTS_KEPT_MAX);
     if (status != STATUS_OK) {
         if (part.fd >= 0)
             close(part.fd);

@@ -105,7 +105,7 @@ static void test_travel(void) {
         OK(checkpoint_save(c, iteration, &array, 1, NULL, &err));
         OK(checkpoint_write_part(c, &array, 1, false, &part, &err));
         CHECK(part.number == iteration);
-        CHECK(part.number - part.first < PARTS_MAX);
+        CHECK(part.number - part.first < PARTS_KEPT_MAX);
         carried += part.bytes;
         carry(&here, &there, &part);
         CHECK(bytes_of_parts(&there) <= (PARTS_STRETCH + 2) * BYTES + 64 * 2000);
