@@ -38,6 +38,9 @@
 
 #define TUS_VERSION "1.0.0" /* of the protocol of /v1/uploads: tus.io */
 
+/* The field in which an `unbaked node` says which of them it is: random hex digits. */
+#define NODE_CLAIMANT_FIELD "Unbake-Claimant"
+
 #define MIME_JSON "application/json"
 #define MIME_PROBLEM "application/problem+json"
 #define MIME_TUS "application/offset+octet-stream" /* the body of a PATCH to /v1/uploads/ID */

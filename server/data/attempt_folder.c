@@ -44,6 +44,23 @@ static enum status look(const char *path, bool *exists, struct error *err) {
                                                           : error_set_errno(err, errno, "cannot look at %s", path);
 }
 
+bool attempt_folder_is_checkpoint_name(const char *name) {
+    return layout_part_number(name) > 0 || layout_is_checkpoint(name);
+}
+
+/* Whether the attempt's folder holds a checkpoint. */
+static enum status look_for_checkpoint(const char *dir, bool *exists, struct error *err) {
+    char *folder = layout_checkpoint_folder(dir), **names = NULL;
+    size_t count = 0;
+    enum status status = file_list(folder, &names, &count, err);
+    *exists = false;
+    for (size_t i = 0; i < count; i++)
+        *exists = *exists || attempt_folder_is_checkpoint_name(names[i]);
+    file_free_names(names, count);
+    mem_free(folder);
+    return status == STATUS_NOT_FOUND ? STATUS_OK : status;
+}
+
 /* Moves a file or folder, durably; one that is absent is no error. */
 static enum status move(const char *from, const char *to, struct error *err) {
     if (rename(from, to) != 0)
@@ -97,11 +114,10 @@ enum status attempt_folder_with_checkpoint(const char *data_dir, int64_t job_id,
     *work_dir = NULL;
     enum status status = list_attempts(data_dir, job_id, &numbers, &count, err);
     for (size_t i = count; i-- > 0 && status == STATUS_OK && !exists;) {
-        char *dir = layout_attempt(data_dir, job_id, numbers[i]), *path = layout_checkpoint(dir);
-        status = look(path, &exists, err);
+        char *dir = layout_attempt(data_dir, job_id, numbers[i]);
+        status = look_for_checkpoint(dir, &exists, err);
         if (exists)
             *work_dir = layout_attempt(NULL, job_id, numbers[i]);
-        mem_free(path);
         mem_free(dir);
     }
     mem_free(numbers);
@@ -124,6 +140,41 @@ enum status attempt_folder_drop_checkpoint(const char *data_dir, int64_t job_id,
         mem_free(dir);
     }
     mem_free(numbers);
+    return status;
+}
+
+enum status attempt_folder_drop_older(const char *data_dir, int64_t job_id, int attempt, int first, struct error *err) {
+    char *dir = layout_attempt(data_dir, job_id, attempt), *folder = layout_checkpoint_folder(dir), **names = NULL;
+    size_t count = 0;
+    enum status status = file_list(folder, &names, &count, err);
+    for (size_t i = count; i-- > 0 && status == STATUS_OK;) { /* backwards: the journal before the database */
+        int number = layout_part_number(names[i]);
+        char *path = file_join(folder, names[i]);
+        if (number > 0 ? number < first : attempt_folder_is_checkpoint_name(names[i]))
+            status = file_remove_tree(path, err);
+        mem_free(path);
+    }
+    file_free_names(names, count);
+    mem_free(folder);
+    mem_free(dir);
+    return status;
+}
+
+enum status attempt_folder_list_checkpoint(const char *data_dir, int64_t job_id, int attempt, char ***names,
+                                           size_t *count, struct error *err) {
+    char *dir = layout_attempt(data_dir, job_id, attempt), *folder = layout_checkpoint_folder(dir);
+    enum status status = file_list(folder, names, count, err);
+    size_t kept = 0;
+    for (size_t i = 0; status == STATUS_OK && i < *count; i++) {
+        if (attempt_folder_is_checkpoint_name((*names)[i]))
+            (*names)[kept++] = (*names)[i];
+        else
+            mem_free((*names)[i]);
+    }
+    if (status == STATUS_OK)
+        *count = kept;
+    mem_free(folder);
+    mem_free(dir);
     return status;
 }
 
@@ -186,14 +237,12 @@ enum status attempt_folder_tidy(const char *data_dir, struct store *store, int64
     for (size_t i = 0; status == STATUS_OK && i < count; i++) {
         struct tidying t = {.rows = rows, .count = row_count, .number = numbers[i]};
         char *dir = layout_attempt(data_dir, job_id, numbers[i]), *out = layout_out(dir);
-        char *checkpoint = layout_checkpoint(dir);
         bool has_checkpoint = false;
         status = tidy_folder(&t, out, "", err);
         if (status == STATUS_OK)
-            status = look(checkpoint, &has_checkpoint, err);
+            status = look_for_checkpoint(dir, &has_checkpoint, err);
         if (status == STATUS_OK && !t.has_files && !has_checkpoint)
             status = file_remove_tree(dir, err);
-        mem_free(checkpoint);
         mem_free(out);
         mem_free(dir);
     }

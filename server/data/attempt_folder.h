@@ -1,6 +1,9 @@
 /* attempt_folder.h -- the folders of a job's attempts, DATA/jobs/ID/attempt-N/: out/ with the files that it writes,
  * checkpoint/ with what a later attempt goes on from.
  *
+ * A checkpoint is checkpoint.db with its journal, or the parts that a node has sent (part-N): each part is written once,
+ * and the newest says from which number on they are needed.
+ *
  * 1. At most one attempt of a job has a checkpoint. The next one takes it over when it begins, by one rename: the
  *    database and its journal are never apart, and whoever had it before has lost it.
  * 2. An output belongs to the attempt that wrote it, and a row of state.db says which. A file that no row names is seen
@@ -9,6 +12,8 @@
 #ifndef UNBAKE_DATA_ATTEMPT_FOLDER_H
 #define UNBAKE_DATA_ATTEMPT_FOLDER_H
 
+#include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include "common/error.h"
@@ -21,6 +26,16 @@ enum status attempt_folder_begin(const char *data_dir, int64_t job_id, int numbe
 enum status attempt_folder_with_checkpoint(const char *data_dir, int64_t job_id, char **work_dir, struct error *err);
 /* Removes the checkpoint; without one it does nothing. */
 enum status attempt_folder_drop_checkpoint(const char *data_dir, int64_t job_id, struct error *err);
+
+/* Of an attempt to which part `number` of a checkpoint has been added: removes what it makes needless, the parts before
+ * `first` and a database, which is older. */
+enum status attempt_folder_drop_older(const char *data_dir, int64_t job_id, int attempt, int first, struct error *err);
+/* The names of the files of the attempt's checkpoint, in the order in which they are to be copied; the caller's
+ * (file_free_names). */
+enum status attempt_folder_list_checkpoint(const char *data_dir, int64_t job_id, int attempt, char ***names,
+                                           size_t *count, struct error *err);
+/* Whether a file of a checkpoint may have that name. */
+bool attempt_folder_is_checkpoint_name(const char *name);
 
 /* Removes what attempts have left that no row names, of a job that no attempt works at. */
 enum status attempt_folder_tidy(const char *data_dir, struct store *store, int64_t job_id, struct error *err);

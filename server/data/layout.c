@@ -80,6 +80,8 @@ char *layout_archive(const char *work_dir) { return in(work_dir, "archive"); }
 
 char *layout_files(const char *work_dir) { return in(work_dir, "files"); }
 
+char *layout_file_list(const char *work_dir) { return in(work_dir, "files.json"); }
+
 char *layout_previews(const char *work_dir) { return in(work_dir, "previews"); }
 
 char *layout_preview(const char *work_dir, const char *name) {
@@ -94,6 +96,10 @@ char *layout_checkpoint_folder(const char *work_dir) { return in(work_dir, "chec
 char *layout_checkpoint(const char *work_dir) { return in(work_dir, "checkpoint/" CHECKPOINT); }
 
 char *layout_checkpoint_journal(const char *work_dir) { return in(work_dir, "checkpoint/" CHECKPOINT_JOURNAL); }
+
+bool layout_is_checkpoint(const char *name) {
+    return strcmp(name, CHECKPOINT) == 0 || strcmp(name, CHECKPOINT_JOURNAL) == 0;
+}
 
 #define PART "part-"
 

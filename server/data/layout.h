@@ -4,10 +4,12 @@
  *   DATA/reserve         room that is given up on a full disk (store/reserve.c)
  *   DATA/lock            locked by the daemon (folder.h)
  *   DATA/admin.sock      on which the daemon answers its administrator (server/admin)
- *   DATA/scenes/ID/      archive: the bundle as it was uploaded; files/: unpacked; previews/NAME: pictures
- *                        that its check drew; job.json, worker.log: of its check
+ *   DATA/scenes/ID/      archive: the bundle as it was uploaded; files/: unpacked; files.json: a list of them, once
+ *                        a node has asked for it; previews/NAME: pictures that its check drew; job.json,
+ *                        worker.log: of its check
  *   DATA/jobs/ID/        worker.log: what the workers of all attempts printed; attempt-N/ (attempt_folder.h):
- *                        job.json: the worker's order; checkpoint/: what a later attempt goes on from; out/NAME: outputs
+ *                        job.json: the worker's order; checkpoint/: what a later attempt goes on from, checkpoint.db
+ *                        or, as a node has sent it, part-N; out/NAME: outputs
  *   DATA/uploads/ID      an upload that is not a scene yet
  *   DATA/trash/          what is being removed (trash.h), and files that no restart needs
  *
@@ -16,6 +18,7 @@
 #ifndef UNBAKE_DATA_LAYOUT_H
 #define UNBAKE_DATA_LAYOUT_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #define LAYOUT_STATE "state.db"
@@ -44,11 +47,13 @@ char *layout_order(const char *work_dir);
 char *layout_log(const char *dir); /* of a job, a scene or a message */
 char *layout_archive(const char *work_dir);
 char *layout_files(const char *work_dir);
+char *layout_file_list(const char *work_dir); /* of what lies in files/ (scene_files.h) */
 char *layout_previews(const char *work_dir);
 char *layout_preview(const char *work_dir, const char *name);
 char *layout_checkpoint_folder(const char *work_dir); /* what lies in it moves together */
 char *layout_checkpoint(const char *work_dir);
 char *layout_checkpoint_journal(const char *work_dir);
+bool layout_is_checkpoint(const char *name); /* of the database or its journal */
 char *layout_part(const char *checkpoint_folder, int number); /* DIR/part-N, of a checkpoint that travels */
 int layout_part_number(const char *name);                     /* N of "part-N"; 0: it is no such name */
 /* The names that a checkpoint had in a job's folder before attempts had folders of their own, and that of a

@@ -8,6 +8,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "common/file.h"
 #include "common/mem.h"
 #include "server/data/layout.h"
 
@@ -60,5 +61,26 @@ enum status work_file_open_preview(const char *data_dir, const char *scene_id, c
     enum status status = open_in(layout_scenes(data_dir), path, fd, err);
     mem_free(path);
     mem_free(folder);
+    return status;
+}
+
+enum status work_file_open_scene(const char *data_dir, const char *scene_id, const char *name, int *fd,
+                                 struct error *err) {
+    char *scene = layout_scene(NULL, scene_id), *folder = layout_files(scene), *path = file_join(folder, name);
+    enum status status = open_in(layout_scenes(data_dir), path, fd, err);
+    mem_free(path);
+    mem_free(folder);
+    mem_free(scene);
+    return status;
+}
+
+enum status work_file_open_checkpoint(const char *data_dir, int64_t job_id, int attempt, const char *name, int *fd,
+                                      struct error *err) {
+    char *dir = layout_attempt(NULL, job_id, attempt), *folder = layout_checkpoint_folder(dir);
+    char *path = file_join(folder, name);
+    enum status status = open_in(layout_jobs(data_dir), path, fd, err);
+    mem_free(path);
+    mem_free(folder);
+    mem_free(dir);
     return status;
 }

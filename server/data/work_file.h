@@ -12,6 +12,12 @@
 enum status work_file_open_output(const char *data_dir, int64_t job_id, int attempt, const char *name, int *fd,
                                   struct error *err);
 enum status work_file_open_log(const char *data_dir, int64_t job_id, int *fd, struct error *err);
+/* A file of a checked scene. */
+enum status work_file_open_scene(const char *data_dir, const char *scene_id, const char *name, int *fd,
+                                 struct error *err);
+/* A file in an attempt's folder checkpoint/. */
+enum status work_file_open_checkpoint(const char *data_dir, int64_t job_id, int attempt, const char *name, int *fd,
+                                      struct error *err);
 enum status work_file_open_preview(const char *data_dir, const char *scene_id, const char *name, int *fd,
                                    struct error *err);
 

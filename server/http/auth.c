@@ -36,21 +36,28 @@ static bool read_cookie(const char *cookies, char token[TOKEN_SIZE]) {
     return false;
 }
 
+bool auth_bearer(const struct request *r, char token[TOKEN_SIZE]) {
+    const char *authorization = request_field(r, "Authorization");
+    if (!authorization || strncasecmp(authorization, "Bearer ", 7) != 0)
+        return false;
+    snprintf(token, TOKEN_SIZE, "%s", authorization + 7 + strspn(authorization + 7, " "));
+    return true;
+}
+
 /* The token that the caller presents; false where there is none, or another scheme. */
 static bool read_token(const struct request *r, char token[TOKEN_SIZE]) {
-    const char *authorization = request_field(r, "Authorization");
-    if (authorization && strncasecmp(authorization, "Bearer ", 7) == 0) {
-        snprintf(token, TOKEN_SIZE, "%s", authorization + 7 + strspn(authorization + 7, " "));
+    if (auth_bearer(r, token))
         return true;
-    }
     const char *cookies = request_field(r, "Cookie");
     return cookies && read_cookie(cookies, token);
 }
 
 /* 401, with a detail that says how to authenticate. */
 static struct response *refuse(const struct request *r, const char *detail) {
-    struct response *reply = problem_full(
-        r, 401, detail, "`unbaked token add NAME` on the server makes a token, `unbake login` keeps it", NULL);
+    const char *hint = r->route->access == ROUTE_NODE
+                           ? "an attempt has a token of its own, which was given to the job script that runs it"
+                           : "`unbaked token add NAME` on the server makes a token, `unbake login` keeps it";
+    struct response *reply = problem_full(r, 401, detail, hint, NULL);
     response_field(reply, "WWW-Authenticate", "Bearer realm=\"unbaked\"");
     return reply;
 }
@@ -86,7 +93,9 @@ struct response *auth_check(struct api *api, struct request *r) {
     struct error err;
     bool has_token = read_token(r, token), is_open = auth_is_open(api);
     r->caller = (struct caller){.role = is_open ? ROLE_ADMIN : ROLE_VIEWER};
-    if (r->route->access == ROUTE_PUBLIC)
+    if (r->route->access == ROUTE_NODE) /* node.h asks for the attempt's own token */
+        r->caller = (struct caller){.role = ROLE_VIEWER};
+    if (r->route->access == ROUTE_PUBLIC || r->route->access == ROUTE_NODE)
         return NULL;
     enum status status = STATUS_OK;
     if (has_token)

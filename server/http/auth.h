@@ -17,6 +17,9 @@ bool auth_is_open(const struct api *api);
  * not use the route at all. */
 struct response *auth_check(struct api *api, struct request *r);
 
+/* The token of Authorization: Bearer; false where there is none. */
+bool auth_bearer(const struct request *r, char token[TOKEN_SIZE]);
+
 /* The reply to an invalid token: 401, or 429 after too many from that address (auth_throttle.h). Logs the address,
  * never the token. */
 struct response *auth_reject(struct api *api, struct request *r);

@@ -62,6 +62,19 @@ struct response *outputs_list(struct api *api, struct request *r);
 struct response *outputs_get(struct api *api, struct request *r);
 struct response *jobs_log(struct api *api, struct request *r);
 
+/* nodes.c */
+struct response *nodes_claim(struct api *api, struct request *r);
+struct response *nodes_report(struct api *api, struct request *r);
+struct response *nodes_end(struct api *api, struct request *r);
+
+/* node_files.c */
+struct response *node_files_scene(struct api *api, struct request *r);
+struct response *node_files_scene_get(struct api *api, struct request *r);
+struct response *node_files_checkpoint(struct api *api, struct request *r);
+struct response *node_files_checkpoint_get(struct api *api, struct request *r);
+struct response *node_files_checkpoint_put(struct api *api, struct request *r);
+struct response *node_files_output_put(struct api *api, struct request *r);
+
 /* events.c */
 struct response *events_get(struct api *api, struct request *r);
 struct response *events_all(struct api *api, struct request *r);

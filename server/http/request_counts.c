@@ -42,7 +42,8 @@ void request_counts_print(struct request_counts *t, const char *name, struct buf
                                           [METHOD_POST] = "POST",
                                           [METHOD_PATCH] = "PATCH",
                                           [METHOD_DELETE] = "DELETE",
-                                          [METHOD_OPTIONS] = "OPTIONS"};
+                                          [METHOD_OPTIONS] = "OPTIONS",
+                                          [METHOD_PUT] = "PUT"};
     size_t count;
     const struct route *table = routes_table(&count);
     for (size_t row = 0; row <= count; row++)

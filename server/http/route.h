@@ -10,11 +10,12 @@ enum route_body {
     ROUTE_BODY_IGNORED, /* read and dropped */
     ROUTE_BODY_JSON,    /* collected in request.body */
     ROUTE_BODY_UPLOAD,  /* written to disk */
+    ROUTE_BODY_FILE,    /* written to disk, for an attempt */
     ROUTE_BODY_PATCH    /* written to a resumable upload; a JSON body changes the upload instead */
 };
 
-/* The lowest role that is allowed. */
-enum route_access { ROUTE_PUBLIC, ROUTE_VIEWER, ROUTE_USER, ROUTE_ADMIN };
+/* The lowest role that is allowed; ROUTE_NODE: none, but the token of the attempt that the path names. */
+enum route_access { ROUTE_PUBLIC, ROUTE_NODE, ROUTE_VIEWER, ROUTE_USER, ROUTE_ADMIN };
 
 struct route {
     enum method method;

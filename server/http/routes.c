@@ -7,6 +7,8 @@
 #include "common/protocol.h"
 #include "server/http/auth.h"
 #include "server/http/handlers.h"
+#include "server/http/node.h"
+#include "server/http/node_body.h"
 #include "server/http/scene_body.h"
 #include "server/http/upload_body.h"
 #include "server/net/field.h"
@@ -56,6 +58,18 @@ static const struct route table[] = {
     {METHOD_GET, "/v1/jobs/{job}/log", ROUTE_VIEWER, jobs_log, 0, PACE_QUICK, "bytes"},
     {METHOD_GET, "/v1/jobs/{job}/outputs", ROUTE_VIEWER, outputs_list, 0, PACE_QUICK, ""},
     {METHOD_GET, "/v1/jobs/{job}/outputs/{name...}", ROUTE_VIEWER, outputs_get, 0, PACE_QUICK, ""},
+    {METHOD_POST, "/v1/attempts/{job}/{number}/claim", ROUTE_NODE, nodes_claim, ROUTE_BODY_JSON, PACE_QUICK, ""},
+    {METHOD_POST, "/v1/attempts/{job}/{number}/report", ROUTE_NODE, nodes_report, ROUTE_BODY_JSON, PACE_QUICK, ""},
+    {METHOD_POST, "/v1/attempts/{job}/{number}/end", ROUTE_NODE, nodes_end, ROUTE_BODY_JSON, PACE_QUICK, ""},
+    {METHOD_GET, "/v1/attempts/{job}/{number}/scene", ROUTE_NODE, node_files_scene, 0, PACE_SLOW, ""},
+    {METHOD_GET, "/v1/attempts/{job}/{number}/scene/{name...}", ROUTE_NODE, node_files_scene_get, 0, PACE_QUICK, ""},
+    {METHOD_GET, "/v1/attempts/{job}/{number}/checkpoint", ROUTE_NODE, node_files_checkpoint, 0, PACE_SLOW, ""},
+    {METHOD_GET, "/v1/attempts/{job}/{number}/checkpoint/{name}", ROUTE_NODE, node_files_checkpoint_get, 0, PACE_QUICK,
+     ""},
+    {METHOD_PUT, "/v1/attempts/{job}/{number}/checkpoint/{name}", ROUTE_NODE, node_files_checkpoint_put,
+     ROUTE_BODY_FILE, PACE_SLOW, "first"},
+    {METHOD_PUT, "/v1/attempts/{job}/{number}/outputs/{name...}", ROUTE_NODE, node_files_output_put, ROUTE_BODY_FILE,
+     PACE_SLOW, ""},
 };
 
 const struct route *routes_table(size_t *count) {
@@ -106,7 +120,7 @@ static void override_method(struct request *r) {
 
 /* 404, or 405 where the path takes another method. */
 static struct response *no_route(const struct request *r) {
-    static const char *const names[] = {"GET, HEAD", "POST", "PATCH", "DELETE", "OPTIONS"};
+    static const char *const names[] = {"GET, HEAD", "POST", "PATCH", "DELETE", "OPTIONS", "PUT"};
     char allow[64] = "";
     for (size_t i = 0; i < sizeof table / sizeof *table; i++) {
         if (!matches(table[i].pattern, &r->target))
@@ -119,7 +133,7 @@ static struct response *no_route(const struct request *r) {
                             NULL);
     char detail[96];
     snprintf(detail, sizeof detail, "this path supports only %s", allow);
-    bool is_other = r->method == METHOD_COUNT && strstr(allow, "POST");
+    bool is_other = (r->method == METHOD_COUNT || r->method == METHOD_PUT) && strstr(allow, "POST");
     struct response *reply =
         problem_full(r, 405, detail, is_other ? "curl -T sends PUT unless -X POST is given" : "", NULL);
     response_field(reply, "Allow", "%s", allow);
@@ -159,6 +173,7 @@ static struct response *check_media_type(const struct request *r) {
     static const char *const accepted[] = {[ROUTE_BODY_IGNORED] = MIME_JSON,
                                            [ROUTE_BODY_JSON] = MIME_JSON,
                                            [ROUTE_BODY_UPLOAD] = "application/octet-stream",
+                                           [ROUTE_BODY_FILE] = "application/octet-stream",
                                            [ROUTE_BODY_PATCH] = MIME_TUS ", " MIME_JSON};
     const char *detail = NULL;
     if (coding && r->has_body)
@@ -193,7 +208,7 @@ struct response *routes_find(struct request *r) {
         return answer(r, no_route(r));
     enum route_body body = body_of(r);
     r->pace = r->route->pace;
-    r->is_body_stored = body == ROUTE_BODY_UPLOAD || body == ROUTE_BODY_PATCH;
+    r->is_body_stored = body == ROUTE_BODY_UPLOAD || body == ROUTE_BODY_FILE || body == ROUTE_BODY_PATCH;
     return NULL;
 }
 
@@ -203,16 +218,21 @@ static struct response *begin(struct api *api, struct request *r) {
         refusal = check_query(r);
     if (!refusal)
         refusal = check_media_type(r);
+    if (!refusal && r->route->access == ROUTE_NODE)
+        refusal = node_check(api, r);
     if (refusal)
         return refusal;
     enum route_body body = body_of(r);
     if (body == ROUTE_BODY_PATCH)
         return upload_body_begin(api, r); /* the upload's length is the limit */
-    uint64_t limit = body == ROUTE_BODY_UPLOAD ? api->config.max_upload_bytes : ROUTES_BODY_MAX;
+    uint64_t limit =
+        body == ROUTE_BODY_UPLOAD || body == ROUTE_BODY_FILE ? api->config.max_upload_bytes : ROUTES_BODY_MAX;
     if (r->content_length > 0 && (uint64_t)r->content_length > limit)
         return too_large(r, limit);
     buf_init(&r->body, ROUTES_BODY_MAX);
-    return body == ROUTE_BODY_UPLOAD ? scene_body_begin(api, r) : NULL;
+    return body == ROUTE_BODY_UPLOAD ? scene_body_begin(api, r)
+           : body == ROUTE_BODY_FILE ? node_body_begin(api, r)
+                                     : NULL;
 }
 
 struct response *routes_begin(struct api *api, struct request *r) {
@@ -226,7 +246,8 @@ static struct response *take(struct api *api, struct request *r, const void *dat
     if (r->upload) {
         if (upload_bytes(r->upload) + length > api->config.max_upload_bytes)
             return too_large(r, api->config.max_upload_bytes);
-        return scene_body_data(api, r, data, length);
+        return r->route->body == ROUTE_BODY_FILE ? node_body_data(api, r, data, length)
+                                                 : scene_body_data(api, r, data, length);
     }
     if (r->patch)
         return upload_body_data(api, r, data, length);

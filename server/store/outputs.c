@@ -36,8 +36,7 @@ void output_row_release(struct output_row *row) {
     *row = (struct output_row){0};
 }
 
-/* Letters, digits, '_', '-', '.', and '/' between parts that do not begin with a dot. */
-static bool name_is_plain(const char *name) {
+bool store_output_is_name(const char *name) {
     size_t length = strlen(name);
     if (length == 0 || length > 200)
         return false;
@@ -64,7 +63,7 @@ static enum status tell_wanted(const struct store *store, enum status status) {
 
 enum status store_output_put(struct store *store, int64_t job_id, int attempt, const char *type, const char *name,
                              uint64_t bytes, const char *sha256, const char *content_type, struct error *err) {
-    if (!name_is_plain(name))
+    if (!store_output_is_name(name))
         return error_set(err, STATUS_INPUT, "\"%.100s\" is no name for an output", name);
     if (strlen(sha256) != 64 || strspn(sha256, "0123456789abcdef") != 64)
         return error_set(err, STATUS_INPUT, "output %s: \"%.70s\" is no SHA-256", name, sha256);

@@ -27,6 +27,8 @@ struct output_row {
     struct file_version version;
 };
 void output_row_release(struct output_row *row);
+/* Letters, digits, '_', '-', '.', and '/' between parts that do not begin with a dot; at most 200 bytes. */
+bool store_output_is_name(const char *name);
 /* Records a complete file of the job's out/ folder and appends its event (`type` is EVENT_OUTPUT or EVENT_PREVIEW).
  * STATUS_INPUT when the name is not a plain relative path. Requests its digest. */
 enum status store_output_put(struct store *store, int64_t job_id, int attempt, const char *type, const char *name,

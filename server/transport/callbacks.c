@@ -33,7 +33,7 @@ static enum MHD_Result take_field(void *user, enum MHD_ValueKind kind, const cha
 }
 
 static void take_method(struct request *r, const char *method) {
-    static const char *const names[METHOD_COUNT] = {"GET", "POST", "PATCH", "DELETE", "OPTIONS"};
+    static const char *const names[METHOD_COUNT] = {"GET", "POST", "PATCH", "DELETE", "OPTIONS", "PUT"};
     r->is_head = strcmp(method, "HEAD") == 0;
     r->method = METHOD_GET;
     while (!r->is_head && r->method < METHOD_COUNT && strcmp(method, names[r->method]) != 0)
@@ -204,7 +204,7 @@ static void log_request(const struct exchange *x, int status, bool is_whole) {
         {"user", *r->caller.name ? r->caller.name : NULL, false},
         {"end", is_whole ? NULL : "cut short", false},
     };
-    log_fields(r->method == METHOD_GET || r->is_throttled ? LOG_DEBUG : LOG_INFO, fields,
+    log_fields(r->method == METHOD_GET || r->is_throttled || r->is_routine ? LOG_DEBUG : LOG_INFO, fields,
                sizeof fields / sizeof *fields, "answered");
 }
 

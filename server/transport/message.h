@@ -19,7 +19,7 @@
 #include "server/net/target.h"
 #include "server/store/users.h"
 
-enum method { METHOD_GET, METHOD_POST, METHOD_PATCH, METHOD_DELETE, METHOD_OPTIONS, METHOD_COUNT };
+enum method { METHOD_GET, METHOD_POST, METHOD_PATCH, METHOD_DELETE, METHOD_OPTIONS, METHOD_PUT, METHOD_COUNT };
 
 /* Which threads work on a request; see listener.h. */
 enum request_pace {
@@ -46,6 +46,7 @@ struct request {
     char id[REQUEST_ID_SIZE];   /* for X-Request-Id and logs */
     struct address address;     /* the client's address (address.h) */
     bool is_throttled;          /* refused after too many invalid tokens */
+    bool is_routine;            /* comes every few seconds: the log tells of it only where it tells of reading */
     const struct route *route;  /* what follows is set by the application's `find`; static storage */
     enum request_pace pace;     /* which threads run begin and finish */
     bool is_body_stored;        /* its body is written to disk as it arrives */

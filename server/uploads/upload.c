@@ -182,12 +182,23 @@ enum status upload_place(const char *data_dir, const char *path, const char *id,
     return status == STATUS_OK ? upload_sync_place(data_dir, id, err) : status;
 }
 
+/* The file is where it belongs: from here on it does not count as an arrival. */
+static void let_go(struct upload *u) {
+    mem_free(u->path);
+    u->path = NULL;
+    unlist(u);
+}
+
+enum status upload_move(struct upload *u, const char *path, struct error *err) {
+    if (rename(u->path, path) != 0)
+        return error_set_errno(err, errno, "cannot move the upload to %s", path);
+    let_go(u);
+    return file_sync_parent(path, err);
+}
+
 enum status upload_publish(struct upload *u, const char *data_dir, const char *id, struct error *err) {
     enum status status = upload_place(data_dir, u->path, id, err);
-    if (status == STATUS_OK) {
-        mem_free(u->path);
-        u->path = NULL;
-        unlist(u); /* from here on it counts as a scene */
-    }
+    if (status == STATUS_OK)
+        let_go(u);
     return status;
 }

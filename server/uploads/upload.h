@@ -42,6 +42,8 @@ enum status upload_sync(struct upload *u, struct error *err);
 enum status upload_publish(struct upload *u, const char *data_dir, const char *id, struct error *err);
 /* The same for the file `path`, which is complete and synced. */
 enum status upload_place(const char *data_dir, const char *path, const char *id, struct error *err);
+/* Moves the synced file durably to `path`, on the file system of the data folder; what was there is replaced. */
+enum status upload_move(struct upload *u, const char *path, struct error *err);
 /* Makes the archive's place durable after an upload_place that failed half-way. */
 enum status upload_sync_place(const char *data_dir, const char *id, struct error *err);
 
