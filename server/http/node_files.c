@@ -92,7 +92,7 @@ static enum status add_file(struct api *api, const struct node_key *key, const c
         return status;
     cJSON *file = cJSON_CreateObject();
     json_add_string(file, "name", name);
-    json_add_int(file, "bytes", version.bytes);
+    json_add_int(file, "bytes", (int64_t)version.bytes);
     json_add_string(file, "sha256", hex);
     cJSON_AddItemToArray(list, file);
     return STATUS_OK;
@@ -107,8 +107,8 @@ struct response *node_files_checkpoint(struct api *api, struct request *r) {
     if (refusal)
         return refusal;
     cJSON *reply = cJSON_CreateObject(), *list = cJSON_AddArrayToObject(reply, "files");
-    enum status status = attempt_folder_list_checkpoint(api->config.data_dir, key.key.job_id, key.key.number, &names,
-                                                        &count, &err);
+    enum status status =
+        attempt_folder_list_checkpoint(api->config.data_dir, key.key.job_id, key.key.number, &names, &count, &err);
     for (size_t i = 0; i < count && status == STATUS_OK; i++)
         status = add_file(api, &key, names[i], list, &err);
     file_free_names(names, count);
@@ -126,10 +126,10 @@ struct response *node_files_checkpoint_get(struct api *api, struct request *r) {
     struct response *refusal = node_key(r, &key);
     if (refusal)
         return refusal;
-    enum status status = attempt_folder_is_checkpoint_name(name)
-                             ? work_file_open_checkpoint(api->config.data_dir, key.key.job_id, key.key.number, name,
-                                                         &fd, &err)
-                             : error_set(&err, STATUS_NOT_FOUND, "a checkpoint has no file %.100s", name);
+    enum status status =
+        attempt_folder_is_checkpoint_name(name)
+            ? work_file_open_checkpoint(api->config.data_dir, key.key.job_id, key.key.number, name, &fd, &err)
+            : error_set(&err, STATUS_NOT_FOUND, "a checkpoint has no file %.100s", name);
     return send_file(r, status, fd, "checkpoint", name, &err);
 }
 
