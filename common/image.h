@@ -121,9 +121,11 @@ enum status image_probe_photograph(const char *path, struct image *image, struct
 /* Whether cameras give their raw files, many of which are TIFF, such a name. image_read refuses them. */
 bool image_is_raw_name(const char *name);
 
-/* Versions of the codecs' libraries, as they say themselves: "1.6.39". */
+/* Versions of the codecs' libraries, as they say themselves: "1.6.39". libjpeg-turbo does not: that of its headers. */
 #define IMAGE_VERSION_SIZE 24
 const char *image_png_version(void);
+const char *image_jpeg_version(void);
+const char *image_zlib_version(void);
 const char *image_heif_version(void);
 void image_exr_version(char text[IMAGE_VERSION_SIZE]);
 void image_tiff_version(char text[IMAGE_VERSION_SIZE]);

@@ -234,3 +234,13 @@ enum status image_read_jpeg(struct image_source *source, bool probe, struct imag
     mem_free(r);
     return status;
 }
+
+#define TEXT_OF(macro) TEXT(macro)
+#define TEXT(words) #words
+const char *image_jpeg_version(void) {
+#ifdef LIBJPEG_TURBO_VERSION
+    return TEXT_OF(LIBJPEG_TURBO_VERSION) " (as built)";
+#else
+    return TEXT_OF(JPEG_LIB_VERSION) " (as built)";
+#endif
+}

@@ -133,3 +133,5 @@ bool png_color_read(struct image_source *source, bool is_grey, int bits, struct 
         mem_free(found[k].data);
     return is_told;
 }
+
+const char *image_zlib_version(void) { return zlibVersion(); }

@@ -44,6 +44,8 @@ void libraries_list(struct library list[LIBRARY_COUNT]) {
         named("cjson", "", cJSON_Version()),
         written("openexr", image_exr_version),
         named("libpng", "", image_png_version()),
+        named("libjpeg", "", image_jpeg_version()),
+        named("zlib", "", image_zlib_version()),
         written("libtiff", image_tiff_version),
         named("libheif", "", image_heif_version()),
         written("libwebp", image_webp_version),

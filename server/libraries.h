@@ -2,7 +2,7 @@
 #ifndef UNBAKE_SERVER_LIBRARIES_H
 #define UNBAKE_SERVER_LIBRARIES_H
 
-#define LIBRARY_COUNT 15
+#define LIBRARY_COUNT 17
 #define LIBRARY_VERSION_SIZE 24
 
 struct library {
@@ -10,7 +10,7 @@ struct library {
     char version[LIBRARY_VERSION_SIZE];
 };
 
-/* All that the Makefile links but libjpeg, which does not say its version, and zlib. */
+/* All that the Makefile links. */
 void libraries_list(struct library list[LIBRARY_COUNT]);
 /* "libmicrohttpd 0.9.75, sqlite ..."; the caller's (mem_free). */
 char *libraries_text(void);

@@ -196,7 +196,9 @@ static struct response *too_large(const struct request *r, uint64_t limit) {
     json_add_int(members, "limit_bytes", (int64_t)limit);
     char detail[128];
     snprintf(detail, sizeof detail, "the body is larger than %llu bytes", (unsigned long long)limit);
-    return problem_full(r, 413, detail, "", members);
+    bool is_option = limit != ROUTES_BODY_MAX;
+    return problem_full(r, 413, detail, is_option ? "an administrator can raise the option max_upload_mib" : "",
+                        members);
 }
 
 struct response *routes_find(struct request *r) {

@@ -108,7 +108,7 @@ static struct response *read_creation(struct api *api, const struct request *r, 
         json_add_int(members, "limit_bytes", (int64_t)api->config.max_upload_bytes);
         char detail[128];
         snprintf(detail, sizeof detail, "the upload is larger than %" PRIu64 " bytes", api->config.max_upload_bytes);
-        return problem_full(r, 413, detail, "", members);
+        return problem_full(r, 413, detail, "an administrator can raise the option max_upload_mib", members);
     }
     row->length = (uint64_t)length;
     return read_metadata(r, row);

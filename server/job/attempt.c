@@ -157,8 +157,11 @@ static enum status enter_false_start(struct store *store, int64_t job_id, int nu
     case STATUS_NO_SPACE:
         return store_job_block(store, job_id, number, why->message, "Free some space, then resume the job.", err);
     case STATUS_LIMIT:
-        return store_job_block(store, job_id, number, why->message,
-                               "Delete jobs or scenes that you do not need, then resume the job.", err);
+        return store_job_block(
+            store, job_id, number, why->message,
+            "Delete jobs or scenes that you do not need, then resume the job; an administrator can raise"
+            " the option user_max_mib.",
+            err);
     default: { /* The machine is at fault: the job loses no attempt, and is not retried at once. */
         enum status status = store_job_stop(store, job_id, number, why->message, err);
         if (status == STATUS_OK && err)

@@ -26,7 +26,8 @@ void segment_light_init(struct segment_light *l, const struct reconstruction *r)
     }
     for (size_t s = 0; s < segments; s++)
         l->first[s + 2] += l->first[s + 1];
-    for (size_t i = 0; i < mesh->triangle_count; i++) /* first[s + 1] is where the next one of s goes, at last its end */
+    for (size_t i = 0; i < mesh->triangle_count;
+         i++) /* first[s + 1] is where the next one of s goes, at last its end */
         l->triangle[l->first[r->segments.of_triangle[i] + 1]++] = (uint32_t)i;
 }
 

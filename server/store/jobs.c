@@ -1,5 +1,6 @@
 /* jobs.c -- the jobs table: adds, reads, edits, chooses; see store.h. Changes of state are in transitions.c. */
 #include <limits.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "common/mem.h"
@@ -98,9 +99,11 @@ static enum status check_kept(struct store *store, const struct job_new *job, st
     if (status != STATUS_OK)
         return status;
     error_set(err, STATUS_NO_SPACE, "you keep %lld jobs, and a user may keep %zu", (long long)kept, job->user_max_jobs);
-    return oldest ? error_hint(err, "delete jobs that you do not need; the oldest that has ended is %lld",
-                               (long long)oldest)
-                  : error_hint(err, "delete jobs that you do not need");
+    char ended[64] = "";
+    if (oldest)
+        snprintf(ended, sizeof ended, "; the oldest that has ended is %lld", (long long)oldest);
+    return error_hint(err, "delete jobs that you do not need%s; an administrator can raise the option user_max_jobs",
+                      ended);
 }
 
 /* Whether one more job may be queued for this scene. */

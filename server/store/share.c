@@ -75,7 +75,8 @@ static enum status compare(uint64_t kept, uint64_t more, uint64_t limit, struct 
     else
         error_set(err, STATUS_LIMIT, "your scenes and jobs take %.1f of the %.1f MiB that a user may keep",
                   (double)kept / MIB, (double)limit / MIB);
-    return error_hint(err, "delete jobs or scenes that you do not need");
+    return error_hint(err,
+                      "delete jobs or scenes that you do not need; an administrator can raise the option user_max_mib");
 }
 
 enum status store_share_check(struct store *store, const struct share *share, uint64_t more, struct error *err) {

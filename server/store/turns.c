@@ -24,15 +24,17 @@ enum status store_queue_check(struct store *store, int64_t owner_id, const struc
     int64_t queued;
     enum status status =
         sql_int(&store->sql, 0, &queued, err, "SELECT count(*) FROM jobs WHERE state = ?", "n", (int)JOB_QUEUED);
-    if (status == STATUS_OK && (uint64_t)queued >= limits->all)
-        return error_set(err, STATUS_LIMIT, "%lld jobs are queued already, the limit is %zu", (long long)queued,
-                         limits->all);
+    if (status == STATUS_OK && (uint64_t)queued >= limits->all) {
+        error_set(err, STATUS_LIMIT, "%lld jobs are queued already, the limit is %zu", (long long)queued, limits->all);
+        return error_hint(err, "try again later; an administrator can raise the option queue_limit");
+    }
     if (status != STATUS_OK || limits->one_user == 0 || owner_id == 0)
         return status;
     status = sql_int(&store->sql, 0, &queued, err, "SELECT count(*) FROM jobs WHERE owner_id = ? AND state = ?", "in",
                      owner_id, (int)JOB_QUEUED);
-    if (status == STATUS_OK && (uint64_t)queued >= limits->one_user)
-        status = error_set(err, STATUS_LIMIT, "%lld of your jobs are queued already, the limit is %zu",
-                           (long long)queued, limits->one_user);
-    return status;
+    if (status != STATUS_OK || (uint64_t)queued < limits->one_user)
+        return status;
+    error_set(err, STATUS_LIMIT, "%lld of your jobs are queued already, the limit is %zu", (long long)queued,
+              limits->one_user);
+    return error_hint(err, "try again later; an administrator can raise the option user_queue_limit");
 }

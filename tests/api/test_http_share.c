@@ -127,11 +127,13 @@ static void test_disk(struct rig *rig, const char *token) {
     buf_release(&reply);
     CHECK(send_as(rig, token, "POST /v1/jobs HTTP/1.1\r\nContent-Type: application/json", 76, &reply) == 507);
     CHECK(strstr(buf_text(&reply), "your scenes and jobs take 5.6 of the 5.0 MiB that a user may keep"));
+    CHECK(strstr(buf_text(&reply), "an administrator can raise the option user_max_mib"));
     buf_release(&reply);
     rig->api->config.user_max_bytes = 0;
     rig->api->config.user_max_jobs = 4; /* jobs 1 to 4 are this user's */
     CHECK(send_as(rig, token, "POST /v1/jobs HTTP/1.1\r\nContent-Type: application/json", 76, &reply) == 507);
     CHECK(strstr(buf_text(&reply), "you keep 4 jobs, and a user may keep 4"));
+    CHECK(strstr(buf_text(&reply), "an administrator can raise the option user_max_jobs"));
     buf_release(&reply);
     CHECK(send_as(rig, token, "GET /v1/session HTTP/1.1", 0, &reply) == 200);
     CHECK(strstr(buf_text(&reply), "\"kept_bytes_max\":null"));

@@ -264,8 +264,9 @@ static void test_full(void) {
     CHECK(!run_job(second, limit));
     OK(store_job_get(store, second, &job, &err));
     CHECK(job.state == JOB_PAUSED && job.attempts_left == 3);
-    CHECK_THAT(strstr(job.reason, "that a user may keep") && strstr(job.hint, "then resume"), "%s; %s", job.reason,
-               job.hint);
+    CHECK_THAT(strstr(job.reason, "that a user may keep") && strstr(job.hint, "then resume") &&
+                   strstr(job.hint, "user_max_mib"),
+               "%s; %s", job.reason, job.hint);
     job_release(&job);
     int64_t others = job_of(BOB);
     CHECK(run_job(others, limit));

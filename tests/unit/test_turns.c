@@ -161,7 +161,7 @@ static void test_kept(void) {
     }
     IS(store_job_add(store, &new, 1000, &id, &replayed, &err), STATUS_NO_SPACE);
     CHECK_STRING(err.message, "you keep 3 jobs, and a user may keep 3");
-    CHECK_STRING(err.hint, "delete jobs that you do not need");
+    CHECK_STRING(err.hint, "delete jobs that you do not need; an administrator can raise the option user_max_jobs");
     for (int i = 0; i < 3; i++)
         OK(store_job_cancel(store, ids[i], &err));
     OK(store_job_patch(store, ids[0], -1,
