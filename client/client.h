@@ -55,7 +55,7 @@ extern const struct command_exit {
     int status;
     const char *meaning;
 } command_exit_statuses[];
-extern const char *const command_job_states[]; /* ends with NULL */
+extern const char *const command_job_states[], *const command_job_kinds[]; /* end with NULL */
 /* Writes the help of the program (command NULL) or of one command. */
 void command_help(const struct command *command, FILE *out);
 

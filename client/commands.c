@@ -152,6 +152,8 @@ const char *const command_job_states[] = {JOB_STATE_QUEUED,
                                           JOB_STATE_CANCELLED,
                                           NULL};
 
+const char *const command_job_kinds[] = {JOB_KIND_RECONSTRUCT, JOB_KIND_RENDER, JOB_KIND_EVALUATE, NULL};
+
 static void print_exit_statuses(FILE *out) {
     fputs("exit status:\n", out);
     for (size_t i = 0; command_exit_statuses[i].meaning; i++)

@@ -12,6 +12,7 @@
 
 const struct client_option list_options[] = {
     {"state", 's', OPTION_TEXT, "STATE", "only jobs that are queued, running, paused, succeeded, ..."},
+    {"kind", 'k', OPTION_TEXT, "KIND", "only jobs of that kind: reconstruct, render or evaluate"},
     {"limit", 'n', OPTION_WHOLE, "N", "at most so many (20); 0: all"},
     {0},
 };
@@ -25,17 +26,20 @@ const struct client_option rm_options[] = {
     {0},
 };
 
-static enum status check_state(const char *state, struct error *err) {
+/* Whether the word (NULL: none was given) is one of those; `all` lists them for people. */
+static enum status check_word(const char *what, const char *word, const char *const *known, const char *all,
+                              struct error *err) {
     struct nearest nearest;
-    nearest_init(&nearest, state);
-    for (const char *const *known = command_job_states; *known; known++) {
-        if (strcmp(*known, state) == 0)
+    if (!word)
+        return STATUS_OK;
+    nearest_init(&nearest, word);
+    for (; *known; known++) {
+        if (strcmp(*known, word) == 0)
             return STATUS_OK;
         nearest_offer(&nearest, *known);
     }
-    error_set(err, STATUS_INPUT, "unknown state \"%.100s\"", state);
-    return nearest.best ? error_hint(err, "did you mean %s?", nearest.best)
-                        : error_hint(err, "queued, running, paused, succeeded, failed or cancelled");
+    error_set(err, STATUS_INPUT, "unknown %s \"%.100s\"", what, word);
+    return nearest.best ? error_hint(err, "did you mean %s?", nearest.best) : error_hint(err, "%s", all);
 }
 
 /* A finished job counts as 100 %: its last report falls short of that. */
@@ -44,12 +48,19 @@ static double percent_done(const cJSON *job) {
     return succeeded ? 100.0 : floor(100.0 * member_number(job, "progress", 0.0));
 }
 
+/* "render 17": what is done, and to which job; nothing of reconstructions, which most are. */
+static void put_kind(struct table *t, size_t column, const cJSON *job) {
+    int64_t source = member_whole(job, "source", 0);
+    if (source)
+        table_set(t, column, COLOUR_NONE, "%s %lld", member_text(job, "kind"), (long long)source);
+}
+
 static void print_jobs(struct client *c, const cJSON *items) {
-    static const char *const headings[] = {">job", "state",    ">done",  "stage", ">left",
-                                           ">age", ">expires", "?owner", "name"};
+    static const char *const headings[] = {">job", "state", ">done",    "stage",  ">left",
+                                           ">age", "?kind", ">expires", "?owner", "name"};
     struct table t;
     const cJSON *job;
-    table_init(&t, 9, headings);
+    table_init(&t, 10, headings);
     cJSON_ArrayForEach(job, items) {
         char age[16], expires[16];
         const char *state = member_text(job, "state");
@@ -67,31 +78,37 @@ static void print_jobs(struct client *c, const cJSON *items) {
         }
         format_duration(age, time_since(member_text(job, "created_at")));
         table_set(&t, 5, COLOUR_NONE, "%s", age);
+        put_kind(&t, 6, job);
         retention_text(expires, job);
-        table_set(&t, 6, COLOUR_NONE, "%s", expires);
-        table_set(&t, 7, COLOUR_NONE, "%s", member_text(job, "owner"));
-        table_set(&t, 8, COLOUR_NONE, "%s", member_text(job, "name"));
+        table_set(&t, 7, COLOUR_NONE, "%s", expires);
+        table_set(&t, 8, COLOUR_NONE, "%s", member_text(job, "owner"));
+        table_set(&t, 9, COLOUR_NONE, "%s", member_text(job, "name"));
     }
     table_print(&t, &c->out);
     table_release(&t);
 }
 
 int list_run(struct client *c, const struct options *o) {
-    const char *state = options_text(o, "state", NULL);
+    const char *state = options_text(o, "state", NULL), *kind = options_text(o, "kind", NULL);
     long limit = options_whole(o, "limit", 20);
     struct reply reply;
     struct error err;
     cJSON *items = NULL;
-    char path[64];
+    char path[96];
     int code = CLIENT_OK;
     reply_init(&reply);
-    enum status status = STATUS_OK;
-    if (state)
-        status = check_state(state, &err);
+    enum status status =
+        check_word("state", state, command_job_states, "queued, running, paused, succeeded, failed or cancelled", &err);
+    if (status == STATUS_OK)
+        status = check_word("kind", kind, command_job_kinds, "reconstruct, render or evaluate", &err);
     if (limit < 0)
         status = error_set(&err, STATUS_INPUT, "--limit must be 0 or more, not %ld", limit);
     if (status == STATUS_OK) {
-        snprintf(path, sizeof path, "/v1/jobs%s%s", state ? "?state=" : "", state ? state : "");
+        snprintf(path, sizeof path, "/v1/jobs%s%s%s%s", state ? "?state=" : "", state ? state : "",
+                 !kind   ? ""
+                 : state ? "&kind="
+                         : "?kind=",
+                 kind ? kind : "");
         status = client_list(c, path, (size_t)limit, &items, &reply, &err);
     }
     if (status != STATUS_OK)
@@ -163,12 +180,34 @@ static void print_webhook(struct client *c, const cJSON *job) {
     field_print(c, "delivery", text);
 }
 
+/* What was sent to the job, and what is still to be. */
+static void print_files(struct client *c, const cJSON *files) {
+    struct buf line;
+    const cJSON *file;
+    buf_init(&line, 1 << 16);
+    cJSON_ArrayForEach(file, files) {
+        double bytes = member_number(file, "bytes", -1.0);
+        char size[16] = "to be sent";
+        if (bytes >= 0.0)
+            format_bytes(size, bytes);
+        buf_printf(&line, "%s%s (%s)", line.length ? ", " : "", member_text(file, "name"), size);
+    }
+    field_print(c, "files", buf_text(&line));
+    buf_release(&line);
+}
+
 static void print_job(struct client *c, const cJSON *job, const cJSON *outputs) {
     char text[96], left[16];
     const char *wanted = member_text(job, "wanted");
     snprintf(text, sizeof text, "%.0f", member_number(job, "id", 0.0));
     field_print(c, "job", text);
     field_print(c, "name", member_text(job, "name"));
+    if (member_whole(job, "source", 0))
+        snprintf(text, sizeof text, "%s of job %lld", member_text(job, "kind"),
+                 (long long)member_whole(job, "source", 0));
+    else
+        snprintf(text, sizeof text, "%s", member_text(job, "kind"));
+    field_print(c, "kind", text);
     snprintf(text, sizeof text, strcmp(wanted, "run") == 0 ? "%s" : "%s, %s requested", member_text(job, "state"),
              wanted);
     field_print(c, "state", text);
@@ -187,6 +226,7 @@ static void print_job(struct client *c, const cJSON *job, const cJSON *outputs) 
     field_print(c, "priority", text);
     print_members(c, "labels", cJSON_GetObjectItemCaseSensitive(job, "labels"));
     print_members(c, "settings", cJSON_GetObjectItemCaseSensitive(job, "settings"));
+    print_files(c, member_items(job, "files"));
     snprintf(text, sizeof text, "%.0f, %.0f left", member_number(job, "attempt", 0.0),
              member_number(job, "attempts_left", 0.0));
     field_print(c, "attempt", text);

@@ -30,6 +30,11 @@
 #define JOB_STATE_FAILED "failed"
 #define JOB_STATE_CANCELLED "cancelled"
 
+/* Kinds of jobs. */
+#define JOB_KIND_RECONSTRUCT "reconstruct"
+#define JOB_KIND_RENDER "render"     /* pictures of a reconstruction under another light */
+#define JOB_KIND_EVALUATE "evaluate" /* a reconstruction compared with the truth of its room */
+
 /* Scene states. */
 #define SCENE_STATE_RECEIVING "receiving"
 #define SCENE_STATE_CHECKING "checking"

@@ -26,6 +26,9 @@ struct scheduler_config daemon_options_scheduler(const struct config *c, const s
         .executor = executor,
         .max_running = (int)c->max_running,
         .user_max_running = (int)c->user_max_running,
+        .small_renders = (int)c->small_renders,
+        .small_render_threads = (int)c->small_render_threads,
+        .small_render_cost = (double)c->small_render_paths,
         .max_checks = (int)c->max_checks,
         .thread_count = (int)c->threads,
         .user_max_bytes = user_max_bytes(c),
@@ -47,6 +50,7 @@ struct api_config daemon_options_api(const struct config *c, const struct proxie
     return (struct api_config){
         .data_dir = c->data_dir,
         .max_attempts = (int)c->max_attempts,
+        .small_render_cost = c->small_renders > 0 ? (double)c->small_render_paths : 0.0,
         .queue_limit = (size_t)c->queue_limit,
         .user_queue_limit = (size_t)c->user_queue_limit,
         .user_max_jobs = (size_t)c->user_max_jobs,

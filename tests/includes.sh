@@ -72,8 +72,9 @@ forbid server/worker 'server/(http|events|transport|net|uploads|job)/|server/dat
 
 forbid "server/demo server/evaluate" "server/($daemon|worker)/" 'tools know only the engine'
 forbid server/demo 'server/(ingest|capture|gather|state|material|light|refine|reconstruct|export|evaluate)/' 'demo sees only render and scene'
-forbid "$(ls -d server/*/ | grep -vE 'demo|evaluate' | tr '\n' ' ')" 'server/(demo|evaluate)/' \
-    'only main.c sees the tools'
+forbid "$(ls -d server/*/ | grep -vE 'demo|evaluate|worker' | tr '\n' ' ')" 'server/(demo|evaluate)/' \
+    'only main.c, and of evaluate the worker, sees the tools'
+forbid server/worker 'server/(demo/|evaluate/(evaluate_command|[^e]))' 'the worker sees of the tools evaluate.h'
 
 own 'embree[34]/' server/render/accel.c
 own 'microhttpd\.h' server/transport/exchange.h

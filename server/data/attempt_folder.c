@@ -178,6 +178,50 @@ enum status attempt_folder_list_checkpoint(const char *data_dir, int64_t job_id,
     return status;
 }
 
+/* --- outputs of earlier attempts --------------------------------------------------------------- */
+
+static enum status link_files(const char *from, const char *to, struct error *err) {
+    char **names = NULL;
+    size_t count = 0;
+    enum status status = file_list(from, &names, &count, err);
+    if (status == STATUS_NOT_FOUND)
+        status = STATUS_OK;
+    for (size_t i = 0; status == STATUS_OK && i < count; i++) {
+        struct stat info;
+        char *old = file_join(from, names[i]), *new = file_join(to, names[i]);
+        bool is_there = lstat(old, &info) == 0;
+        if (is_there && S_ISDIR(info.st_mode)) {
+            status = file_make_dirs(new, err);
+            if (status == STATUS_OK)
+                status = link_files(old, new, err);
+        } else if (is_there && S_ISREG(info.st_mode) && link(old, new) != 0 && errno != EEXIST) {
+            log_warning("%s is made again: it cannot be linked: %s", new, strerror(errno));
+        }
+        mem_free(new);
+        mem_free(old);
+    }
+    file_free_names(names, count);
+    return status;
+}
+
+enum status attempt_folder_carry_outputs(const char *data_dir, int64_t job_id, int number, struct error *err) {
+    int *numbers;
+    size_t count;
+    char *dir = layout_attempt(data_dir, job_id, number), *to = layout_out(dir);
+    enum status status = list_attempts(data_dir, job_id, &numbers, &count, err);
+    for (size_t i = count; i-- > 0 && status == STATUS_OK;) { /* newest first: an older file of a name is left out */
+        char *other = layout_attempt(data_dir, job_id, numbers[i]), *from = layout_out(other);
+        if (numbers[i] != number)
+            status = link_files(from, to, err);
+        mem_free(from);
+        mem_free(other);
+    }
+    mem_free(numbers);
+    mem_free(to);
+    mem_free(dir);
+    return status;
+}
+
 /* --- what no row names ----------------------------------------------------------------------- */
 
 struct tidying {

@@ -22,6 +22,11 @@
 /* Makes the attempt's folder with all that it begins with, durably. No other attempt of the job may run. */
 enum status attempt_folder_begin(const char *data_dir, int64_t job_id, int number, struct error *err);
 
+/* Gives the attempt, which has just begun, what earlier ones have left in out/, the newest of each name: as hard links, so
+ * that it costs no space and what others read stays. Its worker judges what is whole. What cannot be linked is left out
+ * and made again. */
+enum status attempt_folder_carry_outputs(const char *data_dir, int64_t job_id, int number, struct error *err);
+
 /* The folder of the attempt that has a checkpoint, relative to data_dir; the caller's (mem_free). NULL: none has. */
 enum status attempt_folder_with_checkpoint(const char *data_dir, int64_t job_id, char **work_dir, struct error *err);
 /* Removes the checkpoint; without one it does nothing. */

@@ -39,6 +39,14 @@ char *layout_job(const char *data_dir, int64_t job_id) {
     return in_folder(data_dir, "jobs", mem_printf("%lld", (long long)job_id));
 }
 
+char *layout_job_files(const char *data_dir, int64_t job_id) {
+    return in_folder(data_dir, "jobs", mem_printf("%lld/files", (long long)job_id));
+}
+
+char *layout_job_file(const char *data_dir, int64_t job_id, const char *name) {
+    return in_folder(data_dir, "jobs", mem_printf("%lld/files/%s", (long long)job_id, name));
+}
+
 #define ATTEMPT "attempt-"
 
 char *layout_attempt(const char *data_dir, int64_t job_id, int number) {
@@ -81,6 +89,8 @@ char *layout_archive(const char *work_dir) { return in(work_dir, "archive"); }
 char *layout_files(const char *work_dir) { return in(work_dir, "files"); }
 
 char *layout_file_list(const char *work_dir) { return in(work_dir, "files.json"); }
+
+char *layout_truth(const char *room) { return in(room, "truth/objects.json"); }
 
 char *layout_previews(const char *work_dir) { return in(work_dir, "previews"); }
 

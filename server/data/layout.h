@@ -7,7 +7,8 @@
  *   DATA/scenes/ID/      archive: the bundle as it was uploaded; files/: unpacked; files.json: a list of them, once
  *                        a node has asked for it; previews/NAME: pictures that its check drew; job.json,
  *                        worker.log: of its check
- *   DATA/jobs/ID/        worker.log: what the workers of all attempts printed; attempt-N/ (attempt_folder.h):
+ *   DATA/jobs/ID/        worker.log: what the workers of all attempts printed; files/NAME: what was sent to it
+ *                        (store/job_files.h); attempt-N/ (attempt_folder.h):
  *                        job.json: the worker's order; checkpoint/: what a later attempt goes on from, checkpoint.db
  *                        or, as a node has sent it, part-N; out/NAME: outputs
  *   DATA/uploads/ID      an upload that is not a scene yet
@@ -35,6 +36,8 @@ char *layout_scenes(const char *data_dir);
 char *layout_scene(const char *data_dir, const char *scene_id);
 char *layout_jobs(const char *data_dir);
 char *layout_job(const char *data_dir, int64_t job_id);
+char *layout_job_files(const char *data_dir, int64_t job_id);
+char *layout_job_file(const char *data_dir, int64_t job_id, const char *name);
 char *layout_attempt(const char *data_dir, int64_t job_id, int number); /* a work_dir */
 int layout_attempt_number(const char *name);                            /* N of "attempt-N"; 0: it is no such name */
 char *layout_uploads(const char *data_dir);
@@ -48,12 +51,13 @@ char *layout_log(const char *dir); /* of a job, a scene or a message */
 char *layout_archive(const char *work_dir);
 char *layout_files(const char *work_dir);
 char *layout_file_list(const char *work_dir); /* of what lies in files/ (scene_files.h) */
+char *layout_truth(const char *room);         /* the list of objects in a bundle that comes with the truth */
 char *layout_previews(const char *work_dir);
 char *layout_preview(const char *work_dir, const char *name);
 char *layout_checkpoint_folder(const char *work_dir); /* what lies in it moves together */
 char *layout_checkpoint(const char *work_dir);
 char *layout_checkpoint_journal(const char *work_dir);
-bool layout_is_checkpoint(const char *name); /* of the database or its journal */
+bool layout_is_checkpoint(const char *name);                  /* of the database or its journal */
 char *layout_part(const char *checkpoint_folder, int number); /* DIR/part-N, of a checkpoint that travels */
 int layout_part_number(const char *name);                     /* N of "part-N"; 0: it is no such name */
 /* The names that a checkpoint had in a job's folder before attempts had folders of their own, and that of a

@@ -6,11 +6,14 @@
 #include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "common/file.h"
 #include "common/mem.h"
 #include "server/data/layout.h"
+
+#define TRUTH_DEPTH_MAX 16 /* folders; deeper ones no bundle has */
 
 /* Opens `path`, which is relative to the data folder and begins with the name of the folder `root` (taken): jobs/ or
  * scenes/. That folder itself may be a link: only an administrator can have made it. */
@@ -83,4 +86,25 @@ enum status work_file_open_checkpoint(const char *data_dir, int64_t job_id, int 
     mem_free(folder);
     mem_free(dir);
     return status;
+}
+
+bool work_file_has_truth(const char *data_dir, const char *scene_id) {
+    char *folder = layout_scene(data_dir, scene_id), *at = layout_files(folder);
+    bool has = false;
+    for (int depth = 0; depth < TRUTH_DEPTH_MAX && at && !has; depth++) {
+        char *path = layout_truth(at), **names = NULL, *inner = NULL;
+        size_t count = 0;
+        struct stat info;
+        has = lstat(path, &info) == 0 && S_ISREG(info.st_mode);
+        /* an archive of one folder: as ingest/bundle.h has it */
+        if (!has && file_list(at, &names, &count, NULL) == STATUS_OK && count == 1)
+            inner = file_join(at, names[0]);
+        file_free_names(names, count);
+        mem_free(path);
+        mem_free(at);
+        at = inner;
+    }
+    mem_free(at);
+    mem_free(folder);
+    return has;
 }

@@ -3,6 +3,7 @@
 #ifndef UNBAKE_DATA_WORK_FILE_H
 #define UNBAKE_DATA_WORK_FILE_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "common/error.h"
@@ -20,5 +21,7 @@ enum status work_file_open_checkpoint(const char *data_dir, int64_t job_id, int 
                                       struct error *err);
 enum status work_file_open_preview(const char *data_dir, const char *scene_id, const char *name, int *fd,
                                    struct error *err);
+/* Whether a checked scene came with the truth that evaluations compare with. */
+bool work_file_has_truth(const char *data_dir, const char *scene_id);
 
 #endif

@@ -269,7 +269,7 @@ static enum status load_room(struct evaluator *e, struct error *err) {
     struct bundle_limits limits = bundle_default_limits();
     pixels_use(e->pixels, &limits);
     cJSON *problems = cJSON_CreateArray();
-    enum status status = bundle_load(e->room, NULL, &limits, e->pool, &e->scene, problems, err);
+    enum status status = bundle_load(e->room, e->settings->reading, &limits, e->pool, &e->scene, problems, err);
     cJSON_Delete(problems);
     if (status != STATUS_OK) {
         scene_release(&e->scene);
@@ -282,11 +282,15 @@ static enum status load_room(struct evaluator *e, struct error *err) {
 
 enum status evaluate_outputs(const char *room, const char *outputs, const struct evaluate_settings *settings,
                              struct parallel *pool, struct evaluation *v, struct error *err) {
-    struct evaluator e = {.settings = settings, .pool = pool, .room = room};
+    struct evaluator e = {.settings = settings, .pool = pool};
     memset(v, 0, sizeof *v);
+    char *root = NULL;
     size_t turned;
     e.pixels = pixels_new_temporary();
-    enum status status = load_room(&e, err);
+    enum status status = bundle_root(room, &root, err);
+    e.room = root;
+    if (status == STATUS_OK)
+        status = load_room(&e, err);
     if (status != STATUS_OK)
         goto out;
     status = orient_mesh(&e.scene, pool, &turned, err); /* turn the mesh as the outputs are: emitters emit from the
@@ -306,6 +310,7 @@ enum status evaluate_outputs(const char *room, const char *outputs, const struct
     }
     recovered_release(&e.recovered);
 out:
+    mem_free(root);
     mem_free(e.emits);
     scene_release(&e.scene);
     spill_free(e.pixels);

@@ -17,12 +17,15 @@
 #include "server/evaluate/noise_floor.h"
 #include "server/evaluate/score.h"
 
+struct reading; /* common/reading.h */
+
 struct evaluate_settings {
     uint32_t samples;   /* first hits per pixel, at least 16 */
     uint32_t spp;       /* paths per pixel of the re-renders, at least 64; 0: none, no MSRE */
     uint32_t max_depth; /* segments of a path */
     uint64_t seed;
-    const char *pictures_dir; /* where side-by-sides go; NULL: none */
+    const char *pictures_dir;      /* where side-by-sides go; NULL: none */
+    const struct reading *reading; /* how the room is read, as its job read it; NULL: as its files say */
 };
 
 struct evaluate_settings evaluate_default_settings(void);

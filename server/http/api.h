@@ -27,10 +27,11 @@ enum api_access {
 struct api_config {
     const char *data_dir;
     int max_attempts;
-    size_t queue_limit;      /* queued jobs */
-    size_t user_queue_limit; /* queued jobs of one user; 0: no limit */
-    size_t user_max_jobs;    /* jobs of one user, in any state; 0: no limit */
-    uint64_t user_max_bytes; /* what one user keeps; 0: no limit */
+    double small_render_cost; /* as in scheduler_config.h */
+    size_t queue_limit;       /* queued jobs */
+    size_t user_queue_limit;  /* queued jobs of one user; 0: no limit */
+    size_t user_max_jobs;     /* jobs of one user, in any state; 0: no limit */
+    uint64_t user_max_bytes;  /* what one user keeps; 0: no limit */
     uint64_t max_upload_bytes;
     uint64_t min_free_bytes;      /* of the disk; uploads leave at least this much free */
     uint64_t admin_free_bytes;    /* more of it, kept for admins */

@@ -44,10 +44,15 @@ struct response *uploads_delete(struct api *api, struct request *r);
 
 /* jobs.c */
 struct response *jobs_list(struct api *api, struct request *r);
-struct response *jobs_add(struct api *api, struct request *r);
 struct response *jobs_get(struct api *api, struct request *r);
 struct response *jobs_patch(struct api *api, struct request *r);
 struct response *jobs_delete(struct api *api, struct request *r);
+
+/* job_submit.c */
+struct response *jobs_add(struct api *api, struct request *r);
+
+/* job_files.c */
+struct response *job_files_put(struct api *api, struct request *r);
 
 /* job_action.c */
 struct response *job_action_cancel(struct api *api, struct request *r);

@@ -61,10 +61,13 @@ struct response *job_action_retry(struct api *api, struct request *r) {
     struct response *refusal = NULL;
     const char *from = target_query(&r->target, "from");
     bool keeps_checkpoint;
-    int64_t id = auth_job_id(api, r, ACCESS_CHANGE, &refusal);
-    if (!refusal && from && !job_stage_parse(from, &keeps_checkpoint))
-        refusal =
-            problem_full(r, 400, "from must name a stage", "load, prepare, fuse, solve, refine, report, export", NULL);
+    struct job job;
+    if (!auth_job(api, r, ACCESS_CHANGE, &job, &refusal))
+        return refusal;
+    if (from && !job_stage_parse(job.kind, from, &keeps_checkpoint))
+        refusal = problem_full(r, 400, "from must name a stage", job_stages(job.kind), NULL);
+    int64_t id = job.id;
+    job_release(&job);
     if (refusal)
         return refusal;
     struct error err;
@@ -85,7 +88,9 @@ struct response *job_action_extend(struct api *api, struct request *r) {
         return refusal;
     if (store_job_get(api->store, id, &job, &err) != STATUS_OK)
         return problem_from(r, &err);
-    char *settings = extension_settings(r, &job, &refusal);
+    if (job.kind != JOB_RECONSTRUCT)
+        refusal = problem_full(r, 409, "only a reconstruction can be extended", "submit another job", NULL);
+    char *settings = refusal ? NULL : extension_settings(r, &job, &refusal);
     char *holder = NULL;
     if (!refusal && attempt_folder_with_checkpoint(api->config.data_dir, id, &holder, &err) != STATUS_OK)
         refusal = problem_from(r, &err);

@@ -106,6 +106,38 @@ static void read_order(struct job_request *w, const cJSON *member, cJSON *params
     w->before = (int64_t)before;
 }
 
+static void read_kind(struct job_request *w, cJSON *params) {
+    const cJSON *member = cJSON_GetObjectItemCaseSensitive(w->body, "kind");
+    if (member && !(cJSON_IsString(member) && job_kind_parse(member->valuestring, &w->kind)))
+        problem_param(params, "kind", NULL,
+                      "must be " JOB_KIND_RECONSTRUCT ", " JOB_KIND_RENDER " or " JOB_KIND_EVALUATE);
+}
+
+static void read_source(struct job_request *w, const cJSON *member, cJSON *params) {
+    double id = cJSON_IsNumber(member) ? member->valuedouble : 0.0;
+    if (w->kind == JOB_RECONSTRUCT)
+        problem_param(params, "source", "kind says what a job is to do", "is for renders and evaluations");
+    else if (id >= 1.0 && id < 9e15 && id == floor(id))
+        w->source = (int64_t)id;
+    else
+        problem_param(params, "source", NULL, "must be the number of a reconstruction");
+}
+
+static void read_scene(struct job_request *w, const cJSON *member, cJSON *params) {
+    if (w->kind == JOB_RENDER)
+        problem_param(params, "scene", "source names the reconstruction that a render reads", "is not for renders");
+    else
+        w->scene = check_string(member, SCENE_ID_SIZE - 1, params) ? member->valuestring : NULL;
+}
+
+/* What a new job cannot do without. */
+static void check_missing(const struct job_request *w, cJSON *params) {
+    if (w->kind == JOB_RECONSTRUCT && !cJSON_HasObjectItem(w->body, "scene"))
+        problem_param(params, "scene", "POST the bundle to /v1/scenes; its reply has the id", "is missing");
+    if (w->kind != JOB_RECONSTRUCT && !cJSON_HasObjectItem(w->body, "source"))
+        problem_param(params, "source", "it is the number of the reconstruction that is read", "is missing");
+}
+
 struct response *job_request_read(const struct request *r, struct job_request *w, bool is_new, cJSON *params) {
     memset(w, 0, sizeof *w);
     w->priority = INT_MIN;
@@ -114,6 +146,8 @@ struct response *job_request_read(const struct request *r, struct job_request *w
     w->body = body_object(r, &refusal);
     if (!w->body)
         return refusal;
+    if (is_new)
+        read_kind(w, params);
     for (const cJSON *member = w->body->child; member; member = member->next) {
         const char *name = member->string;
         if (strcmp(name, "name") == 0)
@@ -130,21 +164,25 @@ struct response *job_request_read(const struct request *r, struct job_request *w
             read_order(w, member, params);
         else if (!is_new && retention_read(&w->retention, member, params))
             continue;
+        else if (is_new && strcmp(name, "kind") == 0)
+            continue;
         else if (is_new && strcmp(name, "scene") == 0)
-            w->scene = check_string(member, SCENE_ID_SIZE - 1, params) ? member->valuestring : NULL;
+            read_scene(w, member, params);
+        else if (is_new && strcmp(name, "source") == 0)
+            read_source(w, member, params);
         else if (is_new && strcmp(name, "webhook") == 0)
             read_webhook(w, member, params);
         else if (is_new && strcmp(name, "settings") == 0)
             w->settings = member;
         else
             problem_param(params, name,
-                          is_new ? "known: scene, name, settings, priority, labels, webhook, shared"
+                          is_new ? "known: kind, scene, source, name, settings, priority, labels, webhook, shared"
                                  : "known: name, priority, labels, shared, order, pinned, "
                                    "expires_at",
                           "is unknown");
     }
-    if (is_new && !cJSON_HasObjectItem(w->body, "scene"))
-        problem_param(params, "scene", "POST the bundle to /v1/scenes; its reply has the id", "is missing");
+    if (is_new)
+        check_missing(w, params);
     return NULL;
 }
 

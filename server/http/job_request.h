@@ -13,6 +13,8 @@
 /* Pointers point into `body`. */
 struct job_request {
     cJSON *body; /* owned */
+    enum job_kind kind;
+    int64_t source; /* the job whose outputs are read; 0: not given */
     const char *scene, *name;
     const cJSON *settings;
     char *labels;                             /* JSON text; owned; NULL: not given */

@@ -90,6 +90,13 @@ struct response *limits_check_upload(struct api *api, const struct request *r, u
     return refusal ? refusal : check_pledge(api, r, bytes);
 }
 
+struct response *limits_check_file(struct api *api, const struct request *r, uint64_t bytes) {
+    if (!limits_bind(r))
+        return NULL;
+    struct response *refusal = check_count(api, r);
+    return refusal ? refusal : check_pledge(api, r, bytes);
+}
+
 struct hub_limits limits_of_streams(const struct api *api, const struct request *r) {
     size_t most = api->config.max_streams;
     bool is_bound = limits_bind(r);

@@ -13,7 +13,9 @@ bool limits_bind(const struct request *r);
 /* NULL, or the refusal of an upload of `bytes` (0: length unknown). A caller that goes on to reserve the space holds
  * api->folder.scene_mutex: two at once would both find room. */
 struct response *limits_check_upload(struct api *api, const struct request *r, uint64_t bytes);
-/* The same for one more check of a scene. Uploads under way count, too: each becomes a scene to check. */
+/* The same for a file that does not become a scene. */
+struct response *limits_check_file(struct api *api, const struct request *r, uint64_t bytes);
+/* limits_check_upload for one more check of a scene. Uploads under way count, too: each becomes a scene to check. */
 struct response *limits_check_checks(struct api *api, const struct request *r);
 /* How many event streams there may be, the caller's new one included. */
 struct hub_limits limits_of_streams(const struct api *api, const struct request *r);

@@ -38,12 +38,9 @@ void request_counts_add(struct request_counts *t, const struct request *r, int s
 }
 
 void request_counts_print(struct request_counts *t, const char *name, struct buf *b) {
-    static const char *const methods[] = {[METHOD_GET] = "GET",
-                                          [METHOD_POST] = "POST",
-                                          [METHOD_PATCH] = "PATCH",
-                                          [METHOD_DELETE] = "DELETE",
-                                          [METHOD_OPTIONS] = "OPTIONS",
-                                          [METHOD_PUT] = "PUT"};
+    static const char *const methods[] = {
+        [METHOD_GET] = "GET",       [METHOD_POST] = "POST",       [METHOD_PATCH] = "PATCH",
+        [METHOD_DELETE] = "DELETE", [METHOD_OPTIONS] = "OPTIONS", [METHOD_PUT] = "PUT"};
     size_t count;
     const struct route *table = routes_table(&count);
     for (size_t row = 0; row <= count; row++)

@@ -7,11 +7,12 @@
 struct api;
 
 enum route_body {
-    ROUTE_BODY_IGNORED, /* read and dropped */
-    ROUTE_BODY_JSON,    /* collected in request.body */
-    ROUTE_BODY_UPLOAD,  /* written to disk */
-    ROUTE_BODY_FILE,    /* written to disk, for an attempt */
-    ROUTE_BODY_PATCH    /* written to a resumable upload; a JSON body changes the upload instead */
+    ROUTE_BODY_IGNORED,  /* read and dropped */
+    ROUTE_BODY_JSON,     /* collected in request.body */
+    ROUTE_BODY_UPLOAD,   /* a bundle, written to disk */
+    ROUTE_BODY_FILE,     /* written to disk, for an attempt */
+    ROUTE_BODY_JOB_FILE, /* a file that a job's settings name, written to disk */
+    ROUTE_BODY_PATCH     /* written to a resumable upload; a JSON body changes the upload instead */
 };
 
 /* The lowest role that is allowed; ROUTE_NODE: none, but the token of the attempt that the path names. */

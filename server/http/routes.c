@@ -7,6 +7,7 @@
 #include "common/protocol.h"
 #include "server/http/auth.h"
 #include "server/http/handlers.h"
+#include "server/http/job_files.h"
 #include "server/http/node.h"
 #include "server/http/node_body.h"
 #include "server/http/scene_body.h"
@@ -27,7 +28,7 @@ static const struct route table[] = {
     {METHOD_GET, "/v1/session", ROUTE_VIEWER, session_get, 0, PACE_QUICK, ""},
     {METHOD_POST, "/v1/session", ROUTE_PUBLIC, session_add, ROUTE_BODY_JSON, PACE_QUICK, ""},
     {METHOD_DELETE, "/v1/session", ROUTE_PUBLIC, session_delete, 0, PACE_AT_ONCE, ""},
-    {METHOD_GET, "/v1/settings", ROUTE_VIEWER, system_settings, 0, PACE_QUICK, ""},
+    {METHOD_GET, "/v1/settings", ROUTE_VIEWER, system_settings, 0, PACE_QUICK, "kind"},
     {METHOD_GET, "/v1/scenes", ROUTE_VIEWER, scenes_list, 0, PACE_QUICK, "limit cursor"},
     {METHOD_POST, "/v1/scenes", ROUTE_USER, scenes_add, ROUTE_BODY_UPLOAD, PACE_SLOW, "name reading"},
     {METHOD_GET, "/v1/scenes/{scene}", ROUTE_VIEWER, scenes_get, 0, PACE_QUICK, ""},
@@ -42,11 +43,12 @@ static const struct route table[] = {
     {METHOD_PATCH, "/v1/uploads/{upload}", ROUTE_USER, uploads_patch, ROUTE_BODY_PATCH, PACE_SLOW, ""},
     {METHOD_DELETE, "/v1/uploads/{upload}", ROUTE_USER, uploads_delete, 0, PACE_SLOW, "dry_run"},
     {METHOD_POST, "/v1/collect", ROUTE_ADMIN, collect_now, 0, PACE_SLOW, "dry_run"},
-    {METHOD_GET, "/v1/jobs", ROUTE_VIEWER, jobs_list, 0, PACE_QUICK, "state limit cursor"},
+    {METHOD_GET, "/v1/jobs", ROUTE_VIEWER, jobs_list, 0, PACE_QUICK, "state kind source limit cursor"},
     {METHOD_POST, "/v1/jobs", ROUTE_USER, jobs_add, ROUTE_BODY_JSON, PACE_QUICK, "dry_run"},
     {METHOD_GET, "/v1/jobs/{job}", ROUTE_VIEWER, jobs_get, 0, PACE_QUICK, "wait"},
     {METHOD_PATCH, "/v1/jobs/{job}", ROUTE_USER, jobs_patch, ROUTE_BODY_JSON, PACE_QUICK, ""},
     {METHOD_DELETE, "/v1/jobs/{job}", ROUTE_USER, jobs_delete, 0, PACE_SLOW, "dry_run"},
+    {METHOD_PUT, "/v1/jobs/{job}/files/{name}", ROUTE_USER, job_files_put, ROUTE_BODY_JOB_FILE, PACE_SLOW, ""},
     {METHOD_POST, "/v1/jobs/{job}/cancel", ROUTE_USER, job_action_cancel, 0, PACE_QUICK, ""},
     {METHOD_POST, "/v1/jobs/{job}/pause", ROUTE_USER, job_action_pause, 0, PACE_QUICK, ""},
     {METHOD_POST, "/v1/jobs/{job}/resume", ROUTE_USER, job_action_resume, 0, PACE_QUICK, ""},
@@ -166,6 +168,11 @@ static enum route_body body_of(const struct request *r) {
     return r->route->body == ROUTE_BODY_PATCH && is_json(r) ? ROUTE_BODY_JSON : r->route->body;
 }
 
+static bool is_stored(enum route_body body) {
+    return body == ROUTE_BODY_UPLOAD || body == ROUTE_BODY_FILE || body == ROUTE_BODY_JOB_FILE ||
+           body == ROUTE_BODY_PATCH;
+}
+
 static struct response *check_media_type(const struct request *r) {
     const char *type = request_field(r, "Content-Type");
     const char *coding = request_field(r, "Content-Encoding");
@@ -174,12 +181,14 @@ static struct response *check_media_type(const struct request *r) {
                                            [ROUTE_BODY_JSON] = MIME_JSON,
                                            [ROUTE_BODY_UPLOAD] = "application/octet-stream",
                                            [ROUTE_BODY_FILE] = "application/octet-stream",
+                                           [ROUTE_BODY_JOB_FILE] = "application/octet-stream",
                                            [ROUTE_BODY_PATCH] = MIME_TUS ", " MIME_JSON};
     const char *detail = NULL;
     if (coding && r->has_body)
         detail = "a body with a Content-Encoding is not supported";
-    else if (body == ROUTE_BODY_UPLOAD && type && field_is_type(type, "multipart/form-data"))
-        detail = "a form is not supported: send the archive itself as the body, as curl -T does";
+    else if ((body == ROUTE_BODY_UPLOAD || body == ROUTE_BODY_JOB_FILE) && type &&
+             field_is_type(type, "multipart/form-data"))
+        detail = "a form is not supported: send the file itself as the body, as curl -T does";
     else if (body == ROUTE_BODY_JSON && !is_json(r))
         detail = "the body must be JSON and Content-Type say so";
     else if (body == ROUTE_BODY_PATCH && !(type && field_is_type(type, MIME_TUS)))
@@ -210,7 +219,7 @@ struct response *routes_find(struct request *r) {
         return answer(r, no_route(r));
     enum route_body body = body_of(r);
     r->pace = r->route->pace;
-    r->is_body_stored = body == ROUTE_BODY_UPLOAD || body == ROUTE_BODY_FILE || body == ROUTE_BODY_PATCH;
+    r->is_body_stored = is_stored(body);
     return NULL;
 }
 
@@ -227,14 +236,14 @@ static struct response *begin(struct api *api, struct request *r) {
     enum route_body body = body_of(r);
     if (body == ROUTE_BODY_PATCH)
         return upload_body_begin(api, r); /* the upload's length is the limit */
-    uint64_t limit =
-        body == ROUTE_BODY_UPLOAD || body == ROUTE_BODY_FILE ? api->config.max_upload_bytes : ROUTES_BODY_MAX;
+    uint64_t limit = is_stored(body) ? api->config.max_upload_bytes : ROUTES_BODY_MAX;
     if (r->content_length > 0 && (uint64_t)r->content_length > limit)
         return too_large(r, limit);
     buf_init(&r->body, ROUTES_BODY_MAX);
-    return body == ROUTE_BODY_UPLOAD ? scene_body_begin(api, r)
-           : body == ROUTE_BODY_FILE ? node_body_begin(api, r)
-                                     : NULL;
+    return body == ROUTE_BODY_UPLOAD     ? scene_body_begin(api, r)
+           : body == ROUTE_BODY_FILE     ? node_body_begin(api, r)
+           : body == ROUTE_BODY_JOB_FILE ? job_files_begin(api, r)
+                                         : NULL;
 }
 
 struct response *routes_begin(struct api *api, struct request *r) {

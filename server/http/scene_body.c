@@ -74,6 +74,6 @@ struct response *scene_body_end(struct request *r, char id[SHA256_HEX_SIZE]) {
     if (digest && field_digest(digest, wanted) && strcmp(wanted, id) != 0)
         return problem(r, 422, "the body's SHA-256 is %s, and Repr-Digest says %s", id, wanted);
     if (upload_bytes(r->upload) == 0)
-        return problem(r, 400, "the body, an archive of the bundle, is empty");
+        return problem(r, 400, "the body is empty");
     return upload_sync(r->upload, &err) == STATUS_OK ? NULL : problem_from(r, &err);
 }

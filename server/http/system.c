@@ -6,6 +6,7 @@
 #include "common/file.h"
 #include "common/mem.h"
 #include "common/protocol.h"
+#include "common/render_settings.h"
 #include "common/settings.h"
 #include "server/events/hub.h"
 #include "server/http/embedded.h"
@@ -110,8 +111,12 @@ struct response *system_version(struct api *api, struct request *r) {
 }
 
 struct response *system_settings(struct api *api, struct request *r) {
-    (void)api, (void)r;
+    (void)api;
+    const char *word = target_query(&r->target, "kind");
+    enum job_kind kind = JOB_RECONSTRUCT;
+    if (word && (!job_kind_parse(word, &kind) || kind == JOB_EVALUATE))
+        return problem_full(r, 400, "no jobs of that kind have settings", "known: reconstruct, render", NULL);
     cJSON *value = cJSON_CreateObject();
-    json_add(value, "items", settings_describe());
+    json_add(value, "items", kind == JOB_RENDER ? render_settings_describe() : settings_describe());
     return response_json(200, value);
 }

@@ -58,7 +58,13 @@ cJSON *view_job(const struct job *job, const struct caller *who) {
     json_add_int(v, "id", job->id);
     json_add_int(v, "revision", job->revision);
     json_add_string(v, "name", job->name);
+    json_add_string(v, "kind", job_kind_name(job->kind));
     json_add_string(v, "scene", job->scene_id);
+    if (job->source_id)
+        json_add_int(v, "source", job->source_id);
+    else
+        json_add(v, "source", cJSON_CreateNull());
+    add_text(v, "files", job->files);
     json_add_string(v, "owner", or_null(job->owner));
     json_add_bool(v, "shared", job->is_shared);
     json_add_string(v, "state", job_state_name(job->state));
@@ -96,6 +102,9 @@ cJSON *view_job(const struct job *job, const struct caller *who) {
     }
     snprintf(path, sizeof path, "/v1/scenes/%s", job->scene_id);
     json_add_string(links, "scene", path);
+    snprintf(path, sizeof path, "/v1/jobs/%lld", (long long)job->source_id);
+    if (job->source_id)
+        json_add_string(links, "source", path);
     return v;
 }
 

@@ -54,8 +54,7 @@ static enum status list_folder(const char *dir, char ***names, size_t *count, st
     return status;
 }
 
-/* The bundle's root: `dir`, or below it as long as a folder holds nothing but one folder; the caller's. */
-static enum status find_root(const char *dir, char **root, struct error *err) {
+enum status bundle_root(const char *dir, char **root, struct error *err) {
     *root = mem_strdup(dir);
     for (int depth = 0; depth < LISTING_MAX_DEPTH; depth++) {
         char **names;
@@ -260,7 +259,7 @@ enum status bundle_load(const char *dir, const struct reading *given, const stru
     *scene = (struct scene){0};
     enum status status = clean_choice(reading.transforms, &chosen, err);
     if (status == STATUS_OK)
-        status = find_root(dir, &root, err);
+        status = bundle_root(dir, &root, err);
     if (status == STATUS_OK)
         status = list_bundle(dir, &root, &listing, err);
     if (status == STATUS_OK)

@@ -35,6 +35,9 @@ struct bundle_limits bundle_default_limits(void);
  * removed; on success the caller makes the files durable. */
 enum status bundle_unpack(const char *archive, const char *dir, const struct bundle_limits *limits, struct error *err);
 
+/* The bundle's root: `dir`, or below it as long as a folder holds nothing but one folder; the caller's (mem_free). */
+enum status bundle_root(const char *dir, char **root, struct error *err);
+
 /* Reads an unpacked bundle: cameras, mesh, photographs. Collects as many problems as possible, each an object
  * {"file", "reason"} with an optional "hint", in the array `problems`; then returns STATUS_INPUT with a summary in
  * *err. Other statuses are failures of the machine. `reading` says how it is to be read (NULL: as the bundle says). The

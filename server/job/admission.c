@@ -3,12 +3,18 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "common/json.h"
 #include "common/machine.h"
+#include "common/mem.h"
 #include "common/settings.h"
 #include "server/job/memory.h"
 
+/* Memory of a render: of the program with its threads, and for each byte of the room and the textures in their files.
+ * TODO-MEASURE */
+#define RENDER_BYTES (64.0 * 0x1p20)
+#define RENDER_FACTOR 6.0
 #define HINT "It begins when others have ended. A smaller texture_size needs less memory."
 
 void admission_init(struct admission *a, uint64_t limit_bytes, uint64_t worker_limit_bytes) {
@@ -22,7 +28,7 @@ static double side_of(const struct job *job, double fallback) {
     int threads = 1;
     cJSON *given = cJSON_Parse(job->settings);
     buf_init(&what, 4096);
-    cJSON *reduced = memory_reduce(given, job->memory_step, &threads, &what);
+    cJSON *reduced = memory_reduce(job->kind, given, job->memory_step, &threads, &what);
     settings_init(&settings);
     double side = settings_apply(&settings, reduced, NULL, NULL) == STATUS_OK
                       ? settings_number(&settings, "texture_size")
@@ -48,15 +54,38 @@ double admission_need(const struct admission *a, const char *text, const struct 
     return a->worker_limit_bytes > 0 ? fmin(bytes, (double)a->worker_limit_bytes) : bytes;
 }
 
+/* A render holds the room and its textures, which are larger there than in their files. */
+static enum status need_of_render(const struct admission *a, struct store *store, const struct job *job, double *need,
+                                  struct error *err) {
+    struct output_row *rows = NULL;
+    size_t count = 0;
+    double bytes = 0.0;
+    enum status status = store_output_list(store, job->source_id, &rows, &count, err);
+    for (size_t i = 0; i < count; i++) {
+        size_t length = strlen(rows[i].name);
+        bool is_read = !strchr(rows[i].name, '/') && length > 4 &&
+                       (strcmp(rows[i].name + length - 4, ".exr") == 0 || strcmp(rows[i].name, JOB_SOURCE_OUTPUT) == 0);
+        bytes += is_read ? (double)rows[i].bytes : 0.0;
+        output_row_release(&rows[i]);
+    }
+    mem_free(rows);
+    *need = RENDER_BYTES + RENDER_FACTOR * bytes;
+    if (a->worker_limit_bytes > 0)
+        *need = fmin(*need, (double)a->worker_limit_bytes);
+    return status;
+}
+
 static enum status find_need(const struct admission *a, struct store *store, int64_t id, double *need,
                              struct error *err) {
     struct job job = {0};
     struct scene_row scene = {0};
     *need = 0.0;
     enum status status = store_job_get(store, id, &job, err);
-    if (status == STATUS_OK)
+    if (status == STATUS_OK && job.kind == JOB_RENDER)
+        status = need_of_render(a, store, &job, need, err);
+    else if (status == STATUS_OK)
         status = store_scene_get(store, job.scene_id, &scene, err);
-    if (status == STATUS_OK)
+    if (status == STATUS_OK && job.kind != JOB_RENDER)
         *need = admission_need(a, scene.facts, &job);
     scene_row_release(&scene);
     job_release(&job);
@@ -68,7 +97,9 @@ static enum status tell(struct admission *a, struct store *store, int64_t id, do
     char reason[200];
     if (a->told_id == id)
         return STATUS_OK;
-    enum status status = a->told_id == 0 ? STATUS_OK : store_job_explain(store, 0, "", ADMISSION_REASON, "", err);
+    enum status status = a->told_id == 0
+                             ? STATUS_OK
+                             : store_job_explain(store, a->told_id > 0 ? a->told_id : 0, "", ADMISSION_REASON, "", err);
     if (status != STATUS_OK)
         return status;
     a->told_id = 0;

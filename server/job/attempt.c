@@ -42,6 +42,27 @@ static enum status disk_left(const struct scheduler_config *config, struct store
     return status;
 }
 
+/* What orders for jobs of all kinds have. Takes settings. */
+static cJSON *new_job_order(const struct attempt *a, const struct scheduler_config *config, const struct job *job,
+                            int thread_count, uint64_t disk_bytes, cJSON *settings) {
+    cJSON *order = new_order(job_kind_name(job->kind), config, thread_count);
+    json_add_string(order, "scene_id", job->scene_id);
+    json_add_string(order, "name", job->name);
+    json_add_int(order, "job_id", job->id);
+    json_add_int(order, "attempt", a->number);
+    json_add_int(order, "memory_step", job->memory_step);
+    json_add_int(order, "disk_bytes", (int64_t)disk_bytes);
+    json_add(order, "settings", settings);
+    return order;
+}
+
+/* What a reconstruction's order has besides. */
+static void complete_order(cJSON *order, const struct scheduler_config *config, const struct buf *reduced) {
+    json_add_number(order, "checkpoint_interval_sec", config->checkpoint_interval_sec);
+    if (reduced->length > 0)
+        json_add_string(order, "reduced", buf_text(reduced));
+}
+
 /* The order of an attempt; *order is the caller's. */
 static enum status order_job(const struct attempt *a, const struct scheduler_config *config, struct store *store,
                              const struct job *job, const struct scene_row *row, int thread_count, cJSON **out,
@@ -55,40 +76,71 @@ static enum status order_job(const struct attempt *a, const struct scheduler_con
         return status;
     struct buf reduced;
     buf_init(&reduced, 4096);
-    cJSON *smaller = memory_reduce(settings, job->memory_step, &thread_count, &reduced);
-    cJSON *order = new_order("reconstruct", config, thread_count);
-    json_add_string(order, "scene_id", job->scene_id);
-    json_add(order, "reading", fit_reading(row));
-    json_add_string(order, "name", job->name);
-    json_add_int(order, "job_id", job->id);
-    json_add_int(order, "attempt", a->number);
-    json_add_number(order, "checkpoint_interval_sec", config->checkpoint_interval_sec);
-    json_add_int(order, "memory_step", job->memory_step);
-    json_add_int(order, "disk_bytes", (int64_t)disk_bytes);
-    json_add(order, "settings", smaller);
-    if (reduced.length > 0)
-        json_add_string(order, "reduced", buf_text(&reduced));
+    cJSON *smaller = memory_reduce(job->kind, settings, job->memory_step, &thread_count, &reduced);
+    *out = new_job_order(a, config, job, thread_count, disk_bytes, smaller);
+    if (job->kind != JOB_RENDER)
+        json_add(*out, "reading", fit_reading(row));
+    if (job->kind == JOB_RECONSTRUCT)
+        complete_order(*out, config, &reduced);
     cJSON_Delete(settings);
     buf_release(&reduced);
-    *out = order;
     return STATUS_OK;
+}
+
+/* The folder with all outputs of the job's source, relative to the data folder; the caller's. */
+static enum status find_outputs(struct store *store, int64_t source, char **folder, struct error *err) {
+    struct output_row row = {0};
+    *folder = NULL;
+    enum status status = store_source_look(store, source, err);
+    if (status == STATUS_OK)
+        status = store_output_get(store, source, JOB_SOURCE_OUTPUT, &row, err);
+    if (status == STATUS_OK) {
+        char *dir = layout_attempt(NULL, source, row.attempt);
+        *folder = layout_out(dir);
+        mem_free(dir);
+    }
+    output_row_release(&row);
+    /* What it reads has gone, or is no longer as it was when the job was submitted: a retry would not help. */
+    if (status == STATUS_CONFLICT && err)
+        status = err->status = STATUS_INPUT;
+    return status;
+}
+
+/* Prepares the attempt's folder. What another kind than a reconstruction has finished is its checkpoint: `anew` begins
+ * without. */
+static enum status prepare_folder(const struct attempt *a, const struct scheduler_config *config, const struct job *job,
+                                  bool anew, struct error *err) {
+    enum status status = attempt_folder_begin(config->data_dir, job->id, a->number, err);
+    if (status == STATUS_OK && job->kind != JOB_RECONSTRUCT && !anew)
+        status = attempt_folder_carry_outputs(config->data_dir, job->id, a->number, err);
+    return status;
 }
 
 /* Prepares the attempt's folder and starts its run. */
 static enum status run_job(struct attempt *a, const struct scheduler_config *config, struct store *store,
-                           const struct job *job, const struct scene_row *row, struct error *err) {
+                           const struct job *job, const struct scene_row *row, bool anew, struct error *err) {
     cJSON *order = NULL;
+    char *outputs = NULL, *files = job->kind == JOB_RENDER ? layout_job_files(NULL, job->id) : NULL;
     enum status status = order_job(a, config, store, job, row, a->thread_count, &order, err);
+    if (status == STATUS_OK && job->source_id)
+        status = find_outputs(store, job->source_id, &outputs, err);
     if (status == STATUS_OK)
-        status = attempt_folder_begin(config->data_dir, job->id, a->number, err);
+        status = prepare_folder(a, config, job, anew, err);
     char *folder = layout_attempt(NULL, job->id, a->number), *home = layout_job(NULL, job->id), *log = layout_log(home);
-    const struct run_work work = {.folder = folder, .log = log, .scene_id = job->scene_id, .order = order};
+    const struct run_work work = {.folder = folder,
+                                  .log = log,
+                                  .scene_id = job->kind == JOB_RENDER ? NULL : job->scene_id,
+                                  .outputs = outputs,
+                                  .files = files,
+                                  .order = order};
     if (status == STATUS_OK)
         status = config->executor->start(config->executor, &work, &a->run, err);
     cJSON_Delete(order);
     mem_free(log);
     mem_free(home);
     mem_free(folder);
+    mem_free(outputs);
+    mem_free(files);
     return status;
 }
 
@@ -117,9 +169,11 @@ static bool ignores_fit(const char *settings) {
 }
 
 /* A job whose scene was rejected, or does not fit, is started only to fail, so that its user is told. *row is the
- * caller's in any case. */
+ * caller's in any case. A render reads no scene. */
 static enum status check_scene(struct store *store, const struct job *job, struct scene_row *row, struct error *err) {
     const char *scene_id = job->scene_id;
+    if (job->kind == JOB_RENDER)
+        return STATUS_OK;
     enum status status = store_scene_get(store, scene_id, row, err);
     if (status == STATUS_OK && row->state != SCENE_READY) {
         cJSON *problems = cJSON_Parse(row->problems);
@@ -130,7 +184,8 @@ static enum status check_scene(struct store *store, const struct job *job, struc
         status = error_hint(err, "`unbake scenes show %.12s`, or GET /v1/scenes/%.12s, lists its problems.", scene_id,
                             scene_id);
         cJSON_Delete(problems);
-    } else if (status == STATUS_OK && !ignores_fit(job->settings) && fit_check(row, NULL, err) != STATUS_OK) {
+    } else if (status == STATUS_OK && job->kind == JOB_RECONSTRUCT && !ignores_fit(job->settings) &&
+               fit_check(row, NULL, err) != STATUS_OK) {
         status = err->status = STATUS_INPUT;
     }
     return status;
@@ -143,7 +198,7 @@ static enum status restart(const struct attempt *a, const struct scheduler_confi
     if (!job->restart_from[0])
         return STATUS_OK;
     enum status status = STATUS_OK;
-    if (job_stage_parse(job->restart_from, &keeps_checkpoint) && !keeps_checkpoint)
+    if (job_stage_parse(job->kind, job->restart_from, &keeps_checkpoint) && !keeps_checkpoint)
         status = attempt_folder_drop_checkpoint(config->data_dir, job->id, err);
     return status == STATUS_OK ? store_job_restarted(store, job->id, a->number, err) : status;
 }
@@ -176,6 +231,7 @@ enum status attempt_start_job(struct attempt *a, const struct scheduler_config *
     struct job job;
     struct scene_row scene = {0};
     struct error why = {0};
+    bool anew = false;
     int number;
     enum status status = store_job_start(store, job_id, config->executor->name, &number, err);
     if (status == STATUS_CONFLICT || status == STATUS_NOT_FOUND)
@@ -193,6 +249,8 @@ enum status attempt_start_job(struct attempt *a, const struct scheduler_config *
     if (status == STATUS_OK) {
         memcpy(a->scene_id, job.scene_id, sizeof a->scene_id);
         a->owner_id = job.owner_id;
+        a->kind = job.kind;
+        anew = job.restart_from[0] != '\0';
         if (number == 1 && job.started_ms > job.created_ms)
             atomic_fetch_add(&counters->first_wait_ms, (unsigned long long)(job.started_ms - job.created_ms));
         atomic_fetch_add(&counters->first_start_count, number == 1);
@@ -206,7 +264,7 @@ enum status attempt_start_job(struct attempt *a, const struct scheduler_config *
     if (status == STATUS_OK)
         status = restart(a, config, store, &job, &why);
     if (status == STATUS_OK)
-        status = run_job(a, config, store, &job, &scene, &why);
+        status = run_job(a, config, store, &job, &scene, anew, &why);
     scene_row_release(&scene);
     job_release(&job);
     if (status == STATUS_OK) {

@@ -23,6 +23,7 @@ enum attempt_phase { ATTEMPT_EMPTY, ATTEMPT_ALIVE, ATTEMPT_ENDED };
 struct attempt {
     enum attempt_phase phase;
     int64_t job_id;     /* 0: the check of a scene */
+    enum job_kind kind; /* of the job */
     int64_t owner_id;   /* the owner of the job or scene */
     double charged_sec; /* CPU time that was charged to that user */
     int number;         /* fences what is written for the job */

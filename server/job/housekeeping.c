@@ -57,11 +57,12 @@ void housekeeping_tidy_job(const char *data_dir, struct store *store, int64_t jo
 }
 
 void housekeeping_after_kill(const struct scheduler_config *config, struct store *store) {
+    static const struct job_filter running = {.state = JOB_RUNNING, .kind = -1};
     struct job jobs[16];
     struct error err;
     size_t count = sizeof jobs / sizeof *jobs;
     for (int64_t before = 0; count == sizeof jobs / sizeof *jobs;) {
-        if (store_job_list(store, NULL, JOB_RUNNING, before, sizeof jobs / sizeof *jobs, jobs, &count, &err) !=
+        if (store_job_list(store, NULL, &running, before, sizeof jobs / sizeof *jobs, jobs, &count, &err) !=
             STATUS_OK) {
             log_warning("what killed jobs left cannot be removed: %s", err.message);
             return;

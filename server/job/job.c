@@ -33,6 +33,21 @@ bool job_state_parse(const char *name, enum job_state *state) {
     return false;
 }
 
+static const char *const kind_names[JOB_KIND_COUNT] = {
+    [JOB_RECONSTRUCT] = JOB_KIND_RECONSTRUCT, [JOB_RENDER] = JOB_KIND_RENDER, [JOB_EVALUATE] = JOB_KIND_EVALUATE};
+
+const char *job_kind_name(enum job_kind kind) { return (unsigned)kind < JOB_KIND_COUNT ? kind_names[kind] : "unknown"; }
+
+bool job_kind_parse(const char *name, enum job_kind *kind) {
+    for (unsigned i = 0; i < JOB_KIND_COUNT; i++) {
+        if (strcmp(name, kind_names[i]) == 0) {
+            *kind = (enum job_kind)i;
+            return true;
+        }
+    }
+    return false;
+}
+
 const char *job_wanted_name(enum job_wanted wanted) {
     static const char *const names[] = {"run", "pause", "cancel"};
     return (unsigned)wanted < 3 ? names[wanted] : "unknown";
@@ -72,14 +87,17 @@ bool job_may_become(enum job_state from, enum job_state to) {
     return (unsigned)from < JOB_STATE_COUNT && (unsigned)to < JOB_STATE_COUNT && arrow[from][to];
 }
 
-bool job_stage_parse(const char *name, bool *keeps_checkpoint) {
+bool job_stage_parse(enum job_kind kind, const char *name, bool *keeps_checkpoint) {
     static const struct {
+        enum job_kind kind;
         const char *name;
         bool keeps_checkpoint;
-    } stages[] = {{"load", false},   {"prepare", false}, {"fuse", false}, {"solve", false},
-                  {"refine", false}, {"report", true},   {"export", true}};
+    } stages[] = {
+        {JOB_RECONSTRUCT, "load", false},  {JOB_RECONSTRUCT, "prepare", false}, {JOB_RECONSTRUCT, "fuse", false},
+        {JOB_RECONSTRUCT, "solve", false}, {JOB_RECONSTRUCT, "refine", false},  {JOB_RECONSTRUCT, "report", true},
+        {JOB_RECONSTRUCT, "export", true}, {JOB_RENDER, "render", false},       {JOB_EVALUATE, "evaluate", false}};
     for (size_t i = 0; i < sizeof stages / sizeof *stages; i++) {
-        if (strcmp(name, stages[i].name) == 0) {
+        if (stages[i].kind == kind && strcmp(name, stages[i].name) == 0) {
             *keeps_checkpoint = stages[i].keeps_checkpoint;
             return true;
         }
@@ -87,7 +105,14 @@ bool job_stage_parse(const char *name, bool *keeps_checkpoint) {
     return false;
 }
 
+const char *job_stages(enum job_kind kind) {
+    return kind == JOB_RENDER     ? "render"
+           : kind == JOB_EVALUATE ? "evaluate"
+                                  : "load, prepare, fuse, solve, refine, report, export";
+}
+
 void job_release(struct job *job) {
+    mem_free(job->files);
     mem_free(job->owner);
     mem_free(job->name);
     mem_free(job->labels);

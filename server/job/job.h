@@ -26,6 +26,7 @@
 
 /* Stored as numbers in state.db: the order is part of its schema. */
 enum job_state { JOB_QUEUED, JOB_RUNNING, JOB_PAUSED, JOB_SUCCEEDED, JOB_FAILED, JOB_CANCELLED };
+enum job_kind { JOB_RECONSTRUCT, JOB_RENDER, JOB_EVALUATE };
 enum job_wanted { JOB_WANT_RUN, JOB_WANT_PAUSE, JOB_WANT_CANCEL };
 enum scene_state { SCENE_RECEIVING, SCENE_CHECKING, SCENE_READY, SCENE_REJECTED };
 
@@ -41,11 +42,14 @@ enum attempt_row_phase { ATTEMPT_ROW_FORMER, ATTEMPT_ROW_RUNNING, ATTEMPT_ROW_EN
 #define ENDING_RESTARTED "restarted" /* the daemon, or the machine, died */
 
 #define JOB_STATE_COUNT 6
+#define JOB_KIND_COUNT 3
 #define SCENE_STATE_COUNT 4
 
 /* The words of common/protocol.h. Parsing: false for an unknown word. */
 const char *job_state_name(enum job_state state);
 bool job_state_parse(const char *name, enum job_state *state);
+const char *job_kind_name(enum job_kind kind);
+bool job_kind_parse(const char *name, enum job_kind *kind);
 const char *job_wanted_name(enum job_wanted wanted); /* "run", "pause", "cancel" */
 const char *scene_state_name(enum scene_state state);
 bool scene_state_parse(const char *name, enum scene_state *state);
@@ -53,20 +57,26 @@ bool job_is_terminal(enum job_state state);
 /* Whether the diagram above has an arrow between the states. */
 bool job_may_become(enum job_state from, enum job_state to);
 
-/* The stages that a retry may begin with. *keeps_checkpoint: for a stage before the end of the optimisation, it
- * starts over without one. */
-bool job_stage_parse(const char *name, bool *keeps_checkpoint);
+/* The stages that a retry of a job of that kind may begin with. *keeps_checkpoint: for a stage before the end of the
+ * optimisation, it starts over without one. */
+bool job_stage_parse(enum job_kind kind, const char *name, bool *keeps_checkpoint);
+const char *job_stages(enum job_kind kind); /* all of them, for people */
 
 #define SCENE_ID_SIZE 65 /* the SHA-256 of the uploaded content, in hex, and the NUL */
 
 /* A row of the jobs table. Strings are owned; job_release frees them. */
 struct job {
     int64_t id;
+    enum job_kind kind;
+    int64_t source_id; /* the reconstruction whose outputs it reads; 0: none */
+    double cost;       /* of a render: paths from the camera; 0: not known */
+    char *files;      /* that its settings name: JSON array text of {"name", "bytes", "sha256"}, the last two null where
+                        * one has not been sent yet */
     int64_t revision; /* grows by one with every change; in the ETag */
-    char scene_id[SCENE_ID_SIZE];
-    int64_t owner_id; /* the user who submitted it; 0: nobody */
-    char *owner;      /* that user's name; "" */
-    bool is_shared;   /* with the lab: every caller may read it */
+    char scene_id[SCENE_ID_SIZE]; /* of a render: its source's, which may be gone */
+    int64_t owner_id;             /* the user who submitted it; 0: nobody */
+    char *owner;                  /* that user's name; "" */
+    bool is_shared;               /* with the lab: every caller may read it */
     char *name;
     char *labels;   /* JSON object text */
     char *settings; /* JSON object text, as submitted */

@@ -23,7 +23,7 @@ static void replace(cJSON *settings, const char *name, double present, double sm
     buf_printf(what, "%s%s %.0f", what->length ? ", " : "", name, smaller);
 }
 
-cJSON *memory_reduce(const cJSON *settings, int step, int *thread_count, struct buf *what) {
+cJSON *memory_reduce(enum job_kind kind, const cJSON *settings, int step, int *thread_count, struct buf *what) {
     cJSON *smaller = cJSON_Duplicate(settings, true);
     struct settings full;
     int threads = (int)halved(*thread_count, step, 1.0);
@@ -31,7 +31,7 @@ cJSON *memory_reduce(const cJSON *settings, int step, int *thread_count, struct 
         buf_printf(what, "%d thread%s", threads, threads == 1 ? "" : "s");
     *thread_count = threads;
     settings_init(&full);
-    if (settings_apply(&full, settings, NULL, NULL) == STATUS_OK) {
+    if (kind == JOB_RECONSTRUCT && settings_apply(&full, settings, NULL, NULL) == STATUS_OK) {
         double texels = settings_number(&full, "texels_per_iteration");
         double side = settings_number(&full, "texture_size");
         replace(smaller, "texels_per_iteration", texels, halved(texels, 2 * step, TEXELS_LEAST), what);
@@ -41,13 +41,13 @@ cJSON *memory_reduce(const cJSON *settings, int step, int *thread_count, struct 
     return smaller;
 }
 
-bool memory_can_reduce(const cJSON *settings, int step, int thread_count, struct buf *what) {
+bool memory_can_reduce(enum job_kind kind, const cJSON *settings, int step, int thread_count, struct buf *what) {
     struct buf present;
     int threads = thread_count;
     buf_init(&present, 4096);
-    cJSON_Delete(memory_reduce(settings, step, &threads, &present));
+    cJSON_Delete(memory_reduce(kind, settings, step, &threads, &present));
     threads = thread_count;
-    cJSON_Delete(memory_reduce(settings, step + 1, &threads, what));
+    cJSON_Delete(memory_reduce(kind, settings, step + 1, &threads, what));
     bool differs = strcmp(buf_text(&present), buf_text(what)) != 0;
     buf_release(&present);
     return differs;

@@ -8,12 +8,13 @@
 
 #include "common/buf.h"
 #include "common/json.h"
+#include "server/job/job.h"
 
 /* A copy of the job's settings, and its threads, after `step` reductions. Appends to *what, for people, what is
  * smaller: "1 thread, texels_per_iteration 1024"; nothing if nothing is. */
-cJSON *memory_reduce(const cJSON *settings, int step, int *thread_count, struct buf *what);
+cJSON *memory_reduce(enum job_kind kind, const cJSON *settings, int step, int *thread_count, struct buf *what);
 
 /* Whether another reduction is possible; *what (appended to) describes it. */
-bool memory_can_reduce(const cJSON *settings, int step, int thread_count, struct buf *what);
+bool memory_can_reduce(enum job_kind kind, const cJSON *settings, int step, int thread_count, struct buf *what);
 
 #endif

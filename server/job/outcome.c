@@ -120,7 +120,7 @@ static enum status settle_memory(const struct attempt *a, struct store *store, c
     buf_init(&what, 4096);
     buf_init(&reason, 4096);
     buf_puts(&reason, v->reason);
-    if (memory_can_reduce(settings, step, a->thread_count, &what)) {
+    if (memory_can_reduce(a->kind, settings, step, a->thread_count, &what)) {
         step++;
         buf_printf(&reason, "; a further attempt works with %s", buf_text(&what));
     }

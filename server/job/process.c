@@ -180,15 +180,26 @@ static enum status spawn_in(struct process *p, const char *binary, const char *d
     return status;
 }
 
-/* The order, with where the scene's files lie on this machine. */
+/* Says where on this machine a folder lies that the worker reads. */
+static void add_folder(cJSON *order, const char *key, const char *data_dir, const char *folder) {
+    if (!folder)
+        return;
+    char *path = file_join(data_dir, folder);
+    cJSON_DeleteItemFromObjectCaseSensitive(order, key);
+    json_add_string(order, key, path);
+    mem_free(path);
+}
+
+/* The order, with where that lies on this machine which the worker reads. */
 static enum status write_order(const char *data_dir, const char *dir, const struct run_work *work, struct error *err) {
     if (work->scene_id) {
-        char *scene = layout_scene(data_dir, work->scene_id), *files = layout_files(scene);
-        cJSON_DeleteItemFromObjectCaseSensitive(work->order, "scene");
-        json_add_string(work->order, "scene", files);
+        char *scene = layout_scene(NULL, work->scene_id), *files = layout_files(scene);
+        add_folder(work->order, "scene", data_dir, files);
         mem_free(files);
         mem_free(scene);
     }
+    add_folder(work->order, "outputs", data_dir, work->outputs);
+    add_folder(work->order, "files", data_dir, work->files);
     char *text = json_text(work->order), *path = layout_order(dir);
     enum status status = file_replace(path, text, strlen(text), err);
     mem_free(path);

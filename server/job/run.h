@@ -44,7 +44,9 @@ struct run_work {
     const char *folder;   /* in which it is done: a scene's, an attempt's or a message's; exists */
     const char *log;      /* file to which is appended what it prints */
     const char *scene_id; /* whose files it reads; NULL: none */
-    cJSON *order;         /* server/worker/order.h; the executor adds where the scene lies */
+    const char *outputs;  /* folder of another job's outputs that it reads; NULL: none */
+    const char *files;    /* folder of files that were sent to the job; NULL: none */
+    cJSON *order;         /* server/worker/order.h; the executor adds where scene, outputs and files lie */
 };
 
 typedef void run_hear(void *user, const char *line, size_t length); /* without the newline */

@@ -4,8 +4,8 @@
  * until a worker says something, ends, must be killed, or somebody calls. While nothing happens
  * it does not wake up.
  *
- * Slots 0 .. max_running - 1 run jobs, the others check scenes: a check is short and must not
- * wait behind hours of work, nor behind another user's checks: checks.c. */
+ * Slots 0 .. max_running - 1 run jobs, the next small_renders small renders, the others check scenes: a check and a
+ * small render are short and must not wait behind hours of work; nor a check behind another user's: checks.c. */
 #include "server/job/scheduler.h"
 
 #include <errno.h>
@@ -41,13 +41,13 @@ struct scheduler {
     atomic_int running;
     struct counters counters;
     atomic_ulong rounds;
-    size_t job_slots, slot_count;
-    struct attempt *slot; /* [slot_count]; the first job_slots run jobs */
+    size_t main_slots, job_slots, slot_count;
+    struct attempt *slot; /* [slot_count]; the first job_slots run jobs, of those from main_slots on small renders */
     struct checks checks;
-    struct trash *trash;    /* NULL: this thread removes trees itself */
-    bool must_retry;        /* something failed that may work later */
-    double housekeeping_at; /* when it is due, as clock_sec */
-    struct admission admission;
+    struct trash *trash;                         /* NULL: this thread removes trees itself */
+    bool must_retry;                             /* something failed that may work later */
+    double housekeeping_at;                      /* when it is due, as clock_sec */
+    struct admission admission, small_admission; /* of the lanes */
     struct disk_watch disk;
     atomic_bool waits_for_disk; /* disk.is_low, for other threads */
     uint64_t check_room;        /* free bytes above which scenes that had too little are checked again; 0: none waits */
@@ -67,11 +67,15 @@ enum status scheduler_new(struct scheduler **out, const struct scheduler_config 
     s->wake_fd = fd;
     disk_init(&s->disk, config->low_disk_bytes);
     admission_init(&s->admission, config->jobs_memory_bytes, config->worker_memory_bytes);
+    admission_init(&s->small_admission, config->jobs_memory_bytes, config->worker_memory_bytes);
     if (s->config.thread_count <= 0) {
         cpu_set_t set;
         s->config.thread_count = sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : 1;
     }
-    s->job_slots = (size_t)(config->max_running > 0 ? config->max_running : 1);
+    s->main_slots = (size_t)(config->max_running > 0 ? config->max_running : 1);
+    s->job_slots = s->main_slots + (size_t)config->small_renders;
+    if (config->small_renders == 0)
+        s->config.small_render_cost = 0.0; /* without a lane of their own they wait with the others */
     s->slot_count = s->job_slots + (size_t)(config->max_checks > 0 ? config->max_checks : CHECKS_AT_ONCE);
     s->slot = mem_calloc(s->slot_count, sizeof *s->slot);
     s->poll = mem_calloc(1 + RUN_FDS * (s->slot_count + DELIVERIES_AT_ONCE), sizeof *s->poll);
@@ -119,7 +123,7 @@ static void retry_later(struct scheduler *s, const char *what, const struct erro
  * started with, so the shares are approximate. */
 static int thread_share(struct scheduler *s) {
     struct store_counts counts;
-    int64_t limit = (int64_t)s->job_slots, sharing = 1;
+    int64_t limit = (int64_t)s->main_slots, sharing = 1;
     if (store_count(s->store, &counts, NULL) == STATUS_OK)
         sharing = counts.jobs_by_state[JOB_QUEUED] + counts.jobs_by_state[JOB_RUNNING];
     sharing = sharing < 1 ? 1 : sharing > limit ? limit : sharing;
@@ -138,21 +142,33 @@ static void charge_all(struct scheduler *s) {
     (void)store_usage_pay(s->store, NULL); /* charges that failed earlier */
 }
 
+/* Threads of one small render: those of the lane are shared by its slots. */
+static int small_thread_share(const struct scheduler *s) {
+    int threads = s->config.small_render_threads > 0 ? s->config.small_render_threads : s->config.thread_count;
+    int share = threads / (int)(s->job_slots - s->main_slots);
+    return share > 0 ? share : 1;
+}
+
 /* Whether there is memory for the job beside those that run. */
-static enum status ask_admission(struct scheduler *s, int64_t id, bool *may, double *need, struct error *err) {
+static enum status ask_admission(struct scheduler *s, bool is_small, int64_t id, bool *may, double *need,
+                                 struct error *err) {
     size_t running = 0;
     double used = 0.0;
     for (size_t i = 0; i < s->job_slots; i++) {
         running += s->slot[i].phase == ATTEMPT_ALIVE;
         used += s->slot[i].phase == ATTEMPT_ALIVE ? s->slot[i].memory_bytes : 0.0;
     }
-    return admission_ask(&s->admission, s->store, id, running, used, may, need, err);
+    struct admission *a = is_small ? &s->small_admission : &s->admission;
+    enum status status = admission_ask(a, s->store, id, running, used, may, need, err);
+    s->admission.total_bytes = s->small_admission.total_bytes = a->total_bytes;
+    return status;
 }
 
-static void start_jobs(struct scheduler *s) {
-    if (s->disk.is_low)
-        return;
-    for (size_t i = 0; i < s->job_slots; i++) {
+/* Fills the slots of a lane. */
+static void start_lane(struct scheduler *s, bool is_small) {
+    const struct job_lane lane = {s->config.small_render_cost, is_small};
+    size_t end = is_small ? s->job_slots : s->main_slots;
+    for (size_t i = is_small ? s->main_slots : 0; i < end; i++) {
         struct error err;
         bool may = true;
         double need = 0.0;
@@ -160,15 +176,16 @@ static void start_jobs(struct scheduler *s) {
         while (s->slot[i].phase == ATTEMPT_EMPTY) {
             int64_t id;
             charge_all(s);
-            enum status status = store_job_next(s->store, s->config.user_max_running, &id, &err);
+            enum status status = store_job_next(s->store, s->config.user_max_running, &lane, &id, &err);
             if (status == STATUS_NOT_FOUND)
                 return;
             if (status == STATUS_OK)
-                status = ask_admission(s, id, &may, &need, &err);
+                status = ask_admission(s, is_small, id, &may, &need, &err);
             if (status == STATUS_OK && !may)
                 return;
             if (status == STATUS_OK)
-                status = attempt_start_job(&s->slot[i], &s->config, s->store, &s->counters, id, thread_share(s), &err);
+                status = attempt_start_job(&s->slot[i], &s->config, s->store, &s->counters, id,
+                                           is_small ? small_thread_share(s) : thread_share(s), &err);
             if (status != STATUS_OK) {
                 retry_later(s, "cannot start a job", &err);
                 return;
@@ -176,6 +193,13 @@ static void start_jobs(struct scheduler *s) {
             s->slot[i].memory_bytes = need;
         }
     }
+}
+
+static void start_jobs(struct scheduler *s) {
+    if (s->disk.is_low)
+        return;
+    start_lane(s, true);
+    start_lane(s, false);
 }
 
 /* A check that fails for lack of space fills the disk for a moment. It is retried only when there is clearly more
@@ -290,7 +314,7 @@ static void watch_disk(struct scheduler *s) {
     atomic_store(&s->waits_for_disk, s->disk.is_low);
     if (!changed && !s->disk.is_low)
         return;
-    s->admission.told_id = -1; /* the reason that a job waits is the disk now, or none */
+    s->admission.told_id = s->small_admission.told_id = -1; /* the reason that a job waits is the disk now, or none */
     for (size_t i = 0; s->disk.is_low && i < s->job_slots; i++)
         ask_to_stop(s, &s->slot[i]);
     if (store_job_explain(s->store, 0, s->disk.is_low ? s->disk.reason : "", DISK_REASON,

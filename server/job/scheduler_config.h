@@ -11,6 +11,9 @@ struct scheduler_config {
     const char *data_dir;             /* borrowed; holds scenes/ID/, jobs/ID/ */
     const struct executor *executor;  /* borrowed; runs jobs, checks of scenes and what calls webhooks (run.h) */
     int max_running;                  /* jobs at once */
+    int small_renders;                /* small renders at once, besides; 0: they wait with the other jobs */
+    int small_render_threads;         /* shared between these; 0: all processors */
+    double small_render_cost;         /* paths that a small render traces at the most (job.h) */
     int user_max_running;             /* jobs of one user at once; 0: no limit */
     int max_checks;                   /* checks of scenes at once; 0: CHECKS_AT_ONCE */
     int thread_count;                 /* shared between running jobs; 0: all processors */

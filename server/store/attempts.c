@@ -97,10 +97,10 @@ enum status store_job_start(struct store *store, int64_t id, const char *executo
     if (now.state != JOB_QUEUED)
         status = transition_forbidden(&now, "started", err);
     if (status == STATUS_OK)
-        status =
-            sql_int(&store->sql, 0, &is_unchecked, err,
-                    "SELECT 1 FROM jobs JOIN scenes ON scenes.id = scene_id WHERE jobs.id = ? AND scenes.state < ?",
-                    "in", id, (int)SCENE_READY);
+        status = sql_int(&store->sql, 0, &is_unchecked, err,
+                         "SELECT 1 FROM jobs JOIN scenes ON scenes.id = scene_id WHERE jobs.id = ? AND scenes.state < ?"
+                         " AND kind <> 1",
+                         "in", id, (int)SCENE_READY);
     if (is_unchecked)
         status = error_set(err, STATUS_CONFLICT, "the scene of job %lld is being checked", (long long)id);
     if (status == STATUS_OK) {

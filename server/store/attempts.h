@@ -66,11 +66,17 @@ enum status store_job_block(struct store *store, int64_t id, int attempt, const 
  * unknown. */
 enum status store_reconcile(struct store *store, size_t *requeued, struct error *err);
 
-/* The queued job to start next, among those whose scene has been checked (ready, or rejected: such a job is started
- * only to fail); STATUS_NOT_FOUND if none. Among the users with fewer than user_max_running running jobs (0: no
- * limit), the one with the least recent CPU time; of that user's jobs the one of highest priority, then the first in
+/* Two lanes, so that small renders do not wait behind hours of work. */
+struct job_lane {
+    double small_cost; /* renders of at most this cost (job.h) are small; 0: none is */
+    bool is_small;     /* the lane of the small ones; else that of all others */
+};
+/* The queued job to start next in that lane (NULL: there is but one), among those whose scene has been checked (ready, or rejected: such a job is started
+ * only to fail); a render needs no scene. STATUS_NOT_FOUND if none. Among the users with fewer than user_max_running
+ * running jobs in the lane (0: no limit), the one with the least recent CPU time; of that user's jobs the one of highest priority, then the first in
  * turn. */
-enum status store_job_next(struct store *store, int user_max_running, int64_t *id, struct error *err);
+enum status store_job_next(struct store *store, int user_max_running, const struct job_lane *lane, int64_t *id,
+                           struct error *err);
 /* Running jobs and the requests to them, for the scheduler. Fills ids[limit], wanted[limit]. */
 enum status store_job_running(struct store *store, size_t limit, int64_t *ids, enum job_wanted *wanted, size_t *count,
                               struct error *err);

@@ -69,13 +69,15 @@ enum status store_end(struct store *store, enum status status, int64_t changed_j
 int64_t store_now_ms(void); /* Unix time */
 
 /* When a row may go, as SQL over its table: Unix milliseconds, 0 for never; see retention.h. States
- * up to 2 are those of jobs that have not ended; a scene in state 1 is being checked. */
-#define JOB_EXPIRES                                                                                                    \
-    "(CASE WHEN pinned = 1 OR state <= 2 THEN 0 WHEN expires_ms > 0 THEN expires_ms"                                   \
+ * up to 2 are those of jobs that have not ended; a scene in state 1 is being checked. A job stays while another that has
+ * not ended reads its outputs; kind 1, renders, read nothing of their scene. */
+#define JOB_EXPIRES                                                                                                          \
+    "(CASE WHEN pinned = 1 OR state <= 2 OR EXISTS (SELECT 1 FROM jobs AS reader WHERE"                                      \
+    " reader.source_id = jobs.id AND reader.source_id > 0 AND reader.state <= 2) THEN 0 WHEN expires_ms > 0 THEN expires_ms" \
     " ELSE (SELECT iif(job_ms > 0, finished_ms + job_ms, 0) FROM retention) END)"
 #define SCENE_EXPIRES                                                                                                  \
     "(CASE WHEN pinned = 1 OR state = 1 OR EXISTS (SELECT 1 FROM jobs WHERE"                                           \
-    " scene_id = scenes.id AND jobs.state <= 2) THEN 0 WHEN expires_ms > 0 THEN expires_ms"                            \
+    " scene_id = scenes.id AND jobs.state <= 2 AND jobs.kind <> 1) THEN 0 WHEN expires_ms > 0 THEN expires_ms"         \
     " ELSE (SELECT iif(scene_ms > 0, scene_ms + max(scenes.created_ms,"                                                \
     " ifnull((SELECT max(created_ms) FROM scene_owners WHERE scene_id = scenes.id), 0),"                               \
     " ifnull((SELECT max(finished_ms) FROM jobs WHERE scene_id = scenes.id), 0)), 0) FROM retention) END)"
@@ -103,6 +105,14 @@ enum status reserve_check(struct store *store, struct error *err);
 /* Inside a transaction: appends an event. */
 enum status store_event_append(struct store *store, int64_t job_id, int attempt, const char *type, const char *data,
                                struct error *err);
+/* job_files.c, inside a transaction: STATUS_CONFLICT unless job `id` is a reconstruction with results, which another job
+ * may read. */
+enum status store_source_ready(struct store *store, int64_t id, struct error *err);
+/* Inside a transaction: STATUS_CONFLICT while a job that has not ended reads the outputs of job `id`, which
+ * therefore cannot be `action`. */
+enum status store_source_check(struct store *store, int64_t id, const char *action, struct error *err);
+/* Inside a transaction: STATUS_CONFLICT while files of the job are still to be sent. */
+enum status store_job_files_check(struct store *store, int64_t id, struct error *err);
 /* Inside a transaction: gives a job a webhook; queues a message to it, if there is one, about a state. */
 enum status store_webhook_set(struct store *store, int64_t job_id, const char *url, const char *secret,
                               struct error *err);

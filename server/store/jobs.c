@@ -5,6 +5,7 @@
 
 #include "common/mem.h"
 #include "server/store/internal.h"
+#include "server/store/job_files.h"
 #include "server/store/store.h"
 
 #define COLUMNS                                                                                                        \
@@ -17,7 +18,10 @@
     "  WHEN result = 'delivered' THEN result ELSE 'failed' END, 'pending', w.waiting, 'attempts', attempts,"           \
     "  'last_status', nullif(status, 0), 'last_error', nullif(error, ''), 'next_ms', w.next_ms, 'at_ms', at_ms)"       \
     "  FROM webhooks, (SELECT count(*) AS waiting, min(next_ms) AS next_ms FROM outbox WHERE job_id = jobs.id) AS w"   \
-    "  WHERE webhooks.job_id = jobs.id)"
+    "  WHERE webhooks.job_id = jobs.id),"                                                                              \
+    " kind, source_id, cost,"                                                                                          \
+    " (SELECT json_group_array(json_object('name', job_files.name, 'bytes', iif(bytes < 0, NULL, bytes),"              \
+    "  'sha256', nullif(sha256, ''))) FROM job_files WHERE job_id = jobs.id)"
 
 static void fill(struct job *job, sqlite3_stmt *stmt) {
     *job = (struct job){
@@ -50,6 +54,10 @@ static void fill(struct job *job, sqlite3_stmt *stmt) {
         .webhook = sql_dup(stmt, 27),
         .disk_bytes = sqlite3_column_int64(stmt, 28),
         .delivery = sql_dup(stmt, 29),
+        .kind = (enum job_kind)sqlite3_column_int(stmt, 30),
+        .source_id = sqlite3_column_int64(stmt, 31),
+        .cost = sqlite3_column_double(stmt, 32),
+        .files = sql_dup(stmt, 33),
     };
     strncpy(job->scene_id, sql_text(stmt, 2), sizeof job->scene_id - 1);
 }
@@ -106,8 +114,8 @@ static enum status check_kept(struct store *store, const struct job_new *job, st
                       ended);
 }
 
-/* Whether one more job may be queued for this scene. */
-static enum status check_new(struct store *store, const struct job_new *job, size_t queue_limit, struct error *err) {
+/* Whether the scene may have one more job. */
+static enum status check_scene(struct store *store, const struct job_new *job, struct error *err) {
     int64_t state;
     enum status status =
         sql_int(&store->sql, -1, &state, err, "SELECT state FROM scenes WHERE id = ?", "t", job->scene_id);
@@ -120,9 +128,43 @@ static enum status check_new(struct store *store, const struct job_new *job, siz
         return error_hint(err, "`unbake scenes show %.12s`, or GET /v1/scenes/%.12s, lists its problems.",
                           job->scene_id, job->scene_id);
     }
-    status = check_kept(store, job, err);
+    return STATUS_OK;
+}
+
+/* Whether one more job may be queued for what it reads. */
+static enum status check_new(struct store *store, const struct job_new *job, size_t queue_limit, struct error *err) {
+    enum status status = job->kind == JOB_RENDER ? STATUS_OK : check_scene(store, job, err);
+    if (status == STATUS_OK && job->kind != JOB_RECONSTRUCT)
+        status = store_source_ready(store, job->source_id, err);
+    if (status == STATUS_OK)
+        status = check_kept(store, job, err);
     const struct count_limits limits = {queue_limit, job->user_queue_limit};
     return status == STATUS_OK ? store_queue_check(store, job->owner_id, &limits, err) : status;
+}
+
+/* Inside a transaction: adds the rows of a job that waits in the queue or, paused, for its files. */
+static enum status insert(struct store *store, const struct job_new *job, const char *key, int64_t *id,
+                          struct error *err) {
+    bool waits = job->file_count > 0;
+    enum status status = sql_run(
+        &store->sql, err,
+        "INSERT INTO jobs (scene_id, name, labels, settings, priority, attempts_left, created_ms, idempotency_key,"
+        " request_sha256, owner_id, shared, kind, source_id, cost, state, reason, hint, disk_bytes, turn)"
+        " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 0, (SELECT ifnull(max(turn), 0) + 1 FROM jobs))",
+        "ttttnnittinnidntt", job->scene_id, job->name, job->labels, job->settings, job->priority, job->max_attempts,
+        store_now_ms(), key, job->request_sha256, job->owner_id, (int)job->is_shared, (int)job->kind, job->source_id,
+        job->cost, (int)(waits ? JOB_PAUSED : JOB_QUEUED), waits ? JOB_FILES_REASON : "", waits ? JOB_FILES_HINT : "");
+    *id = sqlite3_last_insert_rowid(store->sql.db);
+    for (size_t i = 0; i < job->file_count && status == STATUS_OK; i++)
+        status = sql_run(&store->sql, err, "INSERT OR IGNORE INTO job_files (job_id, name) VALUES (?, ?)", "it", *id,
+                         job->file[i]);
+    if (status == STATUS_OK)
+        status = store_event_append(
+            store, *id, 0, "state",
+            waits ? "{\"state\":\"paused\",\"reason\":\"" JOB_FILES_REASON "\"}" : "{\"state\":\"queued\"}", err);
+    if (status == STATUS_OK && job->webhook_url)
+        status = store_webhook_set(store, *id, job->webhook_url, job->webhook_secret, err);
+    return status;
 }
 
 enum status store_job_add(struct store *store, const struct job_new *job, size_t queue_limit, int64_t *id,
@@ -143,20 +185,7 @@ enum status store_job_add(struct store *store, const struct job_new *job, size_t
         return store_end(store, status, STORE_NOTHING_CHANGED, err);
     }
     if (status == STATUS_OK)
-        status =
-            sql_run(&store->sql, err,
-                    "INSERT INTO jobs (scene_id, name, labels, settings, priority,"
-                    " attempts_left, created_ms, idempotency_key, request_sha256, owner_id,"
-                    " shared, disk_bytes, turn) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 0,"
-                    "                       (SELECT ifnull(max(turn), 0) + 1 FROM jobs))",
-                    "ttttnnittin", job->scene_id, job->name, job->labels, job->settings, job->priority,
-                    job->max_attempts, store_now_ms(), key, job->request_sha256, job->owner_id, (int)job->is_shared);
-    if (status == STATUS_OK) {
-        *id = sqlite3_last_insert_rowid(store->sql.db);
-        status = store_event_append(store, *id, 0, "state", "{\"state\":\"queued\"}", err);
-        if (status == STATUS_OK && job->webhook_url)
-            status = store_webhook_set(store, *id, job->webhook_url, job->webhook_secret, err);
-    }
+        status = insert(store, job, key, id, err);
     mem_free(key);
     return store_end(store, status, *id, err);
 }
@@ -176,23 +205,26 @@ enum status store_job_get(struct store *store, int64_t id, struct job *job, stru
     return status == STATUS_OK && !found ? not_found(id, err) : status;
 }
 
-enum status store_job_list(struct store *store, const struct caller *who, int state_filter, int64_t before_id,
-                           size_t limit, struct job *jobs, size_t *count, struct error *err) {
+enum status store_job_list(struct store *store, const struct caller *who, const struct job_filter *filter,
+                           int64_t before_id, size_t limit, struct job *jobs, size_t *count, struct error *err) {
     bool sees_all = !who || who->role == ROLE_ADMIN;
+    const struct job_filter all = {.state = -1, .kind = -1}, *f = filter ? filter : &all;
+    int64_t before = before_id > 0 ? before_id : INT64_MAX, user = sees_all ? 0 : who->user_id;
     sqlite3_stmt *stmt;
     *count = 0;
-    int64_t before = before_id > 0 ? before_id : INT64_MAX;
     store_lock(store);
     enum status status =
-        state_filter < 0
+        f->state < 0
             ? sql_query(&store->sql, &stmt, err,
-                        "SELECT " COLUMNS " FROM jobs WHERE id < ?"
+                        "SELECT " COLUMNS " FROM jobs WHERE id < ? AND ? IN (-1, kind)"
+                        " AND ? IN (0, source_id)"
                         " AND (? OR owner_id = ? OR shared) ORDER BY id DESC LIMIT ?",
-                        "inii", before, (int)sees_all, sees_all ? 0 : who->user_id, (int64_t)limit)
+                        "ininii", before, f->kind, f->source_id, (int)sees_all, user, (int64_t)limit)
             : sql_query(&store->sql, &stmt, err,
-                        "SELECT " COLUMNS " FROM jobs WHERE id < ? AND state = ?"
+                        "SELECT " COLUMNS " FROM jobs WHERE id < ? AND state = ? AND ? IN (-1, kind)"
+                        " AND ? IN (0, source_id)"
                         " AND (? OR owner_id = ? OR shared) ORDER BY id DESC LIMIT ?",
-                        "innii", before, state_filter, (int)sees_all, sees_all ? 0 : who->user_id, (int64_t)limit);
+                        "inninii", before, f->state, f->kind, f->source_id, (int)sees_all, user, (int64_t)limit);
     while (sql_next(&store->sql, stmt, &status, err))
         fill(&jobs[(*count)++], stmt);
     store_unlock(store);
@@ -274,6 +306,8 @@ static enum status delete_job(struct store *store, int64_t id, struct error *err
         error_set(err, STATUS_CONFLICT, "job %lld is running", (long long)id);
         status = error_hint(err, "Cancel it first.");
     }
+    if (status == STATUS_OK)
+        status = store_source_check(store, id, "deleted", err);
     if (status == STATUS_OK)
         status = sql_run(&store->sql, err, "DELETE FROM jobs WHERE id = ?", "i", id);
     return store_end(store, status, id, err);

@@ -19,11 +19,11 @@ static enum status check_reading(struct store *store, const char *id, int64_t ot
     int64_t begun = 0, waits = 0;
     enum status status =
         sql_int(&store->sql, 0, &begun, err,
-                "SELECT 1 FROM jobs WHERE scene_id = ? AND state <= 2 AND attempt > 0 LIMIT 1", "t", id);
+                "SELECT 1 FROM jobs WHERE scene_id = ? AND state <= 2 AND attempt > 0 AND kind <> 1 LIMIT 1", "t", id);
     if (status == STATUS_OK && !begun && other_than >= 0)
         status = sql_int(&store->sql, 0, &waits, err,
-                         "SELECT 1 FROM jobs WHERE scene_id = ? AND state <= 2 AND owner_id <> ? LIMIT 1", "ti", id,
-                         other_than);
+                         "SELECT 1 FROM jobs WHERE scene_id = ? AND state <= 2 AND owner_id <> ? AND kind <> 1 LIMIT 1",
+                         "ti", id, other_than);
     if (begun) {
         error_set(err, STATUS_CONFLICT, "a job has begun with scene %s as it is read now", id);
         status = error_hint(err, "Cancel the job or wait for its end.");

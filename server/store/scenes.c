@@ -20,7 +20,7 @@
  * he sees all (?1), the first who sent it. */
 #define SHOWN_OWNER                                                                                                    \
     "(SELECT user_id FROM scene_owners AS o WHERE scene_id = scenes.id AND (?1 OR user_id = ?2 OR EXISTS"              \
-    " (SELECT 1 FROM jobs WHERE jobs.scene_id = o.scene_id AND owner_id = o.user_id AND shared = 1))"                  \
+    " (SELECT 1 FROM jobs WHERE jobs.scene_id = o.scene_id AND owner_id = o.user_id AND shared = 1 AND kind = 0))"     \
     " ORDER BY user_id = ?2 DESC, created_ms, user_id LIMIT 1)"
 #define SCENES                                                                                                         \
     "scenes LEFT JOIN scene_owners AS shown ON shown.scene_id = scenes.id AND shown.user_id = " SHOWN_OWNER            \
@@ -34,7 +34,7 @@
 /* What user ?2 may read where not all (?1); see caller_access_job. */
 #define IS_READABLE                                                                                                    \
     "(?1 OR EXISTS (SELECT 1 FROM scene_owners WHERE scene_id = scenes.id AND user_id = ?2)"                           \
-    " OR EXISTS (SELECT 1 FROM jobs WHERE scene_id = scenes.id AND shared = 1))"
+    " OR EXISTS (SELECT 1 FROM jobs WHERE scene_id = scenes.id AND shared = 1 AND kind = 0))"
 #define NOT_A_USER ((int64_t)-1)
 
 static void fill(struct scene_row *row, sqlite3_stmt *stmt) {
@@ -289,7 +289,7 @@ static enum status delete_scene(struct store *store, const char *id, int64_t own
         status = error_set(err, STATUS_CONFLICT, "scene %s is being checked", id);
     if (status == STATUS_OK)
         status = sql_int(&store->sql, 0, &job, err,
-                         "SELECT id FROM jobs WHERE scene_id = ? AND state <= 2"
+                         "SELECT id FROM jobs WHERE scene_id = ? AND state <= 2 AND kind <> 1"
                          " AND (? = 0 OR owner_id = ?) LIMIT 1",
                          "tii", id, others, owner_id);
     if (status == STATUS_OK && job > 0) {

@@ -274,7 +274,22 @@ static const char step_19[] = "CREATE TABLE remote ("
                               ") STRICT;"
                               "ALTER TABLE jobs ADD COLUMN executor TEXT NOT NULL DEFAULT '';";
 
+/* Kinds of jobs (job.h), the job that another one reads, and the files that come with a job; bytes -1: still to be
+ * sent. */
+static const char step_20[] =
+    "ALTER TABLE jobs ADD COLUMN kind INTEGER NOT NULL DEFAULT 0 CHECK (kind BETWEEN 0 AND 2);"
+    "ALTER TABLE jobs ADD COLUMN source_id INTEGER NOT NULL DEFAULT 0;"
+    "ALTER TABLE jobs ADD COLUMN cost REAL NOT NULL DEFAULT 0;"
+    "CREATE INDEX jobs_by_source ON jobs (source_id, state) WHERE source_id > 0;"
+    "CREATE TABLE job_files ("
+    "  job_id INTEGER NOT NULL REFERENCES jobs (id) ON DELETE CASCADE,"
+    "  name TEXT NOT NULL,"
+    "  bytes INTEGER NOT NULL DEFAULT -1,"
+    "  sha256 TEXT NOT NULL DEFAULT '',"
+    "  PRIMARY KEY (job_id, name)"
+    ") STRICT, WITHOUT ROWID;";
+
 const char *const schema_steps[] = {step_1,  step_2,  step_3,  step_4,  step_5,  step_6,  step_7,
                                     step_8,  step_9,  step_10, step_11, step_12, step_13, step_14,
-                                    step_15, step_16, step_17, step_18, step_19};
+                                    step_15, step_16, step_17, step_18, step_19, step_20};
 const int schema_version = (int)(sizeof schema_steps / sizeof schema_steps[0]);

@@ -135,6 +135,11 @@ enum status store_scene_check_again(struct store *store, struct error *err);
 /* --- jobs -------------------------------------------------------------------------------- */
 
 struct job_new {
+    enum job_kind kind;
+    int64_t source_id;       /* whose outputs it reads; 0 for a reconstruction */
+    double cost;             /* as in struct job */
+    const char *const *file; /* [file_count] names of files that come later (job_files.h) */
+    size_t file_count;
     const char *scene_id, *name, *labels, *settings;
     int64_t owner_id; /* 0: nobody */
     bool is_shared;
@@ -148,14 +153,24 @@ struct job_new {
 /* queue_limit and job->user_queue_limit: STATUS_LIMIT when that many jobs are queued, in all or of the owner.
  * STATUS_NO_SPACE when the owner has user_max_jobs jobs. With a known key: the earlier job's id, and *replayed;
  * STATUS_CONFLICT when the request differs. The scene may still be in `checking`; STATUS_CONFLICT when it is
- * rejected, STATUS_NOT_FOUND when there is none. */
+ * rejected, STATUS_NOT_FOUND when there is none; a render needs none. STATUS_CONFLICT when the source has no results. */
 enum status store_job_add(struct store *store, const struct job_new *job, size_t queue_limit, int64_t *id,
                           bool *replayed, struct error *err);
 enum status store_job_get(struct store *store, int64_t id, struct job *job, struct error *err);
-/* Jobs that `who` (NULL: all) may read, newest first; state_filter < 0: all; before_id 0: from the newest. Fills
+/* Whether another job may read the outputs of this one: STATUS_CONFLICT unless it is a reconstruction that has
+ * succeeded. As long as that other job has not ended, it cannot be deleted, retried or extended, nor does it expire. */
+enum status store_source_look(struct store *store, int64_t id, struct error *err);
+/* STATUS_CONFLICT while a job that has not ended reads the outputs of this one, which cannot be `action` therefore. */
+enum status store_source_free(struct store *store, int64_t id, const char *action, struct error *err);
+#define JOB_SOURCE_OUTPUT "scene.ply" /* every reconstruction leaves one; its attempt is that of all the outputs */
+struct job_filter {
+    int state, kind;   /* -1: all */
+    int64_t source_id; /* 0: all */
+};
+/* Jobs that `who` (NULL: all) may read, newest first; filter NULL: all; before_id 0: from the newest. Fills
  * jobs[limit]. */
-enum status store_job_list(struct store *store, const struct caller *who, int state_filter, int64_t before_id,
-                           size_t limit, struct job *jobs, size_t *count, struct error *err);
+enum status store_job_list(struct store *store, const struct caller *who, const struct job_filter *filter,
+                           int64_t before_id, size_t limit, struct job *jobs, size_t *count, struct error *err);
 enum job_place { JOB_PLACE_KEEP, JOB_PLACE_FIRST, JOB_PLACE_LAST, JOB_PLACE_BEFORE };
 struct job_patch {
     const char *name, *labels; /* NULL: unchanged */
@@ -168,7 +183,8 @@ struct job_patch {
 /* expected_revision -1: any; else STATUS_CONFLICT if it differs. STATUS_INPUT when the job before_id is not queued. */
 enum status store_job_patch(struct store *store, int64_t id, int64_t expected_revision, const struct job_patch *patch,
                             struct error *err);
-enum status store_job_delete(struct store *store, int64_t id, struct error *err); /* not a running one */
+/* Not a running one, nor one whose outputs another reads. */
+enum status store_job_delete(struct store *store, int64_t id, struct error *err);
 /* Users' requests. For a running job the request is only recorded; the scheduler fulfils it (wake it). A request for
  * the state that the job already has is STATUS_OK and changes nothing. Resume withdraws a request to pause. Retry is
  * for failed and cancelled jobs; with `from`, a stage that job_stage_parse knows (else NULL), also for succeeded

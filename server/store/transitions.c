@@ -5,7 +5,7 @@
  *                                       running          running, wanted = cancel
  *                   store_job_pause     queued           paused
  *                                       running          running, wanted = pause
- *                   store_job_resume    paused           queued
+ *                   store_job_resume    paused           queued (not while its files are to be sent)
  *                                       running          running, wanted = run (from pause only)
  *                   store_job_retry     failed, cancelled  queued, attempts_left = max_attempts
  *                                       (with a stage, also succeeded)
@@ -80,6 +80,8 @@ static enum status enqueue(struct store *store, struct present *now, const struc
                            struct error *err) {
     int64_t owner = 0;
     enum status status = sql_int(&store->sql, 0, &owner, err, "SELECT owner_id FROM jobs WHERE id = ?", "i", now->id);
+    if (status == STATUS_OK)
+        status = store_job_files_check(store, now->id, err);
     if (status == STATUS_OK && limits)
         status = store_queue_check(store, owner, limits, err);
     return status == STATUS_OK ? transition_move(store, now, JOB_QUEUED, "", "", err) : status;
@@ -106,12 +108,20 @@ enum status store_job_resume(struct store *store, int64_t id, const struct count
 /* A new life for a job that has ended; in the transaction that job_begin began. */
 static enum status revive(struct store *store, struct present *now, int max_attempts, const struct count_limits *limits,
                           struct error *err) {
-    int64_t scene = 0;
+    int64_t scene = 0, source = 0;
     enum status status =
-        sql_int(&store->sql, 0, &scene, err, "SELECT 1 FROM jobs JOIN scenes ON scenes.id = scene_id WHERE jobs.id = ?",
-                "i", now->id);
+        sql_int(&store->sql, 0, &scene, err,
+                "SELECT 1 FROM jobs WHERE id = ? AND (kind = 1 OR scene_id IN (SELECT id FROM scenes))", "i", now->id);
     if (status == STATUS_OK && !scene)
         status = error_set(err, STATUS_CONFLICT, "the scene of job %lld was deleted", (long long)now->id);
+    if (status == STATUS_OK)
+        status = sql_int(&store->sql, 0, &source, err, "SELECT source_id FROM jobs WHERE id = ?", "i", now->id);
+    if (status == STATUS_OK && source)
+        status = store_source_ready(store, source, err);
+    if (status == STATUS_OK)
+        status = store_source_check(store, now->id, "done again", err);
+    if (status == STATUS_NOT_FOUND)
+        status = err->status = STATUS_CONFLICT; /* not the job that was asked for */
     if (status != STATUS_OK)
         return status;
     now->attempts_left = max_attempts;

@@ -2,19 +2,26 @@
 #include "server/store/internal.h"
 #include "server/store/store.h"
 
-enum status store_job_next(struct store *store, int user_max_running, int64_t *id, struct error *err) {
+/* Whether a job is in the lane: ?5 the cost of a small render at the most, ?6 which lane. */
+#define IN_LANE "((jobs.kind = 1 AND jobs.cost > 0 AND jobs.cost <= ?5) = ?6)"
+
+enum status store_job_next(struct store *store, int user_max_running, const struct job_lane *lane, int64_t *id,
+                           struct error *err) {
+    const struct job_lane only = {0}, *l = lane ? lane : &only;
     store_lock(store);
-    enum status status = sql_int(&store->sql, 0, id, err,
-                                 "WITH busy (user_id, count) AS"
-                                 " (SELECT owner_id, count(*) FROM jobs WHERE state = ?1 GROUP BY owner_id)"
-                                 "SELECT jobs.id FROM jobs JOIN scenes ON scenes.id = scene_id"
-                                 " LEFT JOIN busy ON busy.user_id = jobs.owner_id"
-                                 " LEFT JOIN usage ON usage.owner_id = jobs.owner_id"
-                                 " WHERE jobs.state = ?2 AND scenes.state >= ?3"
-                                 "  AND (?4 = 0 OR jobs.owner_id = 0 OR ifnull(busy.count, 0) < ?4)"
-                                 " ORDER BY usage.weight IS NOT NULL, usage.weight, jobs.owner_id,"
-                                 "  priority DESC, turn LIMIT 1",
-                                 "nnnn", (int)JOB_RUNNING, (int)JOB_QUEUED, (int)SCENE_READY, user_max_running);
+    enum status status =
+        sql_int(&store->sql, 0, id, err,
+                "WITH busy (user_id, count) AS"
+                " (SELECT owner_id, count(*) FROM jobs WHERE state = ?1 AND " IN_LANE " GROUP BY owner_id)"
+                "SELECT jobs.id FROM jobs LEFT JOIN scenes ON scenes.id = scene_id"
+                " LEFT JOIN busy ON busy.user_id = jobs.owner_id"
+                " LEFT JOIN usage ON usage.owner_id = jobs.owner_id"
+                " WHERE jobs.state = ?2 AND (kind = 1 OR scenes.state >= ?3) AND " IN_LANE
+                "  AND (?4 = 0 OR jobs.owner_id = 0 OR ifnull(busy.count, 0) < ?4)"
+                " ORDER BY usage.weight IS NOT NULL, usage.weight, jobs.owner_id,"
+                "  priority DESC, turn LIMIT 1",
+                "nnnndn", (int)JOB_RUNNING, (int)JOB_QUEUED, (int)SCENE_READY, user_max_running, l->small_cost,
+                (int)l->is_small);
     store_unlock(store);
     return status == STATUS_OK && *id == 0 ? error_set(err, STATUS_NOT_FOUND, "no job waits to be run") : status;
 }

@@ -53,8 +53,8 @@ enum status store_scene_access(struct store *store, const struct caller *who, co
         sql_int(&store->sql, 0, &owns, err, "SELECT 1 FROM scene_owners WHERE scene_id = ? AND user_id = ?", "ti",
                 scene_id, who->user_id);
     if (status == STATUS_OK && !owns)
-        status = sql_int(&store->sql, 0, &shared, err, "SELECT 1 FROM jobs WHERE scene_id = ? AND shared = 1 LIMIT 1",
-                         "t", scene_id);
+        status = sql_int(&store->sql, 0, &shared, err,
+                         "SELECT 1 FROM jobs WHERE scene_id = ? AND shared = 1 AND kind = 0 LIMIT 1", "t", scene_id);
     store_unlock(store);
     if (status == STATUS_OK)
         *access = access_of(who, owns, shared);

@@ -188,7 +188,7 @@ void *callbacks_on_target(void *user, const char *target, struct MHD_Connection 
 
 /* Requests that may change something are logged; GET and HEAD only at the debug level. */
 static void log_request(const struct exchange *x, int status, bool is_whole) {
-    static const char *const names[] = {"GET", "POST", "PATCH", "DELETE", "OPTIONS", "other"};
+    static const char *const names[] = {"GET", "POST", "PATCH", "DELETE", "OPTIONS", "PUT", "other"};
     const struct request *r = &x->request;
     char status_text[8], duration[24], address[ADDRESS_TEXT_SIZE];
     address_text(&r->address, address);

@@ -1,7 +1,7 @@
 /* upload.h -- a bundle that arrives in one request: written and hashed on the way.
  *
  * 1. It lies in DATA/uploads/ under a random name until it is complete and synced; only then is it renamed to
- *    DATA/scenes/ID/archive. Freeing it earlier removes it.
+ *    DATA/scenes/ID/archive, or to the place of a job's file. Freeing it earlier removes it.
  * 2. Where the length is known, the space is reserved at the start.
  * 3. From upload_new until upload_publish or upload_free it is listed among the arrivals: limits count it from its
  *    admission. (Uploads in parts are rows of the store, which count from their creation.) */

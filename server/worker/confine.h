@@ -8,12 +8,13 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#define SANDBOX_READ_DIRS 2
 /* What a process may still do. */
 struct sandbox {
-    const char *write_dir; /* NULL: none */
-    const char *read_dir;  /* NULL: none */
-    uint16_t connect_port; /* of the server that it connects to; 0: no network */
-    uint64_t memory_bytes; /* 0: no limit */
+    const char *write_dir;                   /* NULL: none */
+    const char *read_dir[SANDBOX_READ_DIRS]; /* NULL: none */
+    uint16_t connect_port;                   /* of the server that it connects to; 0: no network */
+    uint64_t memory_bytes;                   /* 0: no limit */
 };
 
 /* Landlock: which files may be read and written (Linux 5.13), which TCP port may be connected to (6.7); no signals

@@ -105,8 +105,9 @@ bool confine_files(const struct sandbox *sandbox) {
     bool ok = allow_system(ruleset);
     if (sandbox->write_dir)
         ok = ok && allow(ruleset, sandbox->write_dir, WRITE_ACCESS | later);
-    if (sandbox->read_dir)
-        ok = ok && allow(ruleset, sandbox->read_dir, READ_ACCESS);
+    for (size_t i = 0; i < SANDBOX_READ_DIRS; i++)
+        if (sandbox->read_dir[i])
+            ok = ok && allow(ruleset, sandbox->read_dir[i], READ_ACCESS);
     if (sandbox->connect_port)
         ok = ok && allow_network(ruleset, version, sandbox->connect_port);
 #ifdef COVERAGE_DIR /* make coverage: each process writes its counts there */

@@ -41,9 +41,15 @@ static enum status read_memory(struct order *o, struct error *err) {
     return STATUS_OK;
 }
 
-static enum status read_reconstruct(struct order *o, struct error *err) {
+/* What orders for jobs of all kinds have. */
+static enum status read_job(struct order *o, struct error *err) {
     double job_id, attempt;
+    bool is_render = strcmp(o->kind, "render") == 0, is_evaluation = strcmp(o->kind, "evaluate") == 0;
     enum status status = json_string(o->json, "scene", WHAT, "", &o->scene, err);
+    if (status == STATUS_OK)
+        status = json_string(o->json, "outputs", WHAT, "", &o->outputs, err);
+    if (status == STATUS_OK)
+        status = json_string(o->json, "files", WHAT, "", &o->files, err);
     if (status == STATUS_OK)
         status = json_string(o->json, "name", WHAT, "", &o->name, err);
     if (status == STATUS_OK)
@@ -61,9 +67,15 @@ static enum status read_reconstruct(struct order *o, struct error *err) {
     o->job_id = (int64_t)job_id;
     o->attempt = (int)attempt;
     o->settings = cJSON_GetObjectItemCaseSensitive(o->json, "settings");
-    if (!o->scene[0] || !cJSON_IsObject(o->settings))
+    if ((!is_render && !o->scene[0]) || !cJSON_IsObject(o->settings))
         return error_set(err, STATUS_INTERNAL, WHAT ": no scene or no settings");
+    if ((is_render || is_evaluation) && !o->outputs[0])
+        return error_set(err, STATUS_INTERNAL, WHAT ": no outputs");
     return STATUS_OK;
+}
+
+static bool is_job(const struct order *o) {
+    return strcmp(o->kind, "reconstruct") == 0 || strcmp(o->kind, "render") == 0 || strcmp(o->kind, "evaluate") == 0;
 }
 
 static enum status read_deliver(struct order *o, struct error *err) {
@@ -97,8 +109,8 @@ enum status order_read(struct order *o, const char *dir, struct error *err) {
         o->reading = cJSON_GetObjectItemCaseSensitive(o->json, "reading");
         o->thread_count = (int)thread_count;
     }
-    if (status == STATUS_OK && strcmp(o->kind, "reconstruct") == 0)
-        status = read_reconstruct(o, err);
+    if (status == STATUS_OK && is_job(o))
+        status = read_job(o, err);
     if (status == STATUS_OK && strcmp(o->kind, "deliver") == 0)
         status = read_deliver(o, err);
     /* The daemon wrote the file: a fault in it is a bug, not the user's. */

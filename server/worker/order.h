@@ -4,13 +4,16 @@
  *    "name":"my room","job_id":17,"attempt":2,"thread_count":4,"memory_bytes":0,"sandbox":true,
  *    "checkpoint_interval_sec":60,"photograph_memory_bytes":0,"memory_step":0,"keep_free_bytes":671088640,
  *    "disk_bytes":0,"parts":false}
+ *   {"kind":"render","outputs":"DATA/jobs/9/attempt-1/out","files":"DATA/jobs/17/files","settings":{…},"name":"…",
+ *    "job_id":17,"attempt":1,"thread_count":4,"memory_bytes":0,"sandbox":true,"memory_step":0,"disk_bytes":0}
+ *   {"kind":"evaluate", as a render's, without files and with "scene" as a reconstruction's}
  *   {"kind":"check","scene_id":"…","reading":{…},"thread_count":4,"memory_bytes":0,"photograph_memory_bytes":0,
  *    "keep_free_bytes":671088640,"sandbox":true}
  *   {"kind":"deliver","url":"https://…","secret":"…","body":"…","message_id":"msg_7",
  *    "allow_private":false,"sandbox":true}
  *
- * A check's folder is the scene's: it reads DIR/archive and leaves DIR/files/. "scene" is set by the executor
- * (server/job/run.h), which knows where the scene lies. */
+ * A check's folder is the scene's: it reads DIR/archive and leaves DIR/files/. "scene", "outputs" and "files" are set
+ * by the executor (server/job/run.h), which knows where they lie. */
 #ifndef UNBAKE_WORKER_ORDER_H
 #define UNBAKE_WORKER_ORDER_H
 
@@ -29,11 +32,15 @@ struct order {
     uint64_t photograph_memory_bytes; /* of it for pixels of photographs; 0: pixel_memory.h says */
     int memory_step;                  /* how often it has run out of memory */
     uint64_t keep_free_bytes;         /* space of the disk that pixels leave free */
-    uint64_t disk_bytes;              /* that pixels may take of the disk; 0: what is free */
+    uint64_t disk_bytes;              /* that it may take of the disk; 0: what is free */
     bool sandbox;
     const cJSON *reading; /* how to read the scene (common/reading.h); NULL: as its files say */
-    /* kind "reconstruct" */
-    const char *scene;     /* folder of the unpacked bundle */
+    /* kinds "render" and "evaluate" */
+    const char *outputs; /* folder with the outputs of a reconstruction */
+    const char *files;   /* folder of files that settings name */
+    /* kinds "reconstruct" and "evaluate" */
+    const char *scene; /* folder of the unpacked bundle */
+    /* all kinds of jobs */
     const char *name;      /* of the job, for the report's title; may be "" */
     const char *reduced;   /* what was reduced after running out of memory; may be "" */
     const cJSON *settings; /* object */

@@ -5,17 +5,13 @@
  * 2. Checkpoints come every checkpoint_interval_sec. Where they would take more than
  *    CHECKPOINT_SHARE of the time (a slow disk) the interval grows, at most CHECKPOINT_STRETCH
  *    times: what a crash costs stays bounded. Previews likewise, without a bound.
- * 3. SIGTERM, or a daemon that is gone, stops the work at its next step, after a checkpoint.
- *    Signals are blocked and asked for where the engine asks (no handlers, no globals). */
+ * 3. A request to stop (requests.h) is heard at the work's next step, after a checkpoint. */
 #include <errno.h>
 #include <fcntl.h>
 #include <math.h>
-#include <poll.h>
-#include <signal.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
-#include <time.h>
 #include <unistd.h>
 
 #include "common/clock.h"
@@ -27,11 +23,13 @@
 #include "server/data/layout.h"
 #include "server/export/outputs.h"
 #include "server/reconstruct/reconstruct.h"
+#include "server/worker/announce.h"
 #include "server/worker/checkpoint.h"
 #include "server/worker/checkpoint_parts.h"
 #include "server/worker/load.h"
 #include "server/worker/pixel_memory.h"
 #include "server/worker/read_back.h"
+#include "server/worker/requests.h"
 #include "server/worker/results.h"
 #include "server/worker/tasks.h"
 #include "server/worker/working_time.h"
@@ -41,7 +39,6 @@
 #define PREVIEW_SHARE 0.05
 #define PROGRESS_INTERVAL_SEC 0.25
 #define METRIC_INTERVAL_SEC 1.0 /* minimum between values of a series */
-#define HANG_UP_INTERVAL_SEC 1.0
 #define SERIES_MAX 16
 
 struct worker_run {
@@ -51,11 +48,10 @@ struct worker_run {
     struct spill *spill; /* of the photographs' pixels */
     uint64_t told_bytes; /* what they take of the disk, as was told last */
     char *out_dir;
-    bool stop;
-    bool preview_asked;      /* by SIGUSR1 */
+    struct requests requests;
     const struct mesh *mesh; /* the mesh of the outputs */
     struct working_time worked;
-    double next_checkpoint, next_preview, next_progress, next_hang_up_test; /* monotonic, s */
+    double next_checkpoint, next_preview, next_progress; /* monotonic, s */
     double preview_interval_sec;
     size_t series_count;
     struct {
@@ -69,37 +65,9 @@ struct worker_run {
 
 /* --- called by the engine -------------------------------------------------------------------- */
 
-static void signals_of_ours(sigset_t *set) {
-    sigemptyset(set);
-    sigaddset(set, SIGTERM);
-    sigaddset(set, SIGUSR1);
-}
-
-/* Whether the pipe has no reader: the daemon has died without killing this process. */
-static bool hung_up(struct worker_run *run) {
-    double now = clock_sec();
-    if (run->progress->fd < 0 || now < run->next_hang_up_test)
-        return false;
-    run->next_hang_up_test = now + HANG_UP_INTERVAL_SEC;
-    struct pollfd pipe = {.fd = run->progress->fd};
-    return poll(&pipe, 1, 0) == 1 && (pipe.revents & POLLERR);
-}
-
 static bool stop_requested(void *user) {
     struct worker_run *run = user;
-    static const struct timespec at_once = {0, 0};
-    sigset_t set;
-    int number;
-    signals_of_ours(&set);
-    while ((number = sigtimedwait(&set, NULL, &at_once)) > 0) {
-        if (number == SIGTERM)
-            run->stop = true;
-        else
-            run->preview_asked = true;
-    }
-    if (hung_up(run))
-        run->stop = true;
-    return run->stop;
+    return requests_look(&run->requests);
 }
 
 static bool checkpoint_due(void *user) {
@@ -109,7 +77,7 @@ static bool checkpoint_due(void *user) {
 
 static bool preview_due(void *user) {
     const struct worker_run *run = user;
-    return run->preview_asked || clock_sec() >= run->next_preview;
+    return run->requests.preview || clock_sec() >= run->next_preview;
 }
 
 /* --- messages -------------------------------------------------------------------------------- */
@@ -194,7 +162,7 @@ static enum status save_checkpoint(void *user, long iteration, const struct stat
     double start = clock_sec();
     enum status status = checkpoint_save(run->checkpoint, iteration, array, count, &cost, err);
     if (status == STATUS_OK)
-        status = checkpoint_write_part(run->checkpoint, array, count, run->stop, &part, err);
+        status = checkpoint_write_part(run->checkpoint, array, count, run->requests.stop, &part, err);
     if (status != STATUS_OK)
         return status;
     if (part.number > 0)
@@ -253,15 +221,9 @@ static enum status announce(void *user, const char *type, const char *name, cons
                             struct error *err) {
     struct worker_run *run = user;
     char *path = file_join(run->out_dir, name);
-    char hex[SHA256_HEX_SIZE];
-    struct stat info;
     enum status status = read_back(path, name, run->mesh, err);
     if (status == STATUS_OK)
-        status = sha256_of_file(path, hex, err);
-    if (status == STATUS_OK && stat(path, &info) != 0)
-        status = error_set_errno(err, errno, "cannot look at %s", path);
-    if (status == STATUS_OK)
-        progress_file(run->progress, type, name, (uint64_t)info.st_size, hex, content_type);
+        status = announce_file(run->progress, type, path, name, content_type, NULL, err);
     mem_free(path);
     return status;
 }
@@ -278,7 +240,7 @@ static enum status write_preview(void *user, const struct reconstruction *r, str
     if (wait < run->preview_interval_sec)
         wait = run->preview_interval_sec;
     run->next_preview = end + wait;
-    run->preview_asked = false;
+    run->requests.preview = false;
     return status;
 }
 
@@ -358,9 +320,7 @@ static enum status reconstruct(struct worker_run *run, const struct settings *se
 enum status task_reconstruct(const struct order *order, struct progress *progress, struct error *err) {
     struct worker_run run = {.order = order, .progress = progress};
     struct settings settings;
-    sigset_t set;
-    signals_of_ours(&set);
-    sigprocmask(SIG_BLOCK, &set, NULL); /* before the pool's threads, which inherit it */
+    requests_init(&run.requests, progress->fd); /* before the pool's threads */
     settings_init(&settings);
     run.out_dir = layout_out(order->dir);
     struct parallel *pool = NULL;

@@ -1,6 +1,6 @@
 /* sandbox.h -- what a worker gives up before it reads what a stranger uploaded or sends.
  *
- *  - files: it may read `read_dir` and the system's libraries, and write below `write_dir`
+ *  - files: it may read the folders `read_dir` and the system's libraries, and write below `write_dir`
  *    (Landlock, Linux 5.13 and later); modes, owners, times and attributes of files it changes nowhere;
  *  - system calls: those of a list (seccomp). No network, no new programs, no processes of its own, nothing
  *    that reaches another process: no signals by any way, no priorities, no tracing;

@@ -44,7 +44,11 @@ static enum status take_folder(const char *dir, struct error *err) {
 static void confine(const struct order *order, struct progress *progress) {
     struct sandbox_result result;
     struct url url;
-    struct sandbox sandbox = {.write_dir = order->dir, .read_dir = order->scene, .memory_bytes = order->memory_bytes};
+    struct sandbox sandbox = {.write_dir = order->dir, .memory_bytes = order->memory_bytes};
+    const char *read[] = {order->scene, order->outputs, order->files}; /* no kind has more than two of them */
+    for (size_t i = 0, used = 0; i < sizeof read / sizeof *read && used < SANDBOX_READ_DIRS; i++)
+        if (read[i] && *read[i])
+            sandbox.read_dir[used++] = read[i];
     if (strcmp(order->kind, "deliver") == 0) { /* a malformed URL is reported when it is called */
         sandbox.write_dir = NULL;
         if (url_parse(order->url, &url, NULL) == STATUS_OK)
@@ -64,6 +68,7 @@ static enum status work(const struct order *order, struct progress *progress, st
         enum status (*run)(const struct order *, struct progress *, struct error *);
     } tasks[] = {
         {"reconstruct", task_reconstruct},
+        {"evaluate", task_evaluate},
         {"check", task_check},
         {"deliver", task_deliver},
     };

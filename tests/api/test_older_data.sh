@@ -21,7 +21,10 @@ for job in 1 2; do
     mv "$folder"/attempt-1/checkpoint/* "$folder/attempt-1/out" "$folder/attempt-1/job.json" "$folder"
     rm -r "$folder/attempt-1"
 done
-sqlite3 "$data/state.db" "DROP TABLE attempts; DROP TABLE usage_months; UPDATE outputs SET attempt = 7; PRAGMA user_version = 16" || fail "sqlite3"
+sqlite3 "$data/state.db" "DROP TABLE attempts; DROP TABLE usage_months; DROP TABLE remote; DROP TABLE attempt_lines;
+    DROP TABLE job_files; DROP INDEX jobs_by_source; ALTER TABLE jobs DROP COLUMN executor;
+    ALTER TABLE jobs DROP COLUMN kind; ALTER TABLE jobs DROP COLUMN source_id; ALTER TABLE jobs DROP COLUMN cost;
+    UPDATE outputs SET attempt = 7; PRAGMA user_version = 16" || fail "sqlite3"
 
 daemon_start --set checkpoint_interval_sec=1
 mkdir "$work/after"; run 0 get 1 -q -o "$work/after"

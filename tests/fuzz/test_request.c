@@ -126,7 +126,7 @@ static void stop_daemon(void) {
 
 /* As callbacks.c's take_method does it. */
 static void take_method(struct request *r, const char *word) {
-    static const char *const names[METHOD_COUNT] = {"GET", "POST", "PATCH", "DELETE", "OPTIONS"};
+    static const char *const names[METHOD_COUNT] = {"GET", "POST", "PATCH", "DELETE", "OPTIONS", "PUT"};
     r->is_head = strcmp(word, "HEAD") == 0;
     r->method = METHOD_GET;
     while (!r->is_head && r->method < METHOD_COUNT && strcmp(word, names[r->method]) != 0)

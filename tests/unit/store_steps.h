@@ -183,7 +183,8 @@ static enum status get_job(void) {
 static enum status list_by(int state) {
     struct job rows[4];
     size_t count;
-    enum status status = store_job_list(store, &alice, state, 0, 4, rows, &count, &err);
+    enum status status =
+        store_job_list(store, &alice, &(struct job_filter){.state = state, .kind = -1}, 0, 4, rows, &count, &err);
     CHECK(status == STATUS_OK || count == 0);
     for (size_t i = 0; i < count; i++)
         job_release(&rows[i]);
@@ -200,7 +201,7 @@ static enum status place_last(void) { return place(JOB_PLACE_LAST); }
 static enum status place_before(void) { return place(JOB_PLACE_BEFORE); }
 static enum status next_job(void) {
     int64_t id;
-    return store_job_next(store, 1, &id, &err);
+    return store_job_next(store, 1, NULL, &id, &err);
 }
 static enum status running_jobs(void) {
     int64_t ids[4];

@@ -60,7 +60,7 @@ static void copy_pictures(const char *readable) {
 /* In a child: there is no way back. */
 static int confined(const char *writable, const char *readable, const char *other) {
     struct sandbox_result result;
-    struct sandbox sandbox = {.write_dir = writable, .read_dir = readable, .memory_bytes = (uint64_t)256 << 20};
+    struct sandbox sandbox = {.write_dir = writable, .read_dir = {readable}, .memory_bytes = (uint64_t)256 << 20};
     char *secret = file_join(other, "secret"), *photo = file_join(readable, "photo");
     sandbox_enter(&sandbox, &result);
     printf("%s\n", result.text);

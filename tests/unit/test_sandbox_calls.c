@@ -314,7 +314,7 @@ static int in_child(int (*work)(bool), bool network) {
 
 static int attack(bool network) {
     struct sandbox_result result;
-    struct sandbox sandbox = {.write_dir = writable, .read_dir = readable, .connect_port = network ? port : 0};
+    struct sandbox sandbox = {.write_dir = writable, .read_dir = {readable}, .connect_port = network ? port : 0};
     sandbox_enter(&sandbox, &result);
     if (!result.system_calls || !result.files) {
         printf("%s\n", result.text);

@@ -196,7 +196,7 @@ static void check_order(struct queue *q) {
     enum job_wanted wanted[8];
     size_t count;
     int attempt;
-    IS(store_job_next(store, 0, &next, &err), STATUS_NOT_FOUND);
+    IS(store_job_next(store, 0, NULL, &next, &err), STATUS_NOT_FOUND);
     add_ready_scene(store, SCENE_A);
     OK(store_scene_add(store, SCENE_B, "unchecked", 1, 0, &existed, &err));
     int64_t waits = add_job(store, SCENE_B, 100);
@@ -205,13 +205,13 @@ static void check_order(struct queue *q) {
     q->young = add_job(store, SCENE_A, 1);
     int64_t order[] = {q->old, q->young, q->low};
     for (size_t i = 0; i < 3; i++) {
-        OK(store_job_next(store, 0, &next, &err));
+        OK(store_job_next(store, 0, NULL, &next, &err));
         CHECK(next == order[i]);
         OK(store_job_start(store, next, "process", &attempt, &err));
     }
-    IS(store_job_next(store, 0, &next, &err), STATUS_NOT_FOUND);
+    IS(store_job_next(store, 0, NULL, &next, &err), STATUS_NOT_FOUND);
     OK(store_scene_reject(store, SCENE_B, NULL, "[]", "{}", &err));
-    OK(store_job_next(store, 0, &next, &err));
+    OK(store_job_next(store, 0, NULL, &next, &err));
     CHECK(next == waits);
     OK(store_job_pause(store, q->young, &err));
     OK(store_job_running(store, 8, ids, wanted, &count, &err));
@@ -266,11 +266,12 @@ static void check_edits(const struct queue *q) {
 static void check_pages(const struct queue *q) {
     struct job jobs[3];
     size_t count;
-    OK(store_job_list(q->store, NULL, -1, 0, 3, jobs, &count, &err));
+    OK(store_job_list(q->store, NULL, NULL, 0, 3, jobs, &count, &err));
     CHECK(count == 3 && jobs[0].id == q->id && jobs[2].id == q->old);
     for (size_t i = 0; i < count; i++)
         job_release(&jobs[i]);
-    OK(store_job_list(q->store, NULL, JOB_RUNNING, q->young, 3, jobs, &count, &err));
+    OK(store_job_list(q->store, NULL, &(struct job_filter){.state = JOB_RUNNING, .kind = -1}, q->young, 3, jobs, &count,
+                      &err));
     CHECK(count == 2 && jobs[0].id == q->old && jobs[1].id == q->low);
     for (size_t i = 0; i < count; i++)
         job_release(&jobs[i]);
@@ -439,7 +440,7 @@ static void test_threads(void) {
 static void check_turns(struct store *store, const int64_t *wanted, size_t count) {
     for (size_t i = 0; i < count; i++) {
         int64_t id;
-        OK(store_job_next(store, 0, &id, &err));
+        OK(store_job_next(store, 0, NULL, &id, &err));
         CHECK_THAT(id == wanted[i], "place %zu: job %lld, wanted %lld", i, (long long)id, (long long)wanted[i]);
         OK(store_job_pause(store, id, &err));
     }

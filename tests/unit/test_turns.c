@@ -25,7 +25,7 @@ static int64_t job_of(int64_t user, int priority) {
 static int64_t owner_next(int limit) {
     struct job job = {0};
     int64_t id, owner = -1;
-    if (store_job_next(store, limit, &id, &err) == STATUS_OK && store_job_get(store, id, &job, &err) == STATUS_OK)
+    if (store_job_next(store, limit, NULL, &id, &err) == STATUS_OK && store_job_get(store, id, &job, &err) == STATUS_OK)
         owner = job.owner_id;
     job_release(&job);
     return owner;
@@ -121,7 +121,7 @@ static void test_months(void) {
 static int64_t test_running(void) {
     int64_t id;
     int attempt;
-    OK(store_job_next(store, 1, &id, &err));
+    OK(store_job_next(store, 1, NULL, &id, &err));
     OK(store_job_start(store, id, "process", &attempt, &err));
     int64_t second = job_of(3, 0);
     CHECK(owner_next(1) == 2 && owner_next(2) == 3);
@@ -221,7 +221,7 @@ static void test_ten_users(void) {
         struct job job;
         int64_t id;
         int attempt;
-        if (store_job_next(store, 1, &id, &err) != STATUS_OK)
+        if (store_job_next(store, 1, NULL, &id, &err) != STATUS_OK)
             break;
         OK(store_job_get(store, id, &job, &err));
         OK(store_job_start(store, id, "process", &attempt, &err));

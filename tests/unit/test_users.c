@@ -101,7 +101,7 @@ static void test_tokens(void) {
 static size_t jobs_seen(struct store *store, const struct caller *who, int state) {
     struct job jobs[10];
     size_t count;
-    OK(store_job_list(store, who, state, 0, 10, jobs, &count, &err));
+    OK(store_job_list(store, who, &(struct job_filter){.state = state, .kind = -1}, 0, 10, jobs, &count, &err));
     for (size_t i = 0; i < count; i++)
         job_release(&jobs[i]);
     return count;

@@ -1,0 +1,95 @@
+/* job_files.c -- see job_files.h.
+ *
+ * A file counts against its owner's share from its first byte: as an arrival, then as a part of its job's folder. It is in
+ * its place, durably, before its row says so. */
+#include "server/http/job_files.h"
+
+#include "common/file.h"
+#include "common/mem.h"
+#include "server/data/layout.h"
+#include "server/data/trash.h"
+#include "server/http/auth.h"
+#include "server/http/handlers.h"
+#include "server/http/job_reply.h"
+#include "server/http/limits.h"
+#include "server/http/scene_body.h"
+#include "server/http/space.h"
+#include "server/job/measure.h"
+#include "server/store/job_files.h"
+#include "server/transport/problem.h"
+#include "server/uploads/upload.h"
+
+#define NAME_SEGMENT 4 /* of the path */
+
+struct response *job_files_begin(struct api *api, struct request *r) {
+    struct response *refusal = NULL;
+    struct error err;
+    uint64_t length = r->content_length > 0 ? (uint64_t)r->content_length : 0;
+    int64_t id = auth_job_id(api, r, ACCESS_CHANGE, &refusal);
+    if (!refusal && (!r->has_body || r->content_length == 0))
+        refusal = problem_full(r, 400, "the body, the file, is missing", "curl -T sky.hdr URL", NULL);
+    if (!refusal && store_job_file_check(api->store, id, r->target.segments[NAME_SEGMENT], &err) != STATUS_OK)
+        refusal = problem_from(r, &err);
+    if (refusal)
+        return refusal;
+    pthread_mutex_lock(&api->folder.scene_mutex); /* two at once would both find room */
+    refusal = limits_check_file(api, r, length);
+    if (!refusal)
+        refusal = space_check_room(api, r, length);
+    if (!refusal)
+        refusal = space_check_share(api, r, NULL, length);
+    if (!refusal &&
+        upload_new(&r->upload, api->arrivals, r->caller.user_id, api->folder.dir, length, &err) != STATUS_OK)
+        refusal = problem_from(r, &err);
+    pthread_mutex_unlock(&api->folder.scene_mutex);
+    return refusal;
+}
+
+/* Moves the file to its place and enters it. The caller holds the mutex. */
+static enum status put_in_place(struct api *api, struct request *r, int64_t id, const char *name, const char *hex,
+                                bool *queued, struct error *err) {
+    const struct count_limits limits = {api->config.queue_limit, api->config.user_queue_limit};
+    uint64_t bytes = upload_bytes(r->upload);
+    enum status status = store_job_file_check(api->store, id, name, err);
+    if (status != STATUS_OK)
+        return status;
+    char *dir = layout_job(api->config.data_dir, id), *folder = layout_job_files(api->config.data_dir, id),
+         *path = layout_job_file(api->config.data_dir, id, name);
+    status = file_make_dirs(folder, err);
+    if (status == STATUS_OK)
+        status = upload_move(r->upload, path, err);
+    if (status == STATUS_OK)
+        status = store_job_file_put(api->store, id, name, bytes, hex, &limits, queued, err);
+    if (status == STATUS_NOT_FOUND) { /* the job was deleted in between: its folder goes, too */
+        char *inner = layout_job(NULL, id);
+        (void)trash_take(api->folder.trash, inner, NULL);
+        mem_free(inner);
+    }
+    struct error unmeasured; /* a size that is not known is measured later */
+    if (status == STATUS_OK)
+        (void)measure_job(api->store, id, dir, &unmeasured);
+    mem_free(path);
+    mem_free(folder);
+    mem_free(dir);
+    return status;
+}
+
+struct response *job_files_put(struct api *api, struct request *r) {
+    struct response *refusal = NULL;
+    struct error err;
+    char hex[SHA256_HEX_SIZE];
+    bool queued = false;
+    int64_t id = auth_job_id(api, r, ACCESS_CHANGE, &refusal);
+    if (!refusal)
+        refusal = scene_body_end(r, hex);
+    if (refusal)
+        return refusal;
+    pthread_mutex_lock(&api->folder.scene_mutex); /* job_files.h: one at a time */
+    enum status status = put_in_place(api, r, id, r->target.segments[NAME_SEGMENT], hex, &queued, &err);
+    pthread_mutex_unlock(&api->folder.scene_mutex);
+    if (status != STATUS_OK)
+        return problem_from(r, &err);
+    if (queued)
+        scheduler_wake(api->scheduler);
+    return job_reply_of(api, r, id, 200);
+}

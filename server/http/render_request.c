@@ -1,0 +1,144 @@
+/* render_request.c -- see render_request.h. */
+#include "server/http/render_request.h"
+
+#include <string.h>
+#include <unistd.h>
+
+#include "common/buf.h"
+#include "common/mem.h"
+#include "common/render_settings.h"
+#include "common/utf8.h"
+#include "server/data/work_file.h"
+#include "server/transport/problem.h"
+
+#define VIEWS "views.json"             /* the cameras of a reconstruction's held-out views, as an output */
+#define VIEWS_LIMIT ((size_t)64 << 20) /* bytes */
+
+static void add_faults(const cJSON *problems, cJSON *params) {
+    const cJSON *problem;
+    cJSON_ArrayForEach(problem, problems) {
+        const char *name = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(problem, "name"));
+        const char *reason = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(problem, "reason"));
+        const char *hint = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(problem, "hint"));
+        char *full = strcmp(name, "settings") == 0 ? mem_strdup(name) : mem_printf("settings.%s", name);
+        problem_param(params, full, hint, "%s", reason);
+        mem_free(full);
+    }
+}
+
+/* Notes the files; their names become names in a folder and in paths of URLs. */
+static void find_files(struct render_request *q, cJSON *params) {
+    cJSON *files = render_settings_files(q->settings);
+    const cJSON *name;
+    cJSON_ArrayForEach(name, files) {
+        if (!utf8_is_name(name->valuestring)) {
+            problem_param(params, "settings", NULL, "name a file with a control character");
+            continue;
+        }
+        q->file = mem_realloc_array(q->file, q->file_count + 1, sizeof *q->file);
+        q->file[q->file_count++] = mem_strdup(name->valuestring);
+    }
+    cJSON_Delete(files);
+}
+
+void render_request_read(struct render_request *q, const cJSON *settings, cJSON *params) {
+    cJSON *problems = cJSON_CreateArray();
+    struct error err;
+    q->settings = settings;
+    if (settings && render_settings_check(settings, RENDER_FILES_ATTACHED, problems, &err) != STATUS_OK)
+        add_faults(problems, params);
+    else if (settings)
+        find_files(q, params);
+    cJSON_Delete(problems);
+}
+
+/* --- what it costs ----------------------------------------------------------------------------- */
+
+/* The cameras of the source's held-out views; NULL where they cannot be read. The caller's. */
+static cJSON *read_views(struct api *api, int64_t source) {
+    struct output_row row = {0};
+    struct buf text;
+    char chunk[65536];
+    int fd = -1;
+    cJSON *views = NULL;
+    buf_init(&text, VIEWS_LIMIT);
+    if (store_output_get(api->store, source, VIEWS, &row, NULL) == STATUS_OK &&
+        work_file_open_output(api->config.data_dir, source, row.attempt, row.name, &fd, NULL) == STATUS_OK) {
+        ssize_t got;
+        bool fits = true;
+        while (fits && (got = read(fd, chunk, sizeof chunk)) > 0)
+            fits = buf_append(&text, chunk, (size_t)got);
+        close(fd);
+        if (fits)
+            views = cJSON_ParseWithLength(buf_text(&text), text.length);
+    }
+    buf_release(&text);
+    output_row_release(&row);
+    return views;
+}
+
+static double number_of(const cJSON *object, const char *name) {
+    const cJSON *value = cJSON_GetObjectItemCaseSensitive(object, name);
+    return cJSON_IsNumber(value) ? value->valuedouble : 0.0;
+}
+
+/* Pixels of the largest of the cameras. */
+static double pixels_of(const cJSON *frames) {
+    double most = 0.0;
+    const cJSON *frame;
+    cJSON_ArrayForEach(frame, frames) {
+        double pixels = number_of(frame, "w") * number_of(frame, "h");
+        most = pixels > most ? pixels : most;
+    }
+    return most;
+}
+
+/* How many views the setting `view` names; 0: not known. */
+static double count_views(const cJSON *settings, const cJSON *frames) {
+    if (render_settings_has(settings, "path"))
+        return render_settings_number(settings, "path_count");
+    if (render_settings_is(settings, "view", "all"))
+        return (double)cJSON_GetArraySize(frames);
+    double count = 1.0;
+    for (const char *at = render_settings_text(settings, "view"); *at; at++)
+        count += *at == ',';
+    return count;
+}
+
+/* 0: not known. */
+static double cost_of(const cJSON *settings, const cJSON *frames) {
+    uint32_t width, height;
+    double pixels = render_settings_size(settings, &width, &height) ? (double)width * height : pixels_of(frames);
+    if (render_settings_bool(settings, "per_light")) /* a picture for each source */
+        return 0.0;
+    return pixels * count_views(settings, frames) * render_settings_number(settings, "suns") *
+           render_settings_number(settings, "spp");
+}
+
+void render_request_look(struct api *api, struct render_request *q, int64_t source) {
+    cJSON *none = cJSON_CreateObject();
+    const cJSON *settings = q->settings ? q->settings : none;
+    bool knows_cameras = render_settings_is(settings, "cameras", "held_out");
+    cJSON *views = knows_cameras ? read_views(api, source) : NULL;
+    q->cost = cost_of(settings, cJSON_GetObjectItemCaseSensitive(views, "frames"));
+    cJSON_Delete(views);
+    cJSON_Delete(none);
+}
+
+void render_request_describe(const struct api *api, const struct render_request *q, cJSON *value) {
+    cJSON *files = cJSON_AddArrayToObject(value, "files");
+    for (size_t i = 0; i < q->file_count; i++)
+        cJSON_AddItemToArray(files, json_new_string(q->file[i]));
+    if (q->cost > 0.0)
+        json_add_number(value, "paths", q->cost);
+    else
+        json_add(value, "paths", cJSON_CreateNull());
+    json_add_bool(value, "small", q->cost > 0.0 && q->cost <= api->config.small_render_cost);
+}
+
+void render_request_release(struct render_request *q) {
+    for (size_t i = 0; i < q->file_count; i++)
+        mem_free(q->file[i]);
+    mem_free(q->file);
+    *q = (struct render_request){0};
+}
