@@ -46,46 +46,54 @@ struct candidate_levels {
 
 static const struct candidate_levels diffuse_candidate = {ROUGHNESSES - 1, 0};
 
+typedef float misfits[ROUGHNESSES][SPECULARS]; /* of a point, by the candidates */
+
 /* Points of one segment and their misfits. */
 struct segment_points {
-    size_t count; /* points */
-    double floor; /* MISFIT_FLOOR or MISFIT_FLOOR_EDGE */
-    struct specular_point point[SPECULAR_MAX_POINTS];
-    float misfit[SPECULAR_MAX_POINTS][ROUGHNESSES][SPECULARS];
+    size_t count;
+    bool is_observed; /* its material can be fitted; otherwise these points only tell whether it is dark */
+    double floor;     /* MISFIT_FLOOR or MISFIT_FLOOR_EDGE */
+    struct specular_sample *sample; /* borrowed, [points wanted] */
+    misfits *misfit;                /* likewise */
 };
 
 struct specular_job {
     const bool *is_emitter; /* [segment_count]; borrowed, both */
     struct materials *materials;
     struct specular_observer observer;
-    struct segment_points *points;      /* [threads]; owned */
+    struct segment_points *points;  /* [segment_count]; owned */
+    struct specular_sample *sample; /* of all segments; owned */
+    misfits *misfit;                /* likewise */
+    uint32_t *used;                 /* samples to be fitted, [used_count]; owned */
+    size_t used_count;
     struct specular_evidence *evidence; /* [segment_count]; owned */
 };
 
 /* --- misfits ------------------------------------------------------------------------------------ */
 
-/* Robust misfit of one channel of a point's observations under roughness k and specular m, with the base colour that
- * fits them best (iteratively reweighted least squares; Geman and McClure's function). */
-static float misfit_channel(const struct specular_point *p, size_t k, size_t m, int channel, float median) {
+/* Robust misfit of one channel of a sample under roughness k and specular m, with the base colour that fits its views
+ * best (iteratively reweighted least squares; Geman and McClure's function). */
+static float misfit_channel(const struct specular_sample *s, const struct specular_prediction *prediction, size_t k,
+                            size_t m, int channel, float median) {
     float diffuse[SPECULAR_VIEWS], unit_diffuse[SPECULAR_VIEWS], weight[SPECULAR_VIEWS], mean = 0.0f, misfit = 0.0f;
-    for (size_t i = 0; i < p->count; i++) {
-        const struct specular_observation *l = &p->observation[i];
-        float highlight = m == 0 ? 0.0f : (&l->highlight.radiance[k][m - 1].r)[channel];
-        diffuse[i] = (&l->observed.r)[channel] - highlight;
-        unit_diffuse[i] = (&l->unit_diffuse[k].r)[channel];
+    for (size_t i = 0; i < s->count; i++) {
+        const struct specular_prediction *p = &prediction[i];
+        float highlight = m == 0 ? 0.0f : (&p->highlight.radiance[k][m - 1].r)[channel];
+        diffuse[i] = (&s->view[i].observed.r)[channel] - highlight;
+        unit_diffuse[i] = (&p->unit_diffuse[k].r)[channel];
         weight[i] = 1.0f;
-        mean += (&l->observed.r)[channel] / (float)p->count;
+        mean += (&s->view[i].observed.r)[channel] / (float)s->count;
     }
     float scale = SCALE_RELATIVE * mean + SCALE_MEDIAN * median;
     for (int sweep = 0; sweep < 4; sweep++) {
         float over = 0.0f, under = 1e-20f;
-        for (size_t i = 0; i < p->count; i++) {
+        for (size_t i = 0; i < s->count; i++) {
             over += weight[i] * unit_diffuse[i] * diffuse[i];
             under += weight[i] * unit_diffuse[i] * unit_diffuse[i];
         }
         float base = clampf(over / under, 0.0f, MAX_BASE_COLOR);
         misfit = 0.0f;
-        for (size_t i = 0; i < p->count; i++) {
+        for (size_t i = 0; i < s->count; i++) {
             float e = (diffuse[i] - base * unit_diffuse[i]) / scale, influence = 1.0f / (1.0f + e * e);
             weight[i] = influence * influence;
             misfit += e * e * influence;
@@ -94,39 +102,42 @@ static float misfit_channel(const struct specular_point *p, size_t k, size_t m, 
     return misfit;
 }
 
-static void find_misfits(const struct specular_job *job, struct segment_points *e) {
+/* One sample is the unit of parallel work: it takes some milliseconds, a segment up to a thousand times as long. */
+static void find_misfits(void *user, size_t index, int thread) {
+    const struct specular_job *job = user;
+    const struct specular_sample *s = &job->sample[job->used[index]];
+    misfits *misfit = &job->misfit[job->used[index]];
+    struct specular_prediction prediction[SPECULAR_VIEWS];
     float median = job->observer.in.views->median_radiance;
-    for (size_t i = 0; i < e->count; i++) {
-        for (size_t k = 0; k < ROUGHNESSES; k++) {
-            for (size_t m = 0; m < SPECULARS; m++) {
-                e->misfit[i][k][m] = 0.0f;
-                for (int c = 0; c < 3; c++)
-                    e->misfit[i][k][m] += misfit_channel(&e->point[i], k, m, c, median);
-            }
+    specular_predict(&job->observer, s, thread, prediction);
+    for (size_t k = 0; k < ROUGHNESSES; k++) {
+        for (size_t m = 0; m < SPECULARS; m++) {
+            (*misfit)[k][m] = 0.0f;
+            for (int c = 0; c < 3; c++)
+                (*misfit)[k][m] += misfit_channel(s, prediction, k, m, c, median);
         }
     }
 }
 
 /* Samples points of a segment; false where fewer than two have enough observations. */
-static bool sample_points(const struct specular_job *job, size_t segment, struct specular_criteria criteria,
-                          int thread) {
-    struct segment_points *e = &job->points[thread];
-    e->count = specular_observe(&job->observer, segment, criteria, thread, e->point);
+static bool sample_points(const struct specular_job *job, size_t segment, struct specular_criteria criteria) {
+    struct segment_points *e = &job->points[segment];
+    e->count = specular_observe(&job->observer, segment, criteria, e->sample);
     e->floor = criteria.edge == 0 ? MISFIT_FLOOR : MISFIT_FLOOR_EDGE;
     return e->count >= 2;
 }
 
 /* Relaxes the requirements until there are enough points: first pixels nearer to edges, then smaller patches. False
  * where there are fewer than two. */
-static bool sample_segment(const struct specular_job *job, size_t segment, int thread) {
+static bool sample_enough(const struct specular_job *job, size_t segment) {
     struct specular_criteria criteria = {specular_widest_patch(&job->observer, segment), 0, MIN_VIEWS};
     size_t enough = specular_points_wanted(&job->observer, segment) / PART_ENOUGH;
     enough = enough < POINTS_ENOUGH ? POINTS_ENOUGH : enough;
     for (;; criteria.patch = fmaxf(0.5f * criteria.patch, SPECULAR_MIN_PATCH)) {
         bool enough_points = false;
         for (criteria.edge = 0; criteria.edge < VIEWS_EDGE; criteria.edge++) {
-            enough_points = sample_points(job, segment, criteria, thread);
-            if (job->points[thread].count >= enough)
+            enough_points = sample_points(job, segment, criteria);
+            if (job->points[segment].count >= enough)
                 return true;
         }
         if (criteria.patch <= SPECULAR_MIN_PATCH)
@@ -234,36 +245,43 @@ static void set_lobe(struct materials *materials, size_t segment, double roughne
     materials->specular[segment] = (float)specular;
 }
 
+/* Without clean observations mixed pixels and single photographs have to do: for the test of is_too_dark they suffice. */
+static void sample_segment(void *user, size_t segment, int thread) {
+    const struct specular_job *job = user;
+    struct segment_points *e = &job->points[segment];
+    (void)thread;
+    if (job->is_emitter[segment]) /* its own light hides what it reflects */
+        return;
+    e->is_observed = sample_enough(job, segment);
+    if (!e->is_observed && !sample_points(job, segment, (struct specular_criteria){SPECULAR_MIN_PATCH, VIEWS_EDGE, 1}))
+        e->count = 0;
+}
+
 /* Whether a segment without clean observations is darker than the material for unknown segments allows, which reflects
- * a window at grazing angles. Mixed pixels and single photographs suffice for this one-sided test: base colour explains
- * anything brighter. */
-static bool is_too_dark(const struct specular_job *job, size_t segment, int thread) {
+ * a window at grazing angles. This test is one-sided: base colour explains anything brighter. */
+static bool is_too_dark(const struct segment_points *e) {
     struct candidate_levels guess = {0, 0};
     double part, errors;
-    if (!sample_points(job, segment, (struct specular_criteria){SPECULAR_MIN_PATCH, VIEWS_EDGE, 1}, thread))
+    if (e->count == 0)
         return false;
-    find_misfits(job, &job->points[thread]);
     while (specular_levels.roughness[guess.k] < UNKNOWN_ROUGHNESS)
         guess.k++;
     while (specular_of[guess.m] < UNKNOWN_SPECULAR)
         guess.m++;
-    compare(&job->points[thread], diffuse_candidate, guess, &part, &errors);
+    compare(e, diffuse_candidate, guess, &part, &errors);
     return part < -DARKER_PART && errors < -DARKER_ERRORS;
 }
 
 static void measure_segment(void *user, size_t segment, int thread) {
     const struct specular_job *job = user;
-    if (job->is_emitter[segment]) { /* its own light hides what it reflects */
+    const struct segment_points *e = &job->points[segment];
+    (void)thread;
+    if (e->is_observed)
+        set_evidence(job, segment, e);
+    if (job->is_emitter[segment] || (!e->is_observed && is_too_dark(e)))
         set_lobe(job->materials, segment, 1.0, 0.0);
-        return;
-    }
-    set_lobe(job->materials, segment, UNKNOWN_ROUGHNESS, UNKNOWN_SPECULAR);
-    if (sample_segment(job, segment, thread)) {
-        find_misfits(job, &job->points[thread]);
-        set_evidence(job, segment, &job->points[thread]);
-    } else if (is_too_dark(job, segment, thread)) {
-        set_lobe(job->materials, segment, 1.0, 0.0);
-    }
+    else
+        set_lobe(job->materials, segment, UNKNOWN_ROUGHNESS, UNKNOWN_SPECULAR);
 }
 
 static void fit_segment(void *user, size_t segment, int thread) {
@@ -279,16 +297,44 @@ static void fit_segment(void *user, size_t segment, int thread) {
         set_lobe(job->materials, segment, posterior.roughness, posterior.specular);
 }
 
+/* Room for the samples of all segments. */
+static void make_room(struct specular_job *job, size_t segments) {
+    size_t total = 0, first = 0;
+    for (size_t i = 0; i < segments; i++)
+        total += specular_points_wanted(&job->observer, i);
+    job->points = mem_calloc(segments, sizeof *job->points);
+    job->sample = mem_array(total, sizeof *job->sample);
+    job->misfit = mem_array(total, sizeof *job->misfit);
+    job->used = mem_array(total, sizeof *job->used);
+    for (size_t i = 0; i < segments; i++) {
+        job->points[i].sample = &job->sample[first];
+        job->points[i].misfit = &job->misfit[first];
+        first += specular_points_wanted(&job->observer, i);
+    }
+}
+
+static void list_used(struct specular_job *job, size_t segments) {
+    for (size_t i = 0; i < segments; i++)
+        for (size_t k = 0; k < job->points[i].count; k++)
+            job->used[job->used_count++] = (uint32_t)(job->points[i].sample - job->sample + (ptrdiff_t)k);
+}
+
 void specular_fit(const struct specular_input *input, const bool *is_emitter, struct materials *materials,
                   struct parallel *pool) {
     struct specular_job job = {.is_emitter = is_emitter, .materials = materials};
-    size_t threads = (size_t)parallel_thread_count(pool), segments = input->surface.segments->count;
-    specular_observer_init(&job.observer, input, (int)threads);
-    job.points = mem_array(threads, sizeof *job.points);
+    size_t segments = input->surface.segments->count;
+    specular_observer_init(&job.observer, input, parallel_thread_count(pool));
     job.evidence = mem_calloc(segments, sizeof *job.evidence);
+    make_room(&job, segments);
+    parallel_for(pool, segments, sample_segment, &job);
+    list_used(&job, segments);
+    parallel_for(pool, job.used_count, find_misfits, &job);
     parallel_for(pool, segments, measure_segment, &job);
     parallel_for(pool, segments, fit_segment, &job);
-    mem_free(job.evidence);
+    mem_free(job.used);
+    mem_free(job.misfit);
+    mem_free(job.sample);
     mem_free(job.points);
+    mem_free(job.evidence);
     specular_observer_release(&job.observer);
 }

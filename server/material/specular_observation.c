@@ -31,11 +31,11 @@ const struct highlight_levels specular_levels = {
     .specular = {0.125f, 0.25f, 0.5f, 0.75f, 1.0f},
 };
 
-/* Places of a patch, and the irradiance at each. */
+/* Places of a patch, and their positions in the texture. */
 struct specular_patch {
     size_t count;
     struct surface_point at[PATCH * PATCH];
-    struct irradiance light[PATCH * PATCH];
+    vec2 texture[PATCH * PATCH];
 };
 
 /* Places around a texel that are in its chart and have similar normals. */
@@ -49,17 +49,25 @@ static void patch_around(const struct specular_observer *l, uint32_t texel, floa
     float x0 = (float)(texel % s->atlas->width) + 0.5f, y0 = (float)(texel / s->atlas->width) + 0.5f;
     for (int i = 0; i < PATCH * PATCH; i++) {
         struct surface_point p;
-        struct probe_mix mix;
         float dx = ((float)(i % PATCH) + 0.5f) / PATCH - 0.5f, dy = ((float)(i / PATCH) + 0.5f) / PATCH - 0.5f;
         float x = x0 + side * dx, y = y0 + side * dy;
         if (!surface_at(s->mesh, s->atlas, s->inverse, x, y, &p) || s->atlas->chart_of_triangle[p.triangle] != chart ||
             vec3_dot(p.shading, at.shading) < MIN_NORMAL_COSINE)
             continue;
-        probes_mix(l->in.probes, s->atlas, l->in.fused, (uint32_t)y * s->atlas->width + (uint32_t)x, &p, &mix);
-        probes_irradiance(l->in.probes, &mix, &patch->light[patch->count]);
-        sun_add_light(l->in.sun, l->in.field->world->accel, &p, &patch->light[patch->count]);
+        patch->texture[patch->count] = (vec2){x, y};
         patch->at[patch->count++] = p;
     }
+}
+
+/* Irradiance at a place of a patch. */
+static void light_at(const struct specular_observer *l, const struct specular_patch *patch, size_t i,
+                     struct irradiance *light) {
+    const struct atlas *atlas = l->in.surface.atlas;
+    struct probe_mix mix;
+    uint32_t texel = (uint32_t)patch->texture[i].y * atlas->width + (uint32_t)patch->texture[i].x;
+    probes_mix(l->in.probes, atlas, l->in.fused, texel, &patch->at[i], &mix);
+    probes_irradiance(l->in.probes, &mix, light);
+    sun_add_light(l->in.sun, l->in.field->world->accel, &patch->at[i], light);
 }
 
 /* Mean radiance of the patch in a photograph. False unless every place faces the camera, has a valid sample and is no
@@ -83,50 +91,53 @@ static bool patch_observed(const struct views *views, const struct view *view, c
     return patch->count > 0;
 }
 
-/* Radiance that each candidate reflects towards a photograph, mean over the patch. */
-static void predict(const struct specular_observer *l, const struct specular_patch *patch, uint32_t texel,
-                    uint32_t train, struct incident *scratch, struct specular_observation *observation) {
-    float share = 1.0f / (float)patch->count;
-    memset(observation->unit_diffuse, 0, sizeof observation->unit_diffuse);
-    memset(&observation->highlight, 0, sizeof observation->highlight);
-    for (size_t i = 0; i < patch->count; i++) {
-        const struct surface_point *at = &patch->at[i];
-        struct highlight highlight;
-        vec3 wo = views_direction(l->in.views, train, at->position);
-        highlight_gather(&highlight, scratch, l->in.field, at, wo, &specular_levels,
-                         sampler_key(KEY_SPECULAR + i, texel, train), SAMPLES_A_LEVEL * HIGHLIGHT_ROUGHNESSES,
-                         LIGHT_SAMPLES);
-        for (size_t k = 0; k < HIGHLIGHT_ROUGHNESSES; k++) {
-            rgb unit_diffuse = irradiance_diffuse(&patch->light[i], at->shading, specular_levels.roughness[k], wo);
-            observation->unit_diffuse[k] = rgb_mad(observation->unit_diffuse[k], share, unit_diffuse);
-            for (size_t m = 0; m < HIGHLIGHT_SPECULARS; m++)
-                observation->highlight.radiance[k][m] =
-                    rgb_mad(observation->highlight.radiance[k][m], share, highlight.radiance[k][m]);
-        }
+/* Adds what each candidate reflects towards a photograph from a place of the patch, times `share`. */
+static void add_place(const struct specular_observer *l, const struct surface_point *at, const struct irradiance *light,
+                      uint32_t key, uint32_t train, float share, struct incident *scratch,
+                      struct specular_prediction *prediction) {
+    struct highlight highlight;
+    vec3 wo = views_direction(l->in.views, train, at->position);
+    highlight_gather(&highlight, scratch, l->in.field, at, wo, &specular_levels, key,
+                     SAMPLES_A_LEVEL * HIGHLIGHT_ROUGHNESSES, LIGHT_SAMPLES);
+    for (size_t k = 0; k < HIGHLIGHT_ROUGHNESSES; k++) {
+        rgb unit_diffuse = irradiance_diffuse(light, at->shading, specular_levels.roughness[k], wo);
+        prediction->unit_diffuse[k] = rgb_mad(prediction->unit_diffuse[k], share, unit_diffuse);
+        for (size_t m = 0; m < HIGHLIGHT_SPECULARS; m++)
+            prediction->highlight.radiance[k][m] =
+                rgb_mad(prediction->highlight.radiance[k][m], share, highlight.radiance[k][m]);
+    }
+}
+
+void specular_predict(const struct specular_observer *l, const struct specular_sample *sample, int thread,
+                      struct specular_prediction *prediction) {
+    struct specular_patch patch;
+    patch_around(l, sample->texel, sample->patch, &patch);
+    float share = 1.0f / (float)patch.count;
+    memset(prediction, 0, sample->count * sizeof *prediction);
+    for (size_t i = 0; i < patch.count; i++) {
+        struct irradiance light;
+        light_at(l, &patch, i, &light);
+        for (size_t k = 0; k < sample->count; k++)
+            add_place(l, &patch.at[i], &light, sampler_key(KEY_SPECULAR + i, sample->texel, sample->view[k].train),
+                      sample->view[k].train, share, &l->scratch[thread], &prediction[k]);
     }
 }
 
 static bool observe_texel(const struct specular_observer *l, uint32_t texel, struct specular_criteria criteria,
-                          struct incident *scratch, struct specular_point *point) {
+                          struct specular_sample *sample) {
     struct specular_patch patch;
     struct view view[VIEWS_TRIED];
-    size_t observed_count = 0;
-    point->count = 0;
+    *sample = (struct specular_sample){.texel = texel, .patch = criteria.patch};
     patch_around(l, texel, criteria.patch, &patch);
     if (patch.count == 0)
         return false;
     const struct surface_point *middle = &patch.at[patch.count / 2];
     size_t view_count = views_pick(l->in.views, middle->position, middle->normal, texel, VIEWS_TRIED, view);
-    for (size_t i = 0; i < view_count && observed_count < SPECULAR_VIEWS; i++) {
-        if (patch_observed(l->in.views, &view[i], &patch, criteria.edge, &point->observation[observed_count].observed))
-            view[observed_count++] = view[i];
+    for (size_t i = 0; i < view_count && sample->count < SPECULAR_VIEWS; i++) {
+        if (patch_observed(l->in.views, &view[i], &patch, criteria.edge, &sample->view[sample->count].observed))
+            sample->view[sample->count++].train = view[i].train;
     }
-    if (observed_count < criteria.least)
-        return false;
-    for (size_t i = 0; i < observed_count; i++)
-        predict(l, &patch, texel, view[i].train, scratch, &point->observation[i]);
-    point->count = observed_count;
-    return true;
+    return sample->count >= criteria.least;
 }
 
 size_t specular_points_wanted(const struct specular_observer *l, size_t segment) {
@@ -143,13 +154,13 @@ float specular_widest_patch(const struct specular_observer *l, size_t segment) {
 }
 
 size_t specular_observe(const struct specular_observer *l, size_t segment, struct specular_criteria criteria,
-                        int thread, struct specular_point *point) {
+                        struct specular_sample *sample) {
     size_t points = specular_points_wanted(l, segment);
     uint32_t texels = l->texels.first[segment + 1] - l->texels.first[segment];
     const uint32_t *texel = &l->texels.texel[l->texels.first[segment]];
     size_t tries = TRIES * points, count = 0, step = choose_even_step(texels);
     for (size_t i = 0; i < tries && i < texels && count < points; i++)
-        count += observe_texel(l, texel[i * step % texels], criteria, &l->scratch[thread], &point[count]);
+        count += observe_texel(l, texel[i * step % texels], criteria, &sample[count]);
     return count;
 }
 

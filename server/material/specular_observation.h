@@ -18,22 +18,27 @@
 #include "server/scene/surface.h"
 
 #define SPECULAR_VIEWS 10        /* observations of a point, at most; bounds time and memory */
-#define SPECULAR_MAX_POINTS 1024 /* points of a segment, at most; bounds memory: 9 MB a thread */
+#define SPECULAR_MAX_POINTS 1024 /* points of a segment, at most; bounds memory and the share of one segment */
 #define SPECULAR_MIN_PATCH 8.0f  /* least side of a patch, texels */
 
 /* Roughness and specular of the candidates. */
 extern const struct highlight_levels specular_levels;
 
-/* A point in one photograph: observed radiance, and what each candidate reflects there. */
-struct specular_observation {
-    rgb observed;
-    rgb unit_diffuse[HIGHLIGHT_ROUGHNESSES]; /* by the diffuse lobe of base colour 1 */
-    struct highlight highlight;
+/* A sample point of a segment, and what photographs show there: means over a square patch. */
+struct specular_sample {
+    uint32_t texel;
+    float patch; /* side of the patch, texels */
+    uint32_t count;
+    struct {
+        uint32_t train; /* index into views.train */
+        rgb observed;
+    } view[SPECULAR_VIEWS];
 };
 
-struct specular_point {
-    size_t count;
-    struct specular_observation observation[SPECULAR_VIEWS];
+/* What each candidate reflects towards the photographs of a sample. */
+struct specular_prediction {
+    rgb unit_diffuse[HIGHLIGHT_ROUGHNESSES]; /* by the diffuse lobe of base colour 1 */
+    struct highlight highlight;
 };
 
 /* What the observer reads. Borrowed. */
@@ -69,8 +74,12 @@ float specular_widest_patch(const struct specular_observer *l, size_t segment);
 /* Points wanted of a segment. */
 size_t specular_points_wanted(const struct specular_observer *l, size_t segment);
 
-/* Fills point[SPECULAR_MAX_POINTS] with as many points, or fewer; returns their number. */
+/* Fills sample[specular_points_wanted] with as many samples, or fewer; returns their number. */
 size_t specular_observe(const struct specular_observer *l, size_t segment, struct specular_criteria criteria,
-                        int thread, struct specular_point *point);
+                        struct specular_sample *sample);
+
+/* Fills prediction[sample->count]. */
+void specular_predict(const struct specular_observer *l, const struct specular_sample *sample, int thread,
+                      struct specular_prediction *prediction);
 
 #endif
