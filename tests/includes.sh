@@ -111,7 +111,8 @@ fi
 tags=$(grep -rhoE '\b(struct|enum|union) [a-z_0-9]+ \{' common client server --include='*.[ch]' |
     sed -E 's/.* ([a-z_0-9]+) \{/\1/' | sort | uniq -d | xargs)
 [ -z "$tags" ] || { printf 'tags of more than one struct, enum or union: %s\n' "$tags"; bad=1; }
-constants=$(grep -rhoE '^#define [A-Za-z_0-9]+' common client server --include='*.h' | sort | uniq -d | xargs)
+constants=$(grep -roE '^#define [A-Za-z_0-9]+' common client server --include='*.h' | sort -u | sed 's/.*://' | sort |
+    uniq -d | xargs)
 [ -z "$constants" ] || { printf 'defined in more than one header: %s\n' "$constants"; bad=1; }
 silent=$(grep -L 'check_result()' tests/{unit,gradient,render,api,chaos,soak}/test_*.c 2>/dev/null)
 [ -z "$silent" ] || { printf 'cannot fail, for want of check_result:\n%s\n' "$silent"; bad=1; }

@@ -3,19 +3,13 @@
 
 #include "server/render/accel.h"
 #include "server/render/bsdf.h"
+#include "server/render/kernel.h"
 #include "server/render/sampler.h"
 
 #define MIN_CONTRIBUTION_SHARE 0.1f /* of the path's radiance so far; smaller contributions undergo roulette */
 
 /* Random numbers of a vertex: pairs 4 k + these. Pairs below 4 are the camera's. */
 enum { PAIR_CHOICES, PAIR_LIGHT, PAIR_DIRECTION, PAIR_ROULETTE, PAIRS_PER_VERTEX };
-
-/* Sanitizers do not support the ifunc resolver of target_clones. */
-#if defined(__x86_64__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-#define KERNEL __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
-#else
-#define KERNEL
-#endif
 
 #ifdef __clang__ /* clang does not know the pragma */
 #define FOR_LANES for (int i = 0; i < LANES; i++)
