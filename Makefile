@@ -23,7 +23,7 @@ EXR_CFLAGS = $(eval EXR_CFLAGS := $(shell pkg-config --cflags OpenEXR))$(EXR_CFL
 EXR_LIBS = -lOpenEXRCore
 COMMON_LIBS = -lcjson -lm
 IMAGE_LIBS = $(EXR_LIBS) -lpng -ljpeg -ltiff -lheif -lwebpdemux -lwebp -llcms2 -lz
-SERVER_LIBS = -lmeshoptimizer -lmicrohttpd -lgnutls -lsqlite3 -larchive -lseccomp -lexpat $(EMBREE_LIB) $(IMAGE_LIBS) $(COMMON_LIBS)
+SERVER_LIBS = -lmeshoptimizer -lmicrohttpd -lgnutls -lsqlite3 -larchive -lseccomp -lexpat -lunistring $(EMBREE_LIB) $(IMAGE_LIBS) $(COMMON_LIBS)
 CLIENT_LIBS = -lcurl -larchive $(COMMON_LIBS)
 EMBREE_LIB = $(if $(wildcard /usr/include/embree4/rtcore.h /usr/local/include/embree4/rtcore.h),-lembree4,-lembree3)
 

@@ -11,6 +11,7 @@
 #include "common/image.h"
 #include "common/mem.h"
 #include "server/ingest/mesh/gltf_meshopt.h"
+#include "server/ingest/name_key.h"
 #include "server/ingest/source/xml.h"
 #include "server/net/tls.h"
 #include "server/render/accel.h"
@@ -52,6 +53,7 @@ void libraries_list(struct library list[LIBRARY_COUNT]) {
         written("lcms2", color_icc_version),
         named("meshoptimizer", "", gltf_meshopt_version()),
         named("libexpat", "expat_", xml_library_version()),
+        written("libunistring", name_key_library_version),
         written("libseccomp", confine_library_version),
     };
     memcpy(list, all, sizeof all);

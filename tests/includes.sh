@@ -90,6 +90,7 @@ own 'tiffio\.h' common/tiff.h
 own 'webp/' common/webp.c
 own 'meshoptimizer' server/ingest/mesh/gltf_meshopt.c
 own 'expat\.h' server/ingest/source/xml.c
+own 'uni(case|norm|string)' server/ingest/name_key.c
 own 'seccomp\.h' server/worker/confine_calls.c
 
 # Paths in the data folder are made in one place. (Of the engine's files only worker knows the names.)

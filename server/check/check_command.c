@@ -70,6 +70,14 @@ static void print_problems(const cJSON *problems) {
     }
 }
 
+/* What is wrong, and what was noticed before: why frames were left out, for example. */
+static void print_refusal(const struct scene_check *room, const cJSON *problems) {
+    cJSON *warnings = facts_warnings(&room->scene);
+    print_list("warning: ", warnings);
+    print_problems(problems);
+    cJSON_Delete(warnings);
+}
+
 static void print_json(const cJSON *json) {
     char *text = json_page(json);
     puts(text);
@@ -117,7 +125,7 @@ static enum status check(const struct arguments *a, const struct reading *readin
     else if (facts)
         print_facts(facts);
     else
-        print_problems(problems);
+        print_refusal(&room, problems);
     cJSON_Delete(facts);
     cJSON_Delete(problems);
     scene_check_release(&room);

@@ -16,7 +16,9 @@ enum status fit_check(const struct scene_row *scene, cJSON **remedy, struct erro
     cJSON *facts = cJSON_Parse(scene->facts);
     const cJSON *fit = cJSON_GetObjectItemCaseSensitive(facts, "fit");
     const cJSON *known = cJSON_GetObjectItemCaseSensitive(fit, "remedy");
-    const char *why = cJSON_GetStringValue(cJSON_GetArrayItem(cJSON_GetObjectItemCaseSensitive(fit, "evidence"), 0));
+    /* The last one is that which decided. */
+    const cJSON *evidence = cJSON_GetObjectItemCaseSensitive(fit, "evidence");
+    const char *why = cJSON_GetStringValue(cJSON_GetArrayItem(evidence, cJSON_GetArraySize(evidence) - 1));
     const char *remedy_text = text_of(fit, "remedy_text");
     enum status status = STATUS_OK;
     if (remedy)

@@ -135,7 +135,7 @@ doctor 0 'warn +machine .*more memory than there is' --data "$work/none" --set w
 doctor 0 'warn +data .*chmod go=' --data "$work/others" --set min_free_mib=1
 doctor 1 'FAIL +disk' --data "$work/others" --set min_free_mib=16777216
 doctor 1 'FAIL +database .*damaged' --data "$work/damaged" --set min_free_mib=1
-doctor 0 'ok +libraries .*gnutls [0-9].*sqlite [0-9].*libjpeg [0-9].*zlib [0-9].*libtiff [0-9.]+, .*libexpat [0-9].*libseccomp [0-9]' --data "$work/none"
+doctor 0 'ok +libraries .*gnutls [0-9].*sqlite [0-9].*libjpeg [0-9].*zlib [0-9].*libtiff [0-9.]+, .*libexpat [0-9].*libunistring [0-9].*libseccomp [0-9]' --data "$work/none"
 doctor 0 'ok +tokens .*open: .*may do everything' --data "$work/none" --set access=open
 doctor 1 'FAIL +tokens .*loopback addresses only' --data "$work/none" --set access=open --set listen=0.0.0.0:1
 doctor 1 'warn +tls .*unencrypted' --data "$work/none" --set listen=0.0.0.0:1

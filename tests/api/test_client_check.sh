@@ -77,6 +77,9 @@ head -c 200 "$work/room/walls.ply" >"$work/broken/mesh.ply"
 run 4 submit "$work/broken" --dry-run
 has "$err" "mesh.ply: "
 has "$err" "warning: images/1.png"
+out=$("$build/unbaked" check "$work/broken") && fail "unbaked check: a broken mesh is accepted"
+has "$out" "problem: mesh.ply: "
+has "$out" "warning: images/1.png"
 run 2 scenes set
 run 2 scenes set "$id" scale=big
 run 2 scenes set "$id" --pin

@@ -41,6 +41,8 @@ int main(void) {
     check_fit("{\"fit\":{\"verdict\":\"no\",\"evidence\":[\"rays hit nothing\"],\"remedy\":{\"lens\":0.5}}}",
               STATUS_CONFLICT, "unbake scenes set 0123456789ab lens=0.5", "{\"lens\":0.5}");
     check_fit("{\"fit\":{\"verdict\":\"no\",\"evidence\":\"x\",\"remedy\":[1]}}", STATUS_CONFLICT, "fit=ignore", "");
+    check_fit("{\"fit\":{\"verdict\":\"no\",\"evidence\":[\"all rays hit it\",\"pictures differ\"],\"remedy\":null}}",
+              STATUS_CONFLICT, "do not fit: pictures differ", ""); /* the last decided */
     check_fit("{\"fit\":[\"no\"]}", STATUS_OK, "", "");
     return check_result();
 }

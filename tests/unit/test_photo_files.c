@@ -239,6 +239,23 @@ static void names(void) {
     CHECK(unlink(mask) == 0);
     put_frames("images/a.jpg", "images/b.JPG", "images/c.jpeg", "masks/a.jpg");
     CHECK_THAT(!load(work) && strstr(told, "the mask is not in the bundle"), "%s", told);
+    /* "a" and a combining diaeresis on the disk, as macOS writes it, one letter in the list; upper case */
+    put_copy("images/a\xcc\x88.jpg", PLAIN, SIZE_MAX);
+    put_copy("images/a\xcc\x8a.jpg", PLAIN, SIZE_MAX);
+    put_frames("images/\xc3\xa4.jpg", "images/\xc3\x85.JPG", "images/c.jpeg", NULL);
+    CHECK_THAT(load(work), "%s", told);
+    check_names("images/a\xcc\x88.jpg", "images/a\xcc\x8a.jpg", "images/c.jpeg");
+    /* not UTF-8 */
+    put_copy("images/\xe4.jpg", PLAIN, SIZE_MAX);
+    put_frames("images/a.jpg", "images/b.JPG", "images/c.png", NULL);
+    CHECK_THAT(load(work), "%s", told);
+    /* a list of frames by another name is told */
+    char *list = file_join(work, "transforms.json"), *renamed = file_join(work, "frames_b.json");
+    CHECK(rename(list, renamed) == 0);
+    CHECK_THAT(!load(work) && strstr(told, "frames_b.json has frames") && strstr(told, "transforms=PATH"), "%s", told);
+    CHECK(rename(renamed, list) == 0);
+    mem_free(renamed);
+    mem_free(list);
     /* two files that a name may mean */
     put_copy("images/c.tif", PLAIN, SIZE_MAX);
     put_frames("images/a.jpg", "images/b.JPG", "images/c.png", NULL);

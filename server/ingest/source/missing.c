@@ -106,6 +106,20 @@ static struct bundle_contents look(const struct listing *l) {
     return c;
 }
 
+/* Files of frames that go by another name than transforms.json: which one is meant is not ours to say. */
+static bool tell_renamed_transforms(const struct listing *l, struct findings *f) {
+    char reason[300], *path = NULL;
+    for (size_t i = 0; i < l->folder_count && !path; i++)
+        path = listing_first_with(l, l->folder[i], "*.json", "\"frames\"", "\"transform_matrix\"");
+    if (!path)
+        return false;
+    snprintf(reason, sizeof reason, "no cameras: the bundle has no transforms.json; %.200s has frames, by its looks",
+             path);
+    tell(f, path, reason, "--scene-set transforms=PATH, or transforms in PATCH /v1/scenes/ID, says which file it is");
+    mem_free(path);
+    return true;
+}
+
 void missing_tell_cameras(const struct listing *l, const char *chosen, struct findings *f) {
     struct bundle_contents c = look(l);
     char reason[300];
@@ -121,6 +135,8 @@ void missing_tell_cameras(const struct listing *l, const char *chosen, struct fi
             return;
         }
     }
+    if (tell_renamed_transforms(l, f))
+        return;
     if (c.video && c.photographs <= 2) {
         tell(f, c.video, "no cameras: this is a video",
              "ffmpeg -i VIDEO -vf fps=2 -q:v 2 images/%05d.jpg, then " COLMAP_FIRST);

@@ -1,13 +1,13 @@
 /* photo_folder.c -- see photo_folder.h. */
 #include "server/ingest/source/photo_folder.h"
 
-#include <ctype.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
 #include "common/image.h"
 #include "common/mem.h"
+#include "server/ingest/name_key.h"
 #include "server/ingest/path.h"
 
 /* --- names ------------------------------------------------------------------------------------ */
@@ -39,7 +39,7 @@ static size_t stem_length(const char *name) {
 
 /* --- files ------------------------------------------------------------------------------------ */
 
-/* The bundle's pictures by their paths without case and extension. */
+/* The bundle's pictures by their paths without extension, as name_key has them. */
 struct picture {
     char *key; /* owned */
     const struct listed_file *file;
@@ -50,12 +50,15 @@ struct pictures {
     struct picture *picture; /* [count] sorted by key, then by path */
 };
 
-/* folder + name, in lower case and without a picture's extension. */
+/* folder + name as name_key has it, without a picture's extension. */
 static char *make_key(const char *folder, const char *name) {
-    char *key = mem_printf("%s%.*s", folder, (int)stem_length(name), name);
-    for (char *p = key; *p; p++)
-        *p = (char)tolower((unsigned char)*p);
+    char *stem = mem_printf("%s%.*s", folder, (int)stem_length(name), name), *key = name_key(stem);
+    mem_free(stem);
     return key;
+}
+
+static bool has_extension_of(const char *path, const char *name) {
+    return strcasecmp(path_extension(path), path_extension(name)) == 0;
 }
 
 static int by_key(const void *a, const void *b) {
@@ -93,7 +96,7 @@ static void add_meant(struct meant *meant, int *best, int degree, const struct l
         meant->rival = file;
 }
 
-/* The picture in `folder` (a base) that `name` means there: exactly, else but for case, else but for the extension, and
+/* The picture in `folder` (a base) that `name` means there: exactly, else but for case and spelling of accents (name_key.h), else but for the extension, and
  * then rather a picture than the camera's raw file beside it. */
 static struct meant find_meant(const struct pictures *in, const char *folder, const char *name) {
     char *key = make_key(folder, name), *full = mem_printf("%s%s", folder, name);
@@ -109,10 +112,10 @@ static struct meant find_meant(const struct pictures *in, const char *folder, co
     }
     for (; low < in->count && strcmp(in->picture[low].key, key) == 0; low++) {
         const struct listed_file *file = in->picture[low].file;
-        int degree = strcmp(file->path, full) == 0       ? 4
-                     : strcasecmp(file->path, full) == 0 ? 3
-                     : !image_is_raw_name(file->path)    ? 2
-                                                         : 1;
+        int degree = strcmp(file->path, full) == 0        ? 4
+                     : has_extension_of(file->path, full) ? 3
+                     : !image_is_raw_name(file->path)     ? 2
+                                                          : 1;
         add_meant(&meant, &best, degree, file);
     }
     mem_free(full);
