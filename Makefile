@@ -23,7 +23,7 @@ EXR_CFLAGS = $(eval EXR_CFLAGS := $(shell pkg-config --cflags OpenEXR))$(EXR_CFL
 EXR_LIBS = -lOpenEXRCore
 COMMON_LIBS = -lcjson -lm
 IMAGE_LIBS = $(EXR_LIBS) -lpng -ljpeg -ltiff -lheif -lwebpdemux -lwebp -llcms2 -lz
-SERVER_LIBS = -lmeshoptimizer -lmicrohttpd -lgnutls -lsqlite3 -larchive -lseccomp -lexpat -lunistring $(EMBREE_LIB) $(IMAGE_LIBS) $(COMMON_LIBS)
+SERVER_LIBS = -lmeshoptimizer -lcurl -lmicrohttpd -lgnutls -lsqlite3 -larchive -lseccomp -lexpat -lunistring $(EMBREE_LIB) $(IMAGE_LIBS) $(COMMON_LIBS)
 CLIENT_LIBS = -lcurl -larchive $(COMMON_LIBS)
 EMBREE_LIB = $(if $(wildcard /usr/include/embree4/rtcore.h /usr/local/include/embree4/rtcore.h),-lembree4,-lembree3)
 
@@ -110,13 +110,13 @@ $(B)/unbake: $(call obj,client/main.c $(CLIENT_LIB_SRC) $(CLIENT_COMMON_SRC))
 
 $(B)/tests/%: $(B)/obj/tests/%.o $(B)/libserver.a $(B)/libclient.a $(B)/libcommon.a
 	@mkdir -p $(@D)
-	$(CC) $(TEST_LDFLAGS) -o $@ $< $(B)/libclient.a $(B)/libserver.a $(B)/libcommon.a $(SERVER_LIBS) -lcurl $(TEST_LIBS)
+	$(CC) $(TEST_LDFLAGS) -o $@ $< $(B)/libclient.a $(B)/libserver.a $(B)/libcommon.a $(SERVER_LIBS) $(TEST_LIBS)
 # What runs a fuzz target: driver.c, or libFuzzer where make fuzz says so.
 FUZZ_DRIVER = $(B)/obj/tests/fuzz/driver.o
 $(B)/tests/fuzz/%: $(B)/obj/tests/fuzz/%.o $(B)/obj/tests/fuzz/seeds.o $(FUZZ_DRIVER) \
                    $(B)/libclient.a $(B)/libserver.a $(B)/libcommon.a
 	@mkdir -p $(@D)
-	$(CC) $(TEST_LDFLAGS) -o $@ $^ $(SERVER_LIBS) -lcurl
+	$(CC) $(TEST_LDFLAGS) -o $@ $^ $(SERVER_LIBS)
 $(B)/tests/unit/test_image_formats: TEST_LIBS = -lwebpmux
 $(B)/tests/bench/perturb_mesh: TEST_LIBS = $(if $(wildcard /usr/include/meshoptimizer.h),-lmeshoptimizer)
 

@@ -9,6 +9,7 @@
 #include "server/demo/demo_command.h"
 #include "server/evaluate/evaluate_command.h"
 #include "server/evaluate/relight_command.h"
+#include "server/node/node_command.h"
 #include "server/worker/worker.h"
 
 static const struct server_command table[] = {
@@ -65,6 +66,14 @@ static const struct server_command table[] = {
      "OUTPUTS is a folder that `unbake get` filled; nothing else of the job is needed.\n",
      "  unbaked relight /tmp/room-textures --lights off --environment sky.hdr --out sky.png\n", relight_flags,
      relight_command},
+    {"node", "URL", "one attempt of a job, on a machine that a scheduler gave; job scripts run it",
+     "Claims the attempt from the daemon at URL (http://, https:// or unix:PATH), fetches its scene and checkpoint,\n"
+     "runs its worker as the daemon would, and sends what it says and writes. The address must be one that\n"
+     "this machine reaches, and the version the daemon's. SIGTERM and SIGUSR1 stop it after a checkpoint.\n"
+     "Ends with the worker's status: 0 done, 65 the input is at fault, 71 memory ran out, 74 a disk is full,\n"
+     "85 stopped or taken back; with 1 when it was not taken, or the daemon has not answered for a minute.\n",
+     "  unbaked node https://lab.example.org:7117 --job 17 --attempt 2 --token-file /run/token\n", node_flags,
+     node_command},
     {"worker", "DIR", "one attempt of a job; the daemon runs it", "", "", NULL, worker_main},
 };
 #define COMMAND_COUNT (sizeof table / sizeof *table)

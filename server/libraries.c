@@ -10,6 +10,7 @@
 #include "common/color_icc.h"
 #include "common/image.h"
 #include "common/mem.h"
+#include "common/request.h"
 #include "server/ingest/mesh/gltf_meshopt.h"
 #include "server/ingest/name_key.h"
 #include "server/ingest/source/xml.h"
@@ -38,6 +39,7 @@ static struct library written(const char *name, void (*write)(char text[LIBRARY_
 void libraries_list(struct library list[LIBRARY_COUNT]) {
     const struct library all[LIBRARY_COUNT] = {
         named("libmicrohttpd", "", listener_library_version()),
+        named("libcurl", "", request_library_version()),
         named("gnutls", "", tls_library_version()),
         named("sqlite", "", store_library_version()),
         named("embree", "Embree ", accel_library_version()),

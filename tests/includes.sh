@@ -27,7 +27,7 @@ own() {
 # The engine, lowest first: each folder includes only those before it (and common).
 engine_order='scene render capture gather state material light refine reconstruct'
 engine="server/($(echo "$engine_order" | tr ' ' '|')|ingest|export)/"
-daemon='http|events|transport|net|uploads|data|store|job|admin'
+daemon='http|events|transport|net|uploads|data|store|job|admin|node'
 above=" $engine_order "
 for folder in $engine_order; do
     above=${above#* "$folder" }
@@ -67,6 +67,10 @@ forbid server/store "$engine|server/(http|events|transport|net|uploads|worker|ad
     'store sees only job.h and data/layout.h'
 forbid server/job "$engine|server/(http|events|transport|net|uploads|admin)/" 'job never sees the engine, http or uploads'
 forbid server/job 'server/worker/[^p]' 'job sees only worker/progress.h'
+# A node runs a worker as the job layer does and talks to the daemon over HTTP: of the daemon's memory it sees nothing.
+forbid server/node "$engine|server/(http|events|transport|uploads|store|admin|check)/|server/net/[^f]|server/data/[^lw]|server/worker/[^p]" \
+    'node sees run.h and process.h of job, and paths'
+forbid server/node 'server/job/[^pr]' 'node sees run.h and process.h of job, and paths'
 forbid server/worker 'server/(http|events|transport|net|uploads|job)/|server/data/[^l]|server/store/(store|internal)' \
     "the worker never sees the daemon's memory"
 
@@ -95,7 +99,7 @@ own 'seccomp\.h' server/worker/confine_calls.c
 
 # Paths in the data folder are made in one place. (Of the engine's files only worker knows the names.)
 paths=$(grep -nE 'file_join\([^"]*, "|"(%s/)?(scenes|jobs|uploads|trash)/[%a-zX]|%s/(out|files|archive|previews)/|"(checkpoint\.db|worker\.log|state\.db|admin\.sock)' \
-    server/*.c server/{http,events,transport,net,uploads,data,store,job,worker,admin}/*.[ch] | grep -vE '^server/data/layout\.|/manual\.c')
+    server/*.c server/{http,events,transport,net,uploads,data,store,job,node,worker,admin}/*.[ch] | grep -vE '^server/data/layout\.|/manual\.c')
 [ -z "$paths" ] || { printf 'only server/data/layout.c makes paths in the data folder:\n%s\n' "$paths"; bad=1; }
 
 # Each unit and one that it includes, a pair a line.

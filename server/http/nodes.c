@@ -198,6 +198,10 @@ static struct response *with_body(struct api *api, struct request *r,
     return reply;
 }
 
-struct response *nodes_report(struct api *api, struct request *r) { return with_body(api, r, report); }
+struct response *nodes_report(struct api *api, struct request *r) {
+    return with_body(api, r, report);
+}
 
-struct response *nodes_end(struct api *api, struct request *r) { return with_body(api, r, end); }
+struct response *nodes_end(struct api *api, struct request *r) {
+    return with_body(api, r, end);
+}

@@ -1,0 +1,250 @@
+/* link.c -- see link.h: the claim, reports, the end, the lease. */
+#include "server/node/link.h"
+
+#include <errno.h>
+#include <math.h>
+#include <poll.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/random.h>
+
+#include "common/clock.h"
+#include "common/mem.h"
+#include "common/protocol.h"
+#include "common/utf8.h"
+#include "server/worker/progress.h"
+
+#define LEASE_SEC 60.0      /* until the daemon has said another */
+#define REPORT_SEC 2.0      /* between reports with lines: what a user waits at most for news, and for a cancellation */
+#define IDLE_REPORT_SEC 5.0 /* between reports without */
+#define REPORT_BYTES ((size_t)256 << 10) /* of lines; JSON may double them, and a body has at most 1 MiB */
+#define SILENCE_SEC 10.0                 /* a report without an answer for so long is sent again */
+#define PAUSE_FIRST_SEC 0.5
+#define PAUSE_MAX_SEC 5.0
+#define BEAT_SEC 0.2
+
+static void draw_claimant(char field[128]) {
+    unsigned char random[32];
+    char hex[2 * sizeof random + 1];
+    size_t got = 0;
+    while (got < sizeof random) {
+        ssize_t more = getrandom(random + got, sizeof random - got, 0);
+        got += more > 0 ? (size_t)more : 0;
+    }
+    for (size_t i = 0; i < sizeof random; i++)
+        snprintf(hex + 2 * i, 3, "%02x", random[i]);
+    snprintf(field, 128, NODE_CLAIMANT_FIELD ": %s", hex);
+}
+
+static const struct request_advice advice = {.url = "an example: unbaked node https://lab.example.org:7117",
+                                             .ca = "--ca FILE names the certificates to trust",
+                                             .any = "can this machine reach the daemon's?"};
+
+static struct http_request *connect_to(const struct link_config *config) {
+    struct http_request *r = request_new(config->url, 0.0, -1);
+    request_set_advice(r, &advice);
+    request_set_token(r, config->token);
+    if (config->ca)
+        request_set_ca(r, config->ca);
+    return r;
+}
+
+void link_init(struct attempt_link *l, const struct link_config *config) {
+    *l = (struct attempt_link){.control = connect_to(config),
+                               .bulk = connect_to(config),
+                               .path = mem_printf("/v1/attempts/%lld/%d", (long long)config->job_id, config->number),
+                               .beat = config->beat,
+                               .user = config->user,
+                               .lease_sec = LEASE_SEC,
+                               .heard = clock_sec(),
+                               .seq = 1};
+    draw_claimant(l->claimant);
+}
+
+void link_release(struct attempt_link *l) {
+    request_free(l->control);
+    request_free(l->bulk);
+    for (size_t i = 0; i < l->line_count; i++)
+        mem_free(l->line[i]);
+    mem_free(l->line);
+    mem_free(l->path);
+    *l = (struct attempt_link){0};
+}
+
+/* --- the state ------------------------------------------------------------------------------ */
+
+enum link_state link_state(struct attempt_link *l) {
+    if (l->state == LINK_OPEN && clock_sec() - l->heard > l->lease_sec) {
+        l->state = LINK_EXPIRED;
+        snprintf(l->why, sizeof l->why, "the daemon has not answered for %.0f s", l->lease_sec);
+    }
+    return l->state;
+}
+
+enum status link_note(struct attempt_link *l, enum status status, const struct reply *reply, const struct error *err) {
+    bool is_refusal = reply->code == 401 || reply->code == 403 || reply->code == 409;
+    if (status != STATUS_OK && is_refusal && l->state == LINK_OPEN) {
+        l->state = LINK_REFUSED;
+        snprintf(l->why, sizeof l->why, "%s", err->message);
+    }
+    return status;
+}
+
+static double pause_sec(int tries) { return fmin(PAUSE_FIRST_SEC * pow(2.0, tries), PAUSE_MAX_SEC); }
+
+bool link_pause(struct attempt_link *l, int tries) {
+    double until = clock_sec() + pause_sec(tries);
+    while (link_state(l) == LINK_OPEN && clock_sec() < until) {
+        poll(NULL, 0, (int)(1e3 * BEAT_SEC));
+        l->beat(l->user);
+    }
+    return link_state(l) == LINK_OPEN;
+}
+
+/* One POST of JSON. *sent: when it was. */
+static enum status post(struct attempt_link *l, const char *what, const cJSON *body, struct reply *reply, double *sent,
+                        struct error *err) {
+    char *path = mem_printf("%s/%s", l->path, what);
+    const struct request_call call = {.method = "POST",
+                                      .path = path,
+                                      .header = {l->claimant},
+                                      .body = body,
+                                      .silence_sec = SILENCE_SEC,
+                                      .once = true};
+    *sent = clock_sec();
+    enum status status = request_run(l->control, &call, reply, err);
+    mem_free(path);
+    return link_note(l, status, reply, err);
+}
+
+static void take_lease(struct attempt_link *l, const cJSON *reply, double sent) {
+    double lease;
+    if (json_number(reply, "lease_sec", "the reply", LEASE_SEC, &lease, NULL) == STATUS_OK && lease >= 1.0)
+        l->lease_sec = lease;
+    l->heard = sent;
+}
+
+enum status link_claim(struct attempt_link *l, const char *host, int threads, cJSON **order, struct error *err) {
+    struct reply reply;
+    double sent;
+    cJSON *body = cJSON_CreateObject();
+    json_add_string(body, "version", UNBAKE_VERSION);
+    json_add_string(body, "host", host);
+    json_add_int(body, "threads", threads);
+    reply_init(&reply);
+    *order = NULL;
+    enum status status = post(l, "claim", body, &reply, &sent, err);
+    for (int tries = 0; status == STATUS_UNAVAILABLE && link_pause(l, tries); tries++)
+        status = post(l, "claim", body, &reply, &sent, err);
+    if (status == STATUS_OK) {
+        *order = cJSON_DetachItemFromObjectCaseSensitive(reply.json, "order");
+        take_lease(l, reply.json, sent);
+        l->is_claimed = true;
+        if (!cJSON_IsObject(*order))
+            status =
+                error_set(err, STATUS_UNAVAILABLE, "%s does not answer as unbaked does", request_server(l->control));
+    }
+    reply_release(&reply);
+    cJSON_Delete(body);
+    return status;
+}
+
+/* --- reports -------------------------------------------------------------------------------- */
+
+void link_say(struct attempt_link *l, const char *line, size_t length) {
+    if (length >= PROGRESS_LINE_MAX || !utf8_valid(line, length, NULL) || memchr(line, '\0', length))
+        return;
+    if (l->line_count == l->line_room) {
+        l->line_room = l->line_room ? 2 * l->line_room : 64;
+        l->line = mem_realloc_array(l->line, l->line_room, sizeof *l->line);
+    }
+    l->line[l->line_count++] = mem_strndup(line, length);
+}
+
+bool link_has_said_all(const struct attempt_link *l) { return l->line_count == 0 && !l->is_pending; }
+
+double link_next_report(const struct attempt_link *l) {
+    bool has_news = l->line_count > 0 || l->is_pending;
+    return l->next_report + (has_news || l->failures ? 0.0 : IDLE_REPORT_SEC - REPORT_SEC);
+}
+
+/* The body of report `seq`; the lines that it takes are l->pending. */
+static cJSON *make_report(struct attempt_link *l, double cpu_sec) {
+    cJSON *body = cJSON_CreateObject(), *lines = cJSON_CreateArray();
+    size_t bytes = 0, limit = l->is_pending ? l->pending : l->line_count;
+    l->pending = 0;
+    while (l->pending < limit && bytes < REPORT_BYTES) {
+        bytes += strlen(l->line[l->pending]);
+        cJSON_AddItemToArray(lines, cJSON_CreateString(l->line[l->pending++]));
+    }
+    json_add_int(body, "seq", l->seq);
+    json_add(body, "lines", lines);
+    json_add_number(body, "cpu_sec", cpu_sec);
+    return body;
+}
+
+static void take_wish(struct attempt_link *l, const cJSON *reply) {
+    static const char *const words[] = {
+        [LINK_GO_ON] = "go_on", [LINK_PREVIEW] = "preview", [LINK_STOP] = "stop", [LINK_CANCEL] = "cancel"};
+    const char *word;
+    if (json_string(reply, "do", "the reply", "", &word, NULL) != STATUS_OK)
+        return;
+    for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+        if (strcmp(words[i], word) == 0)
+            l->wish = (enum link_wish)i;
+}
+
+/* Report `seq` has been answered. */
+static void answered(struct attempt_link *l) {
+    for (size_t i = 0; i < l->pending; i++)
+        mem_free(l->line[i]);
+    l->line_count -= l->pending;
+    memmove(l->line, l->line + l->pending, l->line_count * sizeof *l->line);
+    l->pending = 0;
+    l->is_pending = false;
+    l->failures = 0;
+    l->seq++;
+}
+
+void link_report(struct attempt_link *l, double cpu_sec, bool now) {
+    struct reply reply;
+    struct error err;
+    double sent;
+    if (!l->is_claimed || link_state(l) != LINK_OPEN ||
+        (l->failures ? clock_sec() < l->next_report : !now && clock_sec() < link_next_report(l)))
+        return;
+    cJSON *body = make_report(l, cpu_sec);
+    reply_init(&reply);
+    l->is_pending = true;
+    if (post(l, "report", body, &reply, &sent, &err) == STATUS_OK) {
+        take_lease(l, reply.json, sent);
+        take_wish(l, reply.json);
+        answered(l);
+        l->next_report = clock_sec() + REPORT_SEC;
+    } else {
+        l->next_report = clock_sec() + pause_sec(l->failures++);
+    }
+    reply_release(&reply);
+    cJSON_Delete(body);
+}
+
+enum status link_end(struct attempt_link *l, const struct link_end *end, double cpu_sec, struct error *err) {
+    struct reply reply;
+    double sent;
+    cJSON *body = cJSON_CreateObject();
+    json_add_int(body, "seq", l->seq);
+    json_add_string(body, "way", end->way);
+    json_add_int(body, "code", end->code);
+    json_add_string(body, "reason", end->reason);
+    json_add_string(body, "last_words", end->last_words);
+    json_add_number(body, "cpu_sec", cpu_sec);
+    reply_init(&reply);
+    enum status status = post(l, "end", body, &reply, &sent, err);
+    for (int tries = 0; status != STATUS_OK && link_state(l) == LINK_OPEN; tries++) {
+        poll(NULL, 0, (int)(1e3 * pause_sec(tries)));
+        status = post(l, "end", body, &reply, &sent, err);
+    }
+    reply_release(&reply);
+    cJSON_Delete(body);
+    return status;
+}

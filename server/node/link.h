@@ -1,0 +1,98 @@
+/* link.h -- what a node and the daemon say to each other about one attempt, over HTTP, and the lease on it. README.md has
+ * the protocol.
+ *
+ *      claim ──> OPEN ──(a lease without an answer)──> EXPIRED
+ *                  └────(the daemon says that it is over)──> REFUSED
+ *
+ * 1. The lease runs from the moment at which the last report that was answered was sent (CLOCK_MONOTONIC): the daemon's
+ *    own clock for it started later. Once it is over, nothing is written any more.
+ * 2. Reports are numbered. One is repeated, as it was, until it is answered.
+ * 3. While a long request is under way, `beat` is called a few times a second: it keeps the lease by link_report, over a
+ *    connection of its own.
+ * Not thread-safe. */
+#ifndef UNBAKE_NODE_LINK_H
+#define UNBAKE_NODE_LINK_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "common/buf.h"
+#include "common/error.h"
+#include "common/json.h"
+#include "common/request.h"
+
+enum link_state { LINK_OPEN, LINK_EXPIRED, LINK_REFUSED };
+enum link_wish { LINK_GO_ON, LINK_PREVIEW, LINK_STOP, LINK_CANCEL };
+
+struct link_config {
+    const char *url, *token;
+    const char *ca; /* file of certificates; NULL: the system's */
+    int64_t job_id;
+    int number;
+    void (*beat)(void *user);
+    void *user;
+};
+
+struct attempt_link {
+    struct http_request *control, *bulk;
+    char *path;         /* "/v1/attempts/JOB/NUMBER" */
+    char claimant[128]; /* the header field */
+    void (*beat)(void *user);
+    void *user;
+    enum link_state state;
+    bool is_claimed;
+    char why[1024];          /* once it is not OPEN */
+    double lease_sec, heard; /* when the last report that was answered was sent; clock_sec */
+    enum link_wish wish;     /* the newest reply's */
+    int64_t seq;             /* of the next report */
+    char **line;             /* [line_count] to be reported, oldest first; owned */
+    size_t line_count, line_room;
+    size_t pending;     /* of them in report `seq`, which may have arrived already; 0: it was not sent yet */
+    bool is_pending;    /* report `seq` was sent and not answered */
+    double next_report; /* clock_sec */
+    int failures;       /* reports in a row that were not answered */
+    uint64_t sent_bytes, fetched_bytes; /* of files */
+};
+
+void link_init(struct attempt_link *l, const struct link_config *config);
+void link_release(struct attempt_link *l);
+/* Looks at the clock, too. */
+enum link_state link_state(struct attempt_link *l);
+
+/* Claims the attempt; tries for as long as a lease is. *order is the caller's. STATUS_CONFLICT: another has it, it is
+ * over, or the versions differ; the message says so. */
+enum status link_claim(struct attempt_link *l, const char *host, int threads, cJSON **order, struct error *err);
+
+/* A line for the next report; longer ones than a line may be, or what is no UTF-8, are dropped. */
+void link_say(struct attempt_link *l, const char *line, size_t length);
+bool link_has_said_all(const struct attempt_link *l);
+/* Reports where that is due: when there are lines every REPORT_SEC, otherwise every IDLE_REPORT_SEC; at once if `now`. */
+void link_report(struct attempt_link *l, double cpu_sec, bool now);
+/* When the next report is due (clock_sec). */
+double link_next_report(const struct attempt_link *l);
+
+struct link_end {
+    const char *way; /* "exit", "signal", "memory", "lost", "preempted" */
+    int code;
+    const char *reason, *last_words;
+};
+/* Everything has been said: the end, tried until it is answered or the lease is over. */
+enum status link_end(struct attempt_link *l, const struct link_end *end, double cpu_sec, struct error *err);
+
+/* link_files.c: files. They are tried again while the link is open. */
+
+/* GET of "scene" or "checkpoint": {"files":[{"name","bytes","sha256"},...]}; the caller's. */
+enum status link_list(struct attempt_link *l, const char *what, cJSON **list, struct error *err);
+/* Appends to the open file what is missing of the daemon's: "scene", "images/1.png". STATUS_NO_SPACE: the disk here. */
+enum status link_fetch(struct attempt_link *l, const char *what, const char *name, int fd, struct error *err);
+/* Sends the whole open file, whose SHA-256 is `hex`; `query` is "" or "?first=1". STATUS_NO_SPACE: the disk there. */
+enum status link_send(struct attempt_link *l, const char *what, const char *name, const char *query, int fd,
+                      const char *hex, struct error *err);
+
+/* For link_files.c: what the reply to any request tells of the link; returns `status`. */
+enum status link_note(struct attempt_link *l, enum status status, const struct reply *reply, const struct error *err);
+/* Waits before try number `tries`, with beats; false when the link is not open any more. */
+bool link_pause(struct attempt_link *l, int tries);
+
+#endif

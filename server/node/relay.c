@@ -1,0 +1,265 @@
+/* relay.c -- see relay.h. */
+#include "server/node/relay.h"
+
+#include <errno.h>
+#include <math.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "common/clock.h"
+#include "common/file.h"
+#include "common/log.h"
+#include "common/mem.h"
+#include "common/sha256.h"
+#include "server/data/layout.h"
+#include "server/data/work_file.h"
+#include "server/node/scene_cache.h"
+
+/* A batch system that cancels kills 30 s after SIGTERM (Slurm's KillWait): some of that is left to say what happened. One
+ * that takes a machine back says so minutes before. */
+#define STOP_SEC_TERM 20.0
+#define STOP_SEC_USR1 30.0
+#define LOOK_SEC 0.5     /* between looks at signals and clocks */
+#define HEARD_MAX 100000 /* lines that wait for a file to be sent: more are left in the worker's pipe */
+
+static void signals_of_ours(sigset_t *set) {
+    sigemptyset(set);
+    sigaddset(set, SIGTERM);
+    sigaddset(set, SIGINT);
+    sigaddset(set, SIGUSR1);
+}
+
+void relay_init(struct relay *r, const struct link_config *config) {
+    struct link_config own = *config;
+    own.beat = relay_beat;
+    own.user = r;
+    *r = (struct relay){.job_id = config->job_id, .number = config->number};
+    link_init(&r->link, &own);
+}
+
+static void wait_for_end(struct relay *r);
+
+void relay_release(struct relay *r) {
+    wait_for_end(r);
+    run_free(r->run);
+    for (size_t i = 0; i < r->heard_count; i++)
+        mem_free(r->heard[i]);
+    mem_free(r->heard);
+    link_release(&r->link);
+}
+
+/* --- what comes -------------------------------------------------------------------------------- */
+
+static void hear(void *user, const char *line, size_t length) {
+    struct relay *r = user;
+    if (r->heard_count == r->heard_room) {
+        r->heard_room = r->heard_room ? 2 * r->heard_room : 64;
+        r->heard = mem_realloc_array(r->heard, r->heard_room, sizeof *r->heard);
+    }
+    r->heard[r->heard_count++] = mem_strndup(line, length);
+}
+
+static void listen_to_run(struct relay *r) {
+    if (!r->run || r->has_ended)
+        return;
+    if (r->heard_count < HEARD_MAX)
+        run_read(r->run, hear, r);
+    r->has_ended = run_ended(r->run, &r->end, hear, r);
+}
+
+static void stop(struct relay *r) {
+    if (!r->has_stopped)
+        run_ask(r->run, RUN_STOP);
+    r->has_stopped = true;
+}
+
+static void put_down(struct relay *r) {
+    if (!r->has_killed)
+        run_ask(r->run, RUN_KILL);
+    r->has_killed = true;
+}
+
+static void obey_signals(struct relay *r) {
+    static const struct timespec at_once = {0, 0};
+    sigset_t set;
+    int number;
+    signals_of_ours(&set);
+    while ((number = sigtimedwait(&set, NULL, &at_once)) > 0) {
+        double patience = number == SIGUSR1 ? STOP_SEC_USR1 : STOP_SEC_TERM, at = clock_sec() + patience;
+        log_info("%s: the worker has %.0f s for a checkpoint", strsignal(number), patience);
+        r->is_taken_back = true;
+        r->kill_at = r->kill_at > 0.0 ? fmin(r->kill_at, at) : at;
+        stop(r);
+    }
+    if (r->kill_at > 0.0 && clock_sec() >= r->kill_at)
+        put_down(r);
+}
+
+static void obey_daemon(struct relay *r) {
+    enum link_wish wish = r->link.wish;
+    if (link_state(&r->link) != LINK_OPEN || wish == LINK_CANCEL)
+        put_down(r);
+    else if (wish == LINK_STOP)
+        stop(r);
+    else if (wish == LINK_PREVIEW)
+        run_ask(r->run, RUN_PREVIEW);
+    if (wish == LINK_PREVIEW) /* each reply that says so asks for one */
+        r->link.wish = LINK_GO_ON;
+}
+
+void relay_beat(void *relay) {
+    struct relay *r = relay;
+    listen_to_run(r);
+    obey_signals(r);
+    link_report(&r->link, run_cpu_sec(r->run), false);
+    obey_daemon(r);
+}
+
+enum status relay_may_begin(struct relay *r, struct error *err) {
+    relay_beat(r);
+    if (link_state(&r->link) != LINK_OPEN)
+        return error_set(err, STATUS_CANCELLED, "%s", r->link.why);
+    return r->has_stopped || r->has_killed ? error_set(err, STATUS_CANCELLED, "stopped before it began") : STATUS_OK;
+}
+
+/* --- files ------------------------------------------------------------------------------------- */
+
+/* Sends the open file, if it is a plain one that has the digest `wanted` (NULL: any); *is_sent: it was. */
+static enum status send_open(struct relay *r, int fd, const char *what, const char *name, const char *query,
+                             const char *wanted, bool *is_sent, struct error *err) {
+    char self[64], hex[SHA256_HEX_SIZE];
+    struct stat info;
+    if (fstat(fd, &info) != 0 || !S_ISREG(info.st_mode))
+        return STATUS_OK;
+    snprintf(self, sizeof self, "/proc/self/fd/%d", fd); /* the name may already be another file's */
+    enum status status = sha256_of_file(self, hex, err);
+    if (status != STATUS_OK || (wanted && strcmp(hex, wanted) != 0))
+        return status;
+    *is_sent = true;
+    return link_send(&r->link, what, name, query, fd, hex, err);
+}
+
+/* The file that a line announces; *is_sent is false where it is not there any more as it was announced. The worker has
+ * read a stranger's files: no name leads out of its folder. */
+static enum status send_output(struct relay *r, const cJSON *line, bool *is_sent, struct error *err) {
+    const char *name, *wanted;
+    int fd;
+    *is_sent = false;
+    if (json_string(line, "name", "a line", "", &name, NULL) != STATUS_OK ||
+        json_string(line, "sha256", "a line", "", &wanted, NULL) != STATUS_OK || !scene_cache_is_name(name) ||
+        work_file_open_output(r->data_dir, r->job_id, r->number, name, &fd, NULL) != STATUS_OK)
+        return STATUS_OK;
+    enum status status = send_open(r, fd, "outputs", name, "", wanted, is_sent, err);
+    close(fd);
+    return status;
+}
+
+static enum status send_part(struct relay *r, const cJSON *line, struct error *err) {
+    double number, first, bytes;
+    bool is_sent = false;
+    char name[32], query[32];
+    int fd;
+    if (json_number(line, "number", "a line", 0.0, &number, NULL) != STATUS_OK ||
+        json_number(line, "first", "a line", 0.0, &first, NULL) != STATUS_OK ||
+        json_number(line, "bytes", "a line", 0.0, &bytes, NULL) != STATUS_OK ||
+        !(first >= 1.0 && number >= first && number < 1e9))
+        return STATUS_OK;
+    snprintf(name, sizeof name, "part-%d", (int)number);
+    snprintf(query, sizeof query, "?first=%d", (int)first);
+    enum status status = work_file_open_checkpoint(r->data_dir, r->job_id, r->number, name, &fd, err);
+    if (status != STATUS_OK)
+        return status;
+    status = send_open(r, fd, "checkpoint", name, query, NULL, &is_sent, err);
+    close(fd);
+    if (status != STATUS_OK || !is_sent)
+        return status;
+    r->part_count++;
+    r->part_bytes += bytes;
+    char *dir = layout_attempt(r->data_dir, r->job_id, r->number), *folder = layout_checkpoint_folder(dir);
+    char *path = layout_part(folder, (int)number);
+    if (unlink(path) != 0)
+        status = error_set_errno(err, errno, "cannot remove %s", path);
+    mem_free(path);
+    mem_free(folder);
+    mem_free(dir);
+    return status;
+}
+
+/* Passes on the oldest line that was heard, or keeps it where its file cannot be sent. */
+static enum status pass_on(struct relay *r, struct error *err) {
+    const char *text = r->heard[0];
+    cJSON *line = NULL;
+    const char *type = "";
+    bool is_passed = true;
+    enum status status = STATUS_OK;
+    if (json_parse(text, strlen(text), "a line", &line, NULL) == STATUS_OK)
+        (void)json_string(line, "type", "a line", "", &type, NULL);
+    if (strcmp(type, "output") == 0 || strcmp(type, "preview") == 0) {
+        status = send_output(r, line, &is_passed, err);
+    } else if (strcmp(type, "part") == 0) {
+        status = send_part(r, line, err);
+        is_passed = false;
+    }
+    cJSON_Delete(line);
+    if (status != STATUS_OK)
+        return status;
+    if (is_passed)
+        link_say(&r->link, r->heard[0], strlen(r->heard[0]));
+    mem_free(r->heard[0]);
+    memmove(r->heard, r->heard + 1, --r->heard_count * sizeof *r->heard);
+    return STATUS_OK;
+}
+
+/* --- the whole ---------------------------------------------------------------------------------- */
+
+static void wait_a_little(struct relay *r) {
+    struct pollfd fds[RUN_FDS];
+    double look_sec, due = link_next_report(&r->link) - clock_sec();
+    size_t count = r->has_ended ? 0 : run_poll(r->run, fds, &look_sec);
+    double wait = fmin(fmax(due, 0.05), LOOK_SEC); /* lines come in bursts: 20 looks a second are enough */
+    if (count > 0)
+        poll(NULL, 0, 50);
+    poll(fds, (nfds_t)count, (int)(1e3 * wait));
+}
+
+static void wait_for_end(struct relay *r) {
+    if (!r->run)
+        return;
+    put_down(r);
+    while (!r->has_ended) {
+        r->has_ended = run_ended(r->run, &r->end, hear, r);
+        if (!r->has_ended)
+            poll(NULL, 0, 10);
+    }
+}
+
+enum status relay_follow(struct relay *r, struct error *err) {
+    enum status status = STATUS_OK;
+    while (status == STATUS_OK && !(r->has_ended && r->heard_count == 0)) {
+        relay_beat(r);
+        while (status == STATUS_OK && r->heard_count > 0 && link_state(&r->link) == LINK_OPEN)
+            status = pass_on(r, err);
+        if (link_state(&r->link) != LINK_OPEN)
+            status = error_set(err, STATUS_CANCELLED, "%s", r->link.why);
+        else if (status == STATUS_OK && !r->has_ended)
+            wait_a_little(r);
+    }
+    wait_for_end(r);
+    if (status == STATUS_OK && !relay_flush(r))
+        status = error_set(err, STATUS_CANCELLED, "%s", r->link.why);
+    return status;
+}
+
+bool relay_flush(struct relay *r) {
+    while (!link_has_said_all(&r->link) && link_state(&r->link) == LINK_OPEN) {
+        double wait = link_next_report(&r->link) - clock_sec();
+        if (r->link.failures > 0 && wait > 0.0)
+            poll(NULL, 0, (int)(1e3 * wait) + 1);
+        link_report(&r->link, run_cpu_sec(r->run), true);
+    }
+    return link_state(&r->link) == LINK_OPEN;
+}
