@@ -14,9 +14,12 @@
 #include "common/utf8.h"
 #include "server/worker/progress.h"
 
-#define LEASE_SEC 60.0      /* until the daemon has said another */
-#define REPORT_SEC 2.0      /* between reports with lines: what a user waits at most for news, and for a cancellation */
-#define IDLE_REPORT_SEC 5.0 /* between reports without */
+#define LEASE_SEC 60.0 /* until the daemon has said another */
+/* Seconds between reports with lines, which is what a user waits at most for news, and between those without, for a
+ * cancellation. Of a short lease so many fit into it. */
+#define REPORT_SEC 2.0
+#define IDLE_REPORT_SEC 5.0
+#define REPORTS_A_LEASE 10.0
 #define REPORT_BYTES ((size_t)256 << 10) /* of lines; JSON may double them, and a body has at most 1 MiB */
 #define SILENCE_SEC 10.0                 /* a report without an answer for so long is sent again */
 #define PAUSE_FIRST_SEC 0.5
@@ -163,9 +166,11 @@ void link_say(struct attempt_link *l, const char *line, size_t length) {
 
 bool link_has_said_all(const struct attempt_link *l) { return l->line_count == 0 && !l->is_pending; }
 
+static double interval(const struct attempt_link *l, double most) { return fmin(most, l->lease_sec / REPORTS_A_LEASE); }
+
 double link_next_report(const struct attempt_link *l) {
     bool has_news = l->line_count > 0 || l->is_pending;
-    return l->next_report + (has_news || l->failures ? 0.0 : IDLE_REPORT_SEC - REPORT_SEC);
+    return l->next_report + (has_news || l->failures ? 0.0 : interval(l, IDLE_REPORT_SEC) - interval(l, REPORT_SEC));
 }
 
 /* The body of report `seq`; the lines that it takes are l->pending. */
@@ -220,7 +225,7 @@ void link_report(struct attempt_link *l, double cpu_sec, bool now) {
         take_lease(l, reply.json, sent);
         take_wish(l, reply.json);
         answered(l);
-        l->next_report = clock_sec() + REPORT_SEC;
+        l->next_report = clock_sec() + interval(l, REPORT_SEC);
     } else {
         l->next_report = clock_sec() + pause_sec(l->failures++);
     }

@@ -67,7 +67,7 @@ enum status link_claim(struct attempt_link *l, const char *host, int threads, cJ
 /* A line for the next report; longer ones than a line may be, or what is no UTF-8, are dropped. */
 void link_say(struct attempt_link *l, const char *line, size_t length);
 bool link_has_said_all(const struct attempt_link *l);
-/* Reports where that is due: when there are lines every REPORT_SEC, otherwise every IDLE_REPORT_SEC; at once if `now`. */
+/* Reports where that is due: when there are lines every 2 s, otherwise every 5 s; at once if `now`. */
 void link_report(struct attempt_link *l, double cpu_sec, bool now);
 /* When the next report is due (clock_sec). */
 double link_next_report(const struct attempt_link *l);
