@@ -104,9 +104,16 @@ bool link_pause(struct attempt_link *l, int tries) {
     return link_state(l) == LINK_OPEN;
 }
 
-/* One POST of JSON. *sent: when it was. */
-static enum status post(struct attempt_link *l, const char *what, const cJSON *body, struct reply *reply, double *sent,
-                        struct error *err) {
+enum status link_whole(const struct attempt_link *l, enum status status, const struct reply *reply, const char *member,
+                       struct error *err) {
+    return status != STATUS_OK || cJSON_HasObjectItem(reply->json, member)
+               ? status
+               : error_set(err, STATUS_UNAVAILABLE, "an answer of %s is not whole", request_server(l->control));
+}
+
+/* One POST of JSON; an answer has the member. *sent: when it was. */
+static enum status post(struct attempt_link *l, const char *what, const cJSON *body, const char *member,
+                        struct reply *reply, double *sent, struct error *err) {
     char *path = mem_printf("%s/%s", l->path, what);
     const struct request_call call = {.method = "POST",
                                       .path = path,
@@ -115,7 +122,7 @@ static enum status post(struct attempt_link *l, const char *what, const cJSON *b
                                       .silence_sec = SILENCE_SEC,
                                       .once = true};
     *sent = clock_sec();
-    enum status status = request_run(l->control, &call, reply, err);
+    enum status status = link_whole(l, request_run(l->control, &call, reply, err), reply, member, err);
     mem_free(path);
     return link_note(l, status, reply, err);
 }
@@ -136,9 +143,9 @@ enum status link_claim(struct attempt_link *l, const char *host, int threads, cJ
     json_add_int(body, "threads", threads);
     reply_init(&reply);
     *order = NULL;
-    enum status status = post(l, "claim", body, &reply, &sent, err);
+    enum status status = post(l, "claim", body, "order", &reply, &sent, err);
     for (int tries = 0; status == STATUS_UNAVAILABLE && link_pause(l, tries); tries++)
-        status = post(l, "claim", body, &reply, &sent, err);
+        status = post(l, "claim", body, "order", &reply, &sent, err);
     if (status == STATUS_OK) {
         *order = cJSON_DetachItemFromObjectCaseSensitive(reply.json, "order");
         take_lease(l, reply.json, sent);
@@ -221,7 +228,7 @@ void link_report(struct attempt_link *l, double cpu_sec, bool now) {
     cJSON *body = make_report(l, cpu_sec);
     reply_init(&reply);
     l->is_pending = true;
-    if (post(l, "report", body, &reply, &sent, &err) == STATUS_OK) {
+    if (post(l, "report", body, "do", &reply, &sent, &err) == STATUS_OK) {
         take_lease(l, reply.json, sent);
         take_wish(l, reply.json);
         answered(l);
@@ -244,10 +251,10 @@ enum status link_end(struct attempt_link *l, const struct link_end *end, double 
     json_add_string(body, "last_words", end->last_words);
     json_add_number(body, "cpu_sec", cpu_sec);
     reply_init(&reply);
-    enum status status = post(l, "end", body, &reply, &sent, err);
+    enum status status = post(l, "end", body, "last_seq", &reply, &sent, err);
     for (int tries = 0; status != STATUS_OK && link_state(l) == LINK_OPEN; tries++) {
         poll(NULL, 0, (int)(1e3 * pause_sec(tries)));
-        status = post(l, "end", body, &reply, &sent, err);
+        status = post(l, "end", body, "last_seq", &reply, &sent, err);
     }
     reply_release(&reply);
     cJSON_Delete(body);

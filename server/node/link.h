@@ -92,6 +92,10 @@ enum status link_send(struct attempt_link *l, const char *what, const char *name
 
 /* For link_files.c: what the reply to any request tells of the link; returns `status`. */
 enum status link_note(struct attempt_link *l, enum status status, const struct reply *reply, const struct error *err);
+/* Where a head is cut off on the way, what is left may look like an answer without content: STATUS_UNAVAILABLE where the
+ * answer to a successful request is not JSON with that member. */
+enum status link_whole(const struct attempt_link *l, enum status status, const struct reply *reply, const char *member,
+                       struct error *err);
 /* Waits before try number `tries`, with beats; false when the link is not open any more. */
 bool link_pause(struct attempt_link *l, int tries);
 

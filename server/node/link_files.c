@@ -43,8 +43,9 @@ static char *path_of(const struct attempt_link *l, const char *what, const char 
     return buf_detach(&path);
 }
 
-/* Runs the call until it succeeds, is refused, or the link is no longer open. `begin` (may be NULL) prepares each try. */
-static enum status run(struct attempt_link *l, struct request_call *call, struct transfer *t,
+/* Runs the call until it succeeds, is refused, or the link is no longer open. `begin` (may be NULL) prepares each try;
+ * `member` (likewise) is one that the answer has. */
+static enum status run(struct attempt_link *l, struct request_call *call, struct transfer *t, const char *member,
                        enum status (*begin)(struct request_call *call, struct transfer *t, struct error *err),
                        struct reply *reply, struct error *err) {
     enum status status;
@@ -58,7 +59,10 @@ static enum status run(struct attempt_link *l, struct request_call *call, struct
         status = begin ? begin(call, t, err) : STATUS_OK;
         if (status != STATUS_OK)
             return status;
-        status = link_note(l, request_run(l->bulk, call, reply, err), reply, err);
+        status = request_run(l->bulk, call, reply, err);
+        if (member)
+            status = link_whole(l, status, reply, member, err);
+        link_note(l, status, reply, err);
         if (t->status != STATUS_OK)
             return t->status;
         if (status != STATUS_UNAVAILABLE || tries == TRIES_MAX || !link_pause(l, tries))
@@ -72,7 +76,7 @@ enum status link_list(struct attempt_link *l, const char *what, cJSON **list, st
     char *path = path_of(l, what, NULL, "");
     struct request_call call = {.path = path, .silence_sec = LIST_SILENCE_SEC};
     reply_init(&reply);
-    enum status status = run(l, &call, &t, NULL, &reply, err);
+    enum status status = run(l, &call, &t, "files", NULL, &reply, err);
     if (status == STATUS_OK && !cJSON_IsArray(cJSON_GetObjectItemCaseSensitive(reply.json, "files")))
         status = error_set(err, STATUS_UNAVAILABLE, "the daemon's list of files cannot be read");
     *list = status == STATUS_OK ? reply.json : NULL;
@@ -124,7 +128,7 @@ enum status link_fetch(struct attempt_link *l, const char *what, const char *nam
     char *path = path_of(l, what, name, "");
     struct request_call call = {.path = path, .sink = take_bytes, .silence_sec = FETCH_SILENCE_SEC};
     reply_init(&reply);
-    enum status status = run(l, &call, &t, begin_fetch, &reply, err);
+    enum status status = run(l, &call, &t, NULL, begin_fetch, &reply, err);
     if (status != STATUS_OK && reply.code == 416) /* there is nothing more */
         status = STATUS_OK;
     l->fetched_bytes += t.bytes;
@@ -178,7 +182,7 @@ enum status link_send(struct attempt_link *l, const char *what, const char *name
                                 .silence_sec = SEND_SILENCE_SEC,
                                 .same_twice = true};
     reply_init(&reply);
-    enum status status = run(l, &call, &t, NULL, &reply, err);
+    enum status status = run(l, &call, &t, NULL, NULL, &reply, err);
     if (status == STATUS_OK)
         l->sent_bytes += (uint64_t)info.st_size;
     else if (status == STATUS_NO_SPACE && reply.code == 507)

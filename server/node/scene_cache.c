@@ -16,6 +16,7 @@
 #include "server/node/cache_room.h"
 
 #define WAIT_MS 200
+#define TRIES_MAX 20 /* of a file whose transfers are cut off without an error */
 
 /* --- one file --------------------------------------------------------------------------------- */
 
@@ -52,40 +53,48 @@ static bool is_right(const char *path, uint64_t bytes, const char *sha256) {
            sha256_of_file(path, hex, NULL) == STATUS_OK && strcmp(hex, sha256) == 0;
 }
 
-/* One try; *is_good: what has come is what was announced. */
-static enum status fetch_once(const char *part, const char *name, uint64_t bytes, const char *sha256,
-                              const struct scene_source *source, bool *is_good, struct error *err) {
-    *is_good = false;
+/* One try, which goes on where the last one was cut off; *size: of what is there then. */
+static enum status fetch_once(const char *part, const char *name, uint64_t bytes, const struct scene_source *source,
+                              uint64_t *size, struct error *err) {
+    struct stat info = {0};
     int fd = open(part, O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);
     if (fd < 0)
         return error_set_errno(err, errno, "cannot create %s", part);
-    struct stat info;
     enum status status = STATUS_OK;
-    if (fstat(fd, &info) == 0 && (uint64_t)info.st_size > bytes && ftruncate(fd, 0) != 0)
+    if (fstat(fd, &info) != 0 || ((uint64_t)info.st_size > bytes && ftruncate(fd, 0) != 0))
         status = error_set_errno(err, errno, "cannot empty %s", part);
-    if (status == STATUS_OK && (bytes == 0 || (uint64_t)info.st_size != bytes))
-        status = bytes == 0 ? STATUS_OK : source->fetch(source->user, name, fd, err);
+    if (status == STATUS_OK && bytes > 0 && (uint64_t)info.st_size != bytes)
+        status = source->fetch(source->user, name, fd, err);
+    if (status == STATUS_OK && fstat(fd, &info) != 0)
+        status = error_set_errno(err, errno, "cannot look at %s", part);
+    *size = (uint64_t)info.st_size;
     if (close(fd) != 0 && status == STATUS_OK)
         status = error_set_errno(err, errno, "cannot write %s", part);
-    *is_good = status == STATUS_OK && is_right(part, bytes, sha256);
     return status;
 }
 
 enum status scene_cache_fetch_file(const char *path, const cJSON *file, const struct scene_source *source,
                                    struct error *err) {
     const char *name, *sha256;
-    uint64_t bytes;
+    uint64_t bytes, size = 0;
+    int wrong_count = 0;
     bool is_good = false;
     enum status status = read_file_entry(file, &name, &bytes, &sha256, err);
     char *part = mem_printf("%s.part", path);
-    for (int i = 0; i < 2 && status == STATUS_OK && !is_good; i++) {
-        status = fetch_once(part, name, bytes, sha256, source, &is_good, err);
-        if (status == STATUS_OK && !is_good && unlink(part) != 0)
+    for (int i = 0; i < TRIES_MAX && status == STATUS_OK && !is_good && wrong_count < 2; i++) {
+        status = fetch_once(part, name, bytes, source, &size, err);
+        if (status != STATUS_OK || size < bytes) /* cut off: what has come may be right */
+            continue;
+        is_good = is_right(part, bytes, sha256);
+        wrong_count += !is_good;
+        if (!is_good && unlink(part) != 0)
             status = error_set_errno(err, errno, "cannot remove %s", part);
     }
     if (status == STATUS_OK && !is_good)
-        status = error_set(err, STATUS_CORRUPT, "%s has arrived with another content than the daemon announced, twice",
-                           name);
+        status = wrong_count > 0
+                     ? error_set(err, STATUS_CORRUPT,
+                                 "%s has arrived with another content than the daemon announced, twice", name)
+                     : error_set(err, STATUS_UNAVAILABLE, "%s does not arrive whole", name);
     if (status == STATUS_OK && rename(part, path) != 0)
         status = error_set_errno(err, errno, "cannot rename %s", part);
     mem_free(part);

@@ -8,22 +8,26 @@
 #include "server/data/layout.h"
 #include "server/store/remote.h"
 #include "tests/api/rig.h"
+#include "tests/chaos/proxy.h"
 #include "tests/chaos/worker.h"
 
 #define TOKEN "token-of-this-attempt"
 #define LIVES_PER_JOB 12
 #define LEASE_SEC 10 /* a report a second */
 #define PATIENCE_SEC 240.0
+#define ITERATIONS 800L
+#define ENDLESS 10000000L /* iterations of a job that is not to come to its end */
 #define SETTINGS                                                                                                       \
-    "\"texture_size\":64,\"iterations\":2000,\"texels_per_iteration\":128,\"cameras_per_texel\":1,"                     \
+    "\"texture_size\":64,\"iterations\":%ld,\"texels_per_iteration\":128,\"cameras_per_texel\":1,"                     \
     "\"samples_per_camera\":2,\"report_samples\":1,\"gather_samples\":16,\"gloss_passes\":1,"                          \
     "\"texels_per_metre\":2,\"preview_interval_sec\":1"
 
 static struct rig rig;
+static int port; /* that nodes are told */
 static struct error err;
 static char binary[512], home_sums[WORKER_OUTPUTS][SHA256_HEX_SIZE];
 static unsigned random_;
-static long kill_count;
+static long kill_count, checkpoint_count; /* of a job that nobody disturbed */
 
 #define OK(call) CHECK_THAT((call) == STATUS_OK, "%s", err.message)
 
@@ -42,7 +46,9 @@ struct remote_attempt {
     struct remote_row row;
 };
 
-static void begin(struct remote_attempt *a, int64_t job, int threads) {
+static char *settings(long iterations) { return mem_printf(SETTINGS, iterations); }
+
+static void begin(struct remote_attempt *a, int64_t job, int threads, long iterations) {
     char hex[SHA256_HEX_SIZE];
     *a = (struct remote_attempt){.job = job, .lease_sec = a->lease_sec};
     OK(store_job_start(rig.store, job, "site", &a->number, &err));
@@ -51,14 +57,15 @@ static void begin(struct remote_attempt *a, int64_t job, int threads) {
     snprintf(row.name, sizeof row.name, "unbake-%lld-%d", (long long)job, a->number);
     sha256_of(TOKEN, strlen(TOKEN), hex);
     OK(store_remote_begin(rig.store, &row, hex, &err));
-    char *dir = layout_attempt(rig.dir, job, a->number);
-    worker_order(dir, "/nowhere", a->number, threads, 0.0, true, SETTINGS);
+    char *dir = layout_attempt(rig.dir, job, a->number), *text = settings(iterations);
+    worker_order(dir, "/nowhere", a->number, threads, 0.0, true, text);
+    mem_free(text);
     mem_free(dir);
 }
 
 /* Starts a node for the attempt; what it prints goes to rig.dir/node.log. */
 static pid_t start_node(const struct remote_attempt *a) {
-    char *url = mem_printf("http://127.0.0.1:%d", listener_port(rig.listener)), *log = file_join(rig.dir, "node.log");
+    char *url = mem_printf("http://127.0.0.1:%d", port), *log = file_join(rig.dir, "node.log");
     char *job = mem_printf("%lld", (long long)a->job), *number = mem_printf("%d", a->number);
     char *cache = file_join(rig.dir, "cache"), *work = file_join(rig.dir, "work");
     pid_t parent = getpid(), pid = fork();
@@ -117,15 +124,30 @@ static enum remote_phase listen_to(struct remote_attempt *a) {
     return a->row.phase;
 }
 
+/* The number of the newest part of a checkpoint that has come. */
+static int newest_part(const struct remote_attempt *a) {
+    char *dir = layout_attempt(rig.dir, a->job, a->number), *folder = layout_checkpoint_folder(dir), **names = NULL;
+    size_t count = 0;
+    int newest = 0;
+    OK(file_list(folder, &names, &count, &err));
+    for (size_t i = 0; i < count; i++)
+        newest = layout_part_number(names[i]) > newest ? layout_part_number(names[i]) : newest;
+    file_free_names(names, count);
+    mem_free(folder);
+    mem_free(dir);
+    return newest;
+}
+
 /* Until the node has ended: its exit status, or minus the signal's number. It gets the signal `number` after so many
- * checkpoints and `wait_sec` more; -1: never. */
-static int follow(struct remote_attempt *a, long checkpoints, double wait_sec, int number) {
+ * parts of checkpoints and `wait_sec` more; -1: never. */
+static int follow(struct remote_attempt *a, int parts, double wait_sec, int number) {
     double give_up = clock_sec() + PATIENCE_SEC, at = 0.0;
+    int before = newest_part(a);
     int status = 0;
     bool has_sent = false;
     while (waitpid(a->pid, &status, WNOHANG) == 0) {
         listen_to(a);
-        if (at == 0.0 && checkpoints >= 0 && a->checkpoints >= checkpoints)
+        if (at == 0.0 && parts >= 0 && newest_part(a) >= before + parts)
             at = clock_sec() + wait_sec;
         if (!has_sent && at > 0.0 && clock_sec() >= at) {
             kill(a->pid, number);
@@ -176,7 +198,7 @@ static void show_log(void) {
 /* The site starts the attempt a second time: that one is turned away, the first one does not notice. */
 static void test_undisturbed(void) {
     struct remote_attempt a = {.lease_sec = LEASE_SEC}, second;
-    begin(&a, rig_job(&rig), 1);
+    begin(&a, rig_job(&rig), 1, ITERATIONS);
     a.pid = start_node(&a);
     while (listen_to(&a) < REMOTE_CLAIMED)
         usleep(10000);
@@ -184,6 +206,7 @@ static void test_undisturbed(void) {
     second.pid = start_node(&a);
     CHECK(follow(&second, -1, 0.0, 0) == 1);
     CHECK_THAT(follow(&a, -1, 0.0, 0) == 0, "the node has failed");
+    checkpoint_count = a.checkpoints;
     CHECK(a.outputs >= (long)WORKER_OUTPUTS && a.row.cpu_sec > 0.0 && a.row.refused_count >= 1);
     check_equal(&a);
 }
@@ -197,10 +220,10 @@ static void test_kills(int lives) {
     for (int i = 0; i < lives || !is_done; i++, of_job++) {
         if (is_done)
             job = rig_job(&rig), of_job = 0;
-        begin(&a, job, 1 + i % 2);
+        begin(&a, job, 1 + i % 2, ITERATIONS);
         a.pid = start_node(&a);
         bool is_last = of_job + 1 >= LIVES_PER_JOB || i >= lives;
-        int code = follow(&a, is_last ? -1 : (long)draw(3), 1e-3 * draw(2000), SIGKILL);
+        int code = follow(&a, is_last ? -1 : (int)draw(5), 1e-3 * draw(150), SIGKILL);
         is_done = code == 0;
         if (is_done) {
             check_equal(&a);
@@ -227,17 +250,17 @@ static void damage_cache(void) {
 static void test_taken_back(int number) {
     struct remote_attempt a = {.lease_sec = LEASE_SEC};
     int64_t job = rig_job(&rig);
-    begin(&a, job, 2);
+    begin(&a, job, 2, ITERATIONS);
     a.pid = start_node(&a);
-    int code = follow(&a, 1, 0.1, number);
+    int code = follow(&a, 3, 0.0, number);
     CHECK_THAT(code == 85, "the node ended with %d", code);
     CHECK_STRING(a.row.end.way, "preempted");
     lose(&a);
     damage_cache();
-    begin(&a, job, 2);
+    begin(&a, job, 2, ITERATIONS);
     a.pid = start_node(&a);
     CHECK(follow(&a, -1, 0.0, 0) == 0);
-    CHECK_THAT(a.checkpoints < 1950, "%ld checkpoints: it began anew", a.checkpoints);
+    CHECK_THAT(a.checkpoints < ITERATIONS, "%ld checkpoints: it began anew", a.checkpoints);
     check_equal(&a);
 }
 
@@ -249,10 +272,10 @@ static void test_wishes(void) {
     } t[] = {{REMOTE_STOP, "exit", 85, 85}, {REMOTE_CANCEL, "signal", SIGKILL, 1}};
     for (size_t i = 0; i < sizeof t / sizeof *t; i++) {
         struct remote_attempt a = {.lease_sec = LEASE_SEC};
-        begin(&a, rig_job(&rig), 2);
+        begin(&a, rig_job(&rig), 2, ENDLESS);
         OK(store_remote_wish(rig.store, a.job, a.number, REMOTE_PREVIEW, &err));
         a.pid = start_node(&a);
-        while (a.checkpoints == 0 && listen_to(&a) < REMOTE_ENDED)
+        while (newest_part(&a) == 0 && listen_to(&a) < REMOTE_ENDED)
             usleep(10000);
         OK(store_remote_wish(rig.store, a.job, a.number, t[i].wish, &err));
         int code = follow(&a, -1, 0.0, 0);
@@ -262,12 +285,29 @@ static void test_wishes(void) {
     }
 }
 
+/* Answers are lost on the way: every request may have been carried out, and nothing is done twice or missed. */
+static void test_lost_answers(unsigned seed) {
+    struct remote_attempt a = {.lease_sec = 60};
+    struct proxy proxy;
+    proxy_start(&proxy, listener_port(rig.listener), 1, seed);
+    port = proxy.port;
+    begin(&a, rig_job(&rig), 2, ITERATIONS);
+    a.pid = start_node(&a);
+    CHECK_THAT(follow(&a, -1, 0.0, 0) == 0, "the node has failed");
+    CHECK_THAT(a.checkpoints == checkpoint_count && a.outputs >= (long)WORKER_OUTPUTS, "%ld checkpoints, %ld outputs",
+               a.checkpoints, a.outputs);
+    check_equal(&a);
+    port = listener_port(rig.listener);
+    printf("%ld connections cut\n", atomic_load(&proxy.cut_count));
+    proxy_stop(&proxy);
+}
+
 /* The daemon is gone for longer than the lease: the node gives up, and its worker with it. */
 static void test_cut_off(void) {
     struct remote_attempt a = {.lease_sec = 3};
-    begin(&a, rig_job(&rig), 2);
+    begin(&a, rig_job(&rig), 2, ENDLESS);
     a.pid = start_node(&a);
-    while (a.checkpoints == 0 && listen_to(&a) < REMOTE_ENDED)
+    while (newest_part(&a) == 0 && listen_to(&a) < REMOTE_ENDED)
         usleep(10000);
     listener_quiesce(rig.listener);
     listener_stop(rig.listener);
@@ -290,12 +330,15 @@ int main(int argc, char **argv) {
     snprintf(binary, sizeof binary, "%s/unbaked", argv[1]);
     random_ = (unsigned)strtoul(argv[4], NULL, 10);
     rig_start(&rig, &rig_patient, 15.0);
+    port = listener_port(rig.listener);
     char *home = file_join(rig.dir, "home"), *scene = layout_scene(rig.dir, RIG_SCENE), *files = layout_files(scene);
     char *copy = mem_printf("mkdir -p %s && cp -r %s/. %s/", files, argv[2], files);
     int fd, status;
     OK(file_make_dirs(home, &err));
     CHECK(system(copy) == 0);
-    worker_order(home, argv[2], 1, 2, 0.0, true, SETTINGS);
+    char *text = settings(ITERATIONS);
+    worker_order(home, argv[2], 1, 2, 0.0, true, text);
+    mem_free(text);
     pid_t pid = worker_start(binary, home, NULL, "/dev/null", &fd);
     worker_hear(fd, "\"end\"", PATIENCE_SEC);
     waitpid(pid, &status, 0);
@@ -308,6 +351,7 @@ int main(int argc, char **argv) {
     if (atoi(argv[3]) > 10)
         test_taken_back(SIGTERM);
     test_wishes();
+    test_lost_answers(random_);
     test_cut_off();
     show_log();
     mem_free(copy);
