@@ -2,7 +2,7 @@
 #ifndef UNBAKE_SERVER_LIBRARIES_H
 #define UNBAKE_SERVER_LIBRARIES_H
 
-#define LIBRARY_COUNT 18
+#define LIBRARY_COUNT 19
 #define LIBRARY_VERSION_SIZE 24
 
 struct library {

@@ -118,6 +118,15 @@ static void adapt_order(const struct node *n, cJSON *order) {
     }
 }
 
+/* Other kinds of jobs read what lies at the daemon's: those stay there. */
+static enum status check_kind(const cJSON *order, struct error *err) {
+    const char *kind;
+    enum status status = json_string(order, "kind", "the order", "", &kind, err);
+    return status != STATUS_OK || strcmp(kind, "reconstruct") == 0
+               ? status
+               : error_set(err, STATUS_INPUT, "a job of kind \"%.40s\" cannot run on another machine", kind);
+}
+
 /* Fetches what the attempt needs and starts its worker. */
 static enum status begin(struct node *n, cJSON *order, struct error *err) {
     struct process_executor process;
@@ -125,7 +134,9 @@ static enum status begin(struct node *n, cJSON *order, struct error *err) {
     char *folder = layout_attempt(NULL, (int64_t)n->job_id, (int)n->number);
     char *dir = file_join(n->folder.path, folder), *checkpoint = layout_checkpoint_folder(dir);
     char *log = layout_log(folder);
-    enum status status = file_make_dirs(checkpoint, err);
+    enum status status = check_kind(order, err);
+    if (status == STATUS_OK)
+        status = file_make_dirs(checkpoint, err);
     if (status == STATUS_OK)
         status = fetch_scene(&n->relay, n->cache, n->cache_bytes, &n->scene, err);
     if (status == STATUS_OK)
@@ -170,7 +181,7 @@ static struct link_end judge(struct relay *r, enum status status, const struct e
         end.way = r->has_killed ? "signal" : "exit";
         end.code = r->has_killed ? SIGKILL : PROGRESS_EXIT_STOPPED;
     } else if (status != STATUS_OK) {
-        end.way = "lost";
+        end.way = status == STATUS_INPUT ? "refused" : "lost";
         end.reason = why->message;
     } else {
         static const char *const ways[] = {[RUN_EXIT] = "exit",
