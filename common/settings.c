@@ -42,6 +42,8 @@ static const struct setting table[] = {
      "of a look's radiance in the loss: two independent ones, or one, whose squared error is biased"},
     {"exclude", SETTING_TEXT, "", 0, 0, NULL, "", NULL,
      "photographs to leave out: names or patterns with * and ?, separated by commas"},
+    {"executor", SETTING_TEXT, "", 0, 0, NULL, "", NULL,
+     "where the job runs: the name of an executor that the daemon's administrator has set up; empty: where there is a place"},
     {"fit", SETTING_CHOICE, "", 0, 0, "check|ignore", "check", NULL,
      "a scene whose mesh and photographs do not fit, as its check found, is refused; or reconstructed all the same"},
     {"gather_samples", SETTING_INT, "rays", 16, 1048576, NULL, "512", "solve",

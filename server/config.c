@@ -10,6 +10,7 @@
 #include "common/file.h"
 #include "common/mem.h"
 #include "common/nearest.h"
+#include "server/executor/sites.h"
 #include "server/net/address.h"
 
 #define FILE_MAX_BYTES ((size_t)1 << 20)
@@ -38,7 +39,12 @@ static const struct config_option table[] = {
     TEXT(proxy_field, "X-Forwarded-For", "The field in which they say so: X-Forwarded-For or Forwarded."),
     TEXT(log_level, "info", "error, warning, info or debug; the log goes to stderr."),
     TEXT(log_format, "text", "text, logfmt or json: how a line of the log is written."),
-    INT(max_running, "jobs", 1, 64, "1", "Jobs that run at the same time."),
+    TEXT(
+        executors, "process",
+        "Where jobs run, the first that has a place first: process (this machine), and names of files in executors_dir."),
+    TEXT(executors_dir, "/etc/unbaked/executors.d",
+         "Folder of NAME.conf, by which a cluster's scheduler is talked to."),
+    INT(max_running, "jobs", 1, 64, "1", "Jobs that run at the same time on this machine."),
     INT(max_checks, "scenes", 1, 64, "2",
         "Scenes that are checked at the same time; of one user one fewer, where there are several."),
     INT(small_renders, "renders", 0, 64, "1",
@@ -49,7 +55,8 @@ static const struct config_option table[] = {
     INT(threads, "threads", 0, 1024, "0", "Threads shared by the running jobs. 0: one a processor."),
     INT(max_attempts, "attempts", 1, 100, "3", "Crashes after which a job is given up."),
     INT(queue_limit, "jobs", 1, 1000000, "1000", "Jobs that may wait; more are refused with 429."),
-    INT(user_max_running, "jobs", 0, 64, "0", "Jobs of one user that run at the same time. 0: no limit."),
+    INT(user_max_running, "jobs", 0, 4096, "0",
+        "Jobs of one user that run at the same time, or wait in a cluster. 0: no limit."),
     INT(user_queue_limit, "jobs", 0, 1000000, "100",
         "Jobs of one user that may wait; more are refused with 429. 0: no limit."),
     INT(user_max_jobs, "jobs", 0, 1000000, "0",
@@ -309,12 +316,15 @@ void config_check(const struct config *c, struct buf *problems) {
     uint16_t port;
     bool is_loopback;
     struct error err;
+    struct sites sites;
     if (config_address(c->listen, address, &port, &is_loopback, &err) != STATUS_OK)
         buf_printf(problems, "%s: %s%s%s\n", origin(c, "listen"), err.message, *err.hint ? "; " : "", err.hint);
     check_word(c, "access", c->access, accesses, problems);
     check_word(c, "log_level", c->log_level, levels, problems);
     check_word(c, "log_format", c->log_format, formats, problems);
     check_proxies(c, problems);
+    sites_read(&sites, c->executors, c->executors_dir, problems);
+    sites_release(&sites);
     if (*c->data_dir == '\0')
         buf_printf(problems, "%s: data_dir must name a folder\n", origin(c, "data_dir"));
     if ((*c->tls_certificate != '\0') != (*c->tls_key != '\0'))

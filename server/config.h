@@ -30,6 +30,7 @@ struct config {
     char *where[CONFIG_OPTIONS_MAX]; /* by the table: where it was set, "unbaked.conf:12"; owned; NULL: default */
     char *listen, *access, *tls_certificate, *tls_key, *server_names; /* owned */
     char *trusted_proxies, *proxy_field;                              /* owned */
+    char *executors, *executors_dir;                                  /* owned */
     char *data_dir, *log_level, *log_format;                          /* owned */
     int64_t max_running, max_checks, threads, max_attempts, queue_limit, worker_memory_mib, jobs_memory_mib;
     int64_t small_renders, small_render_threads, small_render_paths;

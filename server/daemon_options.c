@@ -5,6 +5,8 @@
 #include <string.h>
 #include <sys/statvfs.h>
 
+#include "server/executor/metrics.h"
+
 static enum api_access read_access(const char *word) {
     return strcmp(word, "open") == 0     ? API_ACCESS_OPEN
            : strcmp(word, "tokens") == 0 ? API_ACCESS_TOKENS
@@ -20,10 +22,13 @@ static uint64_t user_max_bytes(const struct config *c) {
     return limit == 0 || (share > 0 && share < limit) ? share : limit;
 }
 
-struct scheduler_config daemon_options_scheduler(const struct config *c, const struct executor *executor) {
+struct scheduler_config daemon_options_scheduler(const struct config *c, const struct executor *executor,
+                                                 const struct sites *sites) {
     return (struct scheduler_config){
         .data_dir = c->data_dir,
         .executor = executor,
+        .places = sites->executor,
+        .place_count = sites->count,
         .max_running = (int)c->max_running,
         .user_max_running = (int)c->user_max_running,
         .small_renders = (int)c->small_renders,
@@ -45,7 +50,7 @@ struct scheduler_config daemon_options_scheduler(const struct config *c, const s
     };
 }
 
-struct api_config daemon_options_api(const struct config *c, const struct proxies *proxies,
+struct api_config daemon_options_api(const struct config *c, const struct proxies *proxies, const struct sites *sites,
                                      const struct api_library list[LIBRARY_COUNT]) {
     return (struct api_config){
         .data_dir = c->data_dir,
@@ -71,6 +76,9 @@ struct api_config daemon_options_api(const struct config *c, const struct proxie
         .access = read_access(c->access),
         .is_tls = *c->tls_certificate != '\0',
         .server_names = c->server_names,
+        .executors = c->executors,
+        .executor_metrics = executor_metrics,
+        .executor_user = sites,
         .proxies = proxies,
         .libraries = list,
         .library_count = LIBRARY_COUNT,

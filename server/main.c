@@ -1,6 +1,6 @@
 /* main.c -- the daemon's entry: wiring, signals. The command line is read by invocation.c.
  *
- *   lock the data folder ──> store ──> scheduler ──> api ──> listener ──> admin ──> scheduler_run
+ *   lock the data folder ──> store ──> executors ──> scheduler ──> api ──> listener ──> admin ──> scheduler_run
  *
  * and back in the same order when SIGTERM or SIGINT comes: nothing new is accepted, running jobs
  * write checkpoints and go back to the queue, streams end, the database is closed. SIGHUP reads
@@ -60,6 +60,7 @@ struct daemon {
     int lock_fd;
     struct store *store;
     struct process_executor executor;
+    struct sites sites;
     struct scheduler *scheduler;
     struct api *api;
     struct listener *listener;
@@ -101,6 +102,26 @@ static void on_revoked(void *user) {
     hub_recheck(d->api->hub);
 }
 
+static void wake_scheduler(void *user) {
+    struct daemon *d = user;
+    scheduler_wake(d->scheduler);
+}
+
+/* What executes jobs; checks of scenes and webhooks stay on this machine. */
+static enum status build_scheduler(struct daemon *d, struct error *err) {
+    const struct config *c = d->config;
+    struct buf none;
+    const struct executor *process = process_executor_init(&d->executor, "/proc/self/exe", c->data_dir);
+    buf_init(&none, 4096);
+    sites_read(&d->sites, c->executors, c->executors_dir, &none); /* was checked with the rest */
+    buf_release(&none);
+    enum status status = sites_start(&d->sites, process, d->store, c->data_dir, wake_scheduler, d, err);
+    if (status != STATUS_OK)
+        return status;
+    const struct scheduler_config work = daemon_options_scheduler(c, process, &d->sites);
+    return scheduler_new(&d->scheduler, &work, d->store, err);
+}
+
 static enum status build(struct daemon *d, struct error *err) {
     const struct config *c = d->config;
     bool is_loopback;
@@ -108,9 +129,7 @@ static enum status build(struct daemon *d, struct error *err) {
     for (size_t i = 0; i < LIBRARY_COUNT; i++)
         d->library_names[i] = (struct api_library){d->libraries[i].name, d->libraries[i].version};
     proxies_parse(&d->proxies, c->trusted_proxies, c->proxy_field, NULL); /* was checked with the rest */
-    const struct scheduler_config work =
-        daemon_options_scheduler(c, process_executor_init(&d->executor, "/proc/self/exe", c->data_dir));
-    const struct api_config limits = daemon_options_api(c, &d->proxies, d->library_names);
+    const struct api_config limits = daemon_options_api(c, &d->proxies, &d->sites, d->library_names);
     const struct listener_config network = daemon_options_listener(c, d->address, &is_loopback);
     enum status status = store_open(&d->store, c->data_dir, err);
     if (status == STATUS_OK)
@@ -120,7 +139,7 @@ static enum status build(struct daemon *d, struct error *err) {
     if (status == STATUS_OK)
         status = check_access(d, is_loopback, err);
     if (status == STATUS_OK)
-        status = scheduler_new(&d->scheduler, &work, d->store, err);
+        status = build_scheduler(d, err);
     if (status == STATUS_OK)
         status = service_new(&d->api, &limits, d->store, d->scheduler, err);
     if (status == STATUS_OK)
@@ -261,6 +280,7 @@ static int run_daemon(struct config *config, const char *port_file) {
     collector_stop(d.collector);
     service_free(d.api);
     scheduler_free(d.scheduler);
+    sites_release(&d.sites);
     store_close(d.store);
     if (d.lock_fd >= 0)
         close(d.lock_fd);

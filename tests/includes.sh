@@ -71,6 +71,9 @@ forbid server/job 'server/worker/[^p]' 'job sees only worker/progress.h'
 forbid server/node "$engine|server/(http|events|transport|uploads|store|admin|check)/|server/net/[^f]|server/data/[^lw]|server/worker/[^p]" \
     'node sees run.h and process.h of job, and paths'
 forbid server/node 'server/job/[^pr]' 'node sees run.h and process.h of job, and paths'
+forbid server/executor "$engine|server/(http|events|transport|net|uploads|admin|worker)/" \
+    'executor sees job/run.h, store and data/layout.h'
+forbid "server/job server/store server/data server/http" 'server/executor/' 'only the daemon as a whole sees its executors'
 forbid server/worker 'server/(http|events|transport|net|uploads|job)/|server/data/[^l]|server/store/(store|internal)' \
     "the worker never sees the daemon's memory"
 

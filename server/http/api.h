@@ -45,6 +45,9 @@ struct api_config {
     int64_t scene_keep_ms, job_keep_ms, upload_keep_ms,
         empty_upload_ms /* 0: as upload_keep_ms */; /* see store/retention.h */
     const char *server_names;                       /* host names besides loopback's; separated by spaces or commas */
+    const char *executors; /* names of those that jobs may run on; separated by spaces or commas; NULL: any */
+    void (*executor_metrics)(const void *user, struct buf *b); /* appends theirs to /metrics; NULL: none */
+    const void *executor_user;
     const struct api_library *libraries;
     size_t library_count;
 };

@@ -202,6 +202,19 @@ void job_request_settings(const struct job_request *w, struct settings *settings
     cJSON_Delete(problems);
 }
 
+void job_request_executor(const struct settings *settings, const char *names, cJSON *params) {
+    const char *wish = settings_text(settings, "executor"), *at = names ? names : "";
+    size_t length = strlen(wish);
+    while (length > 0 && *(at += strspn(at, " ,\t"))) {
+        size_t each = strcspn(at, " ,\t");
+        if (each == length && strncmp(at, wish, length) == 0)
+            return;
+        at += each;
+    }
+    if (length > 0 && names)
+        problem_param(params, "settings.executor", NULL, "must be one of: %s", names);
+}
+
 struct response *job_request_fit(const struct request *r, const struct scene_row *scene,
                                  const struct settings *settings) {
     struct error err;

@@ -79,7 +79,10 @@ static struct response *find_what_is_read(struct job_submission *s) {
 
 static void check_settings(struct job_submission *s) {
     switch (s->w.kind) {
-    case JOB_RECONSTRUCT: job_request_settings(&s->w, &s->settings, s->params); break;
+    case JOB_RECONSTRUCT:
+        job_request_settings(&s->w, &s->settings, s->params);
+        job_request_executor(&s->settings, s->api->config.executors, s->params);
+        break;
     case JOB_RENDER: render_request_read(&s->render, s->w.settings, s->params); break;
     case JOB_EVALUATE:
         if (s->w.settings && (!cJSON_IsObject(s->w.settings) || s->w.settings->child))

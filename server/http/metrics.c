@@ -53,8 +53,9 @@ static void store_metrics(struct buf *b, const struct store_counts *counts) {
 
 static void work_metrics(struct buf *b, const struct counters *f) {
     static const char *const ends[END_COUNT] = {
-        [END_SUCCEEDED] = "succeeded", [END_INPUT] = "input", [END_CRASHED] = "crashed", [END_MEMORY] = "memory",
-        [END_STOPPED] = "stopped",     [END_DISK] = "disk",   [END_LOST] = "lost",       [END_REFUSED] = "refused"};
+        [END_SUCCEEDED] = "succeeded", [END_INPUT] = "input",     [END_CRASHED] = "crashed",
+        [END_MEMORY] = "memory",       [END_STOPPED] = "stopped", [END_DISK] = "disk",
+        [END_LOST] = "lost",           [END_REFUSED] = "refused", [END_PREEMPTED] = "preempted"};
     metric_head(b, "attempts_ended_total", "counter", "Attempts of jobs that have ended, by how.");
     for (int i = 0; i < END_COUNT; i++)
         buf_printf(b, "unbaked_attempts_ended_total{reason=\"%s\"} %llu\n", ends[i],
@@ -85,6 +86,8 @@ struct response *system_metrics(struct api *api, struct request *r) {
     store_metrics(&b, &counts);
     metric(&b, "workers", "gauge", "Worker processes alive.", scheduler_running(api->scheduler));
     work_metrics(&b, scheduler_counters(api->scheduler));
+    if (api->config.executor_metrics)
+        api->config.executor_metrics(api->config.executor_user, &b);
     metric_head(&b, "http_requests_total", "counter", "Requests, by route and status; 0: cut off before a reply.");
     request_counts_print(api->request_counts, "unbaked_http_requests_total", &b);
     metric(&b, "uploaded_bytes_total", "counter", "Bytes of bundles received.",

@@ -10,6 +10,7 @@
 #include "common/mem.h"
 #include "server/data/attempt_folder.h"
 #include "server/data/layout.h"
+#include "server/job/admission.h"
 #include "server/job/fit.h"
 #include "server/job/housekeeping.h"
 #include "server/job/memory.h"
@@ -127,12 +128,16 @@ static enum status run_job(struct attempt *a, const struct scheduler_config *con
     if (status == STATUS_OK)
         status = prepare_folder(a, config, job, anew, err);
     char *folder = layout_attempt(NULL, job->id, a->number), *home = layout_job(NULL, job->id), *log = layout_log(home);
+    const struct admission foretold = {.worker_limit_bytes = config->worker_memory_bytes};
     const struct run_work work = {.folder = folder,
                                   .log = log,
                                   .scene_id = job->kind == JOB_RENDER ? NULL : job->scene_id,
                                   .outputs = outputs,
                                   .files = files,
-                                  .order = order};
+                                  .order = order,
+                                  .job_id = job->id,
+                                  .attempt = a->number,
+                                  .memory_bytes = row->facts ? admission_need(&foretold, row->facts, job) : 0.0};
     if (status == STATUS_OK)
         status = config->executor->start(config->executor, &work, &a->run, err);
     cJSON_Delete(order);
@@ -226,6 +231,47 @@ static enum status enter_false_start(struct store *store, int64_t job_id, int nu
     }
 }
 
+static void name_attempt(struct attempt *a, const struct scheduler_config *config, int64_t job_id, int number) {
+    *a = (struct attempt){.job_id = job_id,
+                          .number = number,
+                          .executor = config->executor,
+                          .iteration = -1.0,
+                          .event_max = config->attempt_events_max > 0 ? config->attempt_events_max : EVENTS_MAX,
+                          .data_dir = config->data_dir,
+                          .dir = layout_attempt(config->data_dir, job_id, number),
+                          .whole_dir = layout_job(config->data_dir, job_id)};
+}
+
+static void know_job(struct attempt *a, const struct job *job, int thread_count) {
+    memcpy(a->scene_id, job->scene_id, sizeof a->scene_id);
+    a->owner_id = job->owner_id;
+    a->kind = job->kind;
+    a->settings = mem_strdup(job->settings);
+    a->thread_count = thread_count;
+    a->memory_step = job->memory_step;
+}
+
+enum status attempt_resume_job(struct attempt *a, const struct scheduler_config *config, struct store *store,
+                               int64_t job_id, struct error *err) {
+    struct job job = {0};
+    struct run *run = NULL;
+    enum status status = store_job_get(store, job_id, &job, err);
+    if (status == STATUS_OK && !config->executor->resume)
+        status = error_set(err, STATUS_NOT_FOUND, "no run of %s outlives its daemon", config->executor->name);
+    if (status == STATUS_OK)
+        status = config->executor->resume(config->executor, job_id, job.attempt, &run, err);
+    if (status == STATUS_OK) {
+        name_attempt(a, config, job_id, job.attempt);
+        know_job(a, &job, 1);
+        a->run = run;
+        a->phase = ATTEMPT_ALIVE;
+        a->charged_sec = run_cpu_sec(run); /* what the former daemon had not charged is given away */
+        log_info("job %lld: attempt %d goes on as %s", (long long)job_id, job.attempt, run->place);
+    }
+    job_release(&job);
+    return status;
+}
+
 enum status attempt_start_job(struct attempt *a, const struct scheduler_config *config, struct store *store,
                               struct counters *counters, int64_t job_id, int thread_count, struct error *err) {
     struct job job;
@@ -238,25 +284,14 @@ enum status attempt_start_job(struct attempt *a, const struct scheduler_config *
         return STATUS_OK; /* meanwhile a user has paused, cancelled or deleted it */
     if (status != STATUS_OK)
         return status;
-    *a = (struct attempt){.job_id = job_id,
-                          .number = number,
-                          .iteration = -1.0,
-                          .event_max = config->attempt_events_max > 0 ? config->attempt_events_max : EVENTS_MAX,
-                          .data_dir = config->data_dir,
-                          .dir = layout_attempt(config->data_dir, job_id, number),
-                          .whole_dir = layout_job(config->data_dir, job_id)};
+    name_attempt(a, config, job_id, number);
     status = store_job_get(store, job_id, &job, &why);
     if (status == STATUS_OK) {
-        memcpy(a->scene_id, job.scene_id, sizeof a->scene_id);
-        a->owner_id = job.owner_id;
-        a->kind = job.kind;
+        know_job(a, &job, thread_count);
         anew = job.restart_from[0] != '\0';
         if (number == 1 && job.started_ms > job.created_ms)
             atomic_fetch_add(&counters->first_wait_ms, (unsigned long long)(job.started_ms - job.created_ms));
         atomic_fetch_add(&counters->first_start_count, number == 1);
-        a->settings = mem_strdup(job.settings);
-        a->thread_count = thread_count;
-        a->memory_step = job.memory_step;
         status = check_scene(store, &job, &scene, &why);
     }
     if (status == STATUS_OK) /* a full disk does not stop a job whose own files fill it */

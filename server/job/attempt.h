@@ -22,11 +22,12 @@ enum attempt_phase { ATTEMPT_EMPTY, ATTEMPT_ALIVE, ATTEMPT_ENDED };
 
 struct attempt {
     enum attempt_phase phase;
-    int64_t job_id;     /* 0: the check of a scene */
-    enum job_kind kind; /* of the job */
-    int64_t owner_id;   /* the owner of the job or scene */
-    double charged_sec; /* CPU time that was charged to that user */
-    int number;         /* fences what is written for the job */
+    int64_t job_id;                  /* 0: the check of a scene */
+    enum job_kind kind;              /* of the job */
+    int64_t owner_id;                /* the owner of the job or scene */
+    double charged_sec;              /* CPU time that was charged to that user */
+    const struct executor *executor; /* borrowed */
+    int number;                      /* fences what is written for the job */
     char scene_id[SCENE_ID_SIZE];
     char *reading;                  /* with which a scene is checked, JSON; owned; NULL for a job */
     uint64_t user_max_bytes;        /* as in scheduler_config, for the check of a scene */
@@ -61,6 +62,10 @@ struct attempt {
  * immediate retry is pointless. */
 enum status attempt_start_job(struct attempt *a, const struct scheduler_config *config, struct store *store,
                               struct counters *counters, int64_t job_id, int thread_count, struct error *err);
+/* Takes up the job's present attempt, which config->executor runs and an earlier daemon has started. STATUS_NOT_FOUND where
+ * it does not run there. */
+enum status attempt_resume_job(struct attempt *a, const struct scheduler_config *config, struct store *store,
+                               int64_t job_id, struct error *err);
 /* Starts the check of a scene, which is in `checking` and stays there if this fails. */
 enum status attempt_start_check(struct attempt *a, const struct scheduler_config *config, struct store *store,
                                 const struct unchecked *scene, int thread_count, struct error *err);

@@ -9,11 +9,12 @@ enum attempt_end {
     END_SUCCEEDED,
     END_INPUT, /* the input was at fault */
     END_CRASHED,
-    END_MEMORY,  /* it ran out of memory */
-    END_STOPPED, /* paused, cancelled, or the daemon stopped */
-    END_DISK,    /* blocked until there is disk space */
-    END_LOST,    /* nothing was heard of it any more */
-    END_REFUSED, /* it was not taken where it was to run */
+    END_MEMORY,    /* it ran out of memory */
+    END_STOPPED,   /* paused, cancelled, or the daemon stopped */
+    END_DISK,      /* blocked until there is disk space */
+    END_LOST,      /* nothing was heard of it any more */
+    END_REFUSED,   /* it was not taken where it was to run */
+    END_PREEMPTED, /* its place was wanted for others */
     END_COUNT
 };
 

@@ -14,6 +14,7 @@
 #include "server/data/attempt_folder.h"
 #include "server/data/layout.h"
 #include "server/job/measure.h"
+#include "server/store/remote.h"
 
 /* Temporary names as file_replace and file_put_in_place make them. */
 static bool is_temporary(const char *name) {
@@ -68,9 +69,13 @@ void housekeeping_after_kill(const struct scheduler_config *config, struct store
             return;
         }
         for (size_t i = 0; i < count; i++) {
+            struct remote_row row;
             char *dir = layout_attempt(config->data_dir, jobs[i].id, jobs[i].attempt);
-            housekeeping_drop_temporary(dir);
-            housekeeping_tidy_job(config->data_dir, store, jobs[i].id);
+            /* what runs elsewhere goes on, and writes */
+            if (store_remote_get(store, jobs[i].id, jobs[i].attempt, &row, &err) == STATUS_NOT_FOUND) {
+                housekeeping_drop_temporary(dir);
+                housekeeping_tidy_job(config->data_dir, store, jobs[i].id);
+            }
             before = jobs[i].id;
             mem_free(dir);
             job_release(&jobs[i]);

@@ -62,6 +62,8 @@ bool job_may_become(enum job_state from, enum job_state to);
 bool job_stage_parse(enum job_kind kind, const char *name, bool *keeps_checkpoint);
 const char *job_stages(enum job_kind kind); /* all of them, for people */
 
+#define JOB_EXECUTOR_HERE "process" /* name of the executor on this machine */
+
 #define SCENE_ID_SIZE 65 /* the SHA-256 of the uploaded content, in hex, and the NUL */
 
 /* A row of the jobs table. Strings are owned; job_release frees them. */

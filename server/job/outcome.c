@@ -26,8 +26,9 @@ enum outcome {
     OUTCOME_MEMORY, /* a crash that a smaller working set may avoid */
     OUTCOME_STOPPED,
     OUTCOME_BLOCKED,
-    OUTCOME_LOST,   /* where it ran is at fault, or the way there */
-    OUTCOME_REFUSED /* where it was to run, it was not taken */
+    OUTCOME_LOST,     /* where it ran is at fault, or the way there */
+    OUTCOME_REFUSED,  /* where it was to run, it was not taken */
+    OUTCOME_PREEMPTED /* its place was wanted for others */
 };
 
 struct verdict {
@@ -95,6 +96,7 @@ static void judge(const struct attempt *a, struct verdict *v) {
     case RUN_SIGNAL: judge_signal(a, v); break;
     case RUN_MEMORY: say(v, OUTCOME_MEMORY, "killed by the kernel, which ran out of memory", HINT_MEMORY); break;
     case RUN_LOST: say(v, OUTCOME_LOST, a->end.reason, ""); break;
+    case RUN_PREEMPTED: say(v, OUTCOME_PREEMPTED, a->end.reason, ""); break;
     case RUN_REFUSED: say(v, OUTCOME_REFUSED, a->end.reason, "Resume the job once that is put right."); break;
     }
     /* It was asked to stop: how it ended does not matter. */
@@ -139,6 +141,7 @@ static enum status settle_job(const struct attempt *a, struct store *store, cons
     case OUTCOME_REFUSED:
     case OUTCOME_BLOCKED: return store_job_block(store, a->job_id, a->number, v->reason, v->hint, err);
     case OUTCOME_STOPPED: return store_job_stop(store, a->job_id, a->number, "", err);
+    case OUTCOME_PREEMPTED: return store_job_stop(store, a->job_id, a->number, v->reason, err);
     case OUTCOME_MEMORY: return settle_memory(a, store, v, err);
     case OUTCOME_LOST: return store_job_lose(store, a->job_id, a->number, v->reason, err);
     case OUTCOME_CRASH: break;
@@ -281,13 +284,13 @@ enum status outcome_settle(struct attempt *a, struct store *store, struct trash 
     static const enum attempt_end ends[] = {
         [OUTCOME_OK] = END_SUCCEEDED,  [OUTCOME_INPUT] = END_INPUT,     [OUTCOME_CRASH] = END_CRASHED,
         [OUTCOME_MEMORY] = END_MEMORY, [OUTCOME_STOPPED] = END_STOPPED, [OUTCOME_BLOCKED] = END_DISK,
-        [OUTCOME_LOST] = END_LOST,     [OUTCOME_REFUSED] = END_REFUSED};
+        [OUTCOME_LOST] = END_LOST,     [OUTCOME_REFUSED] = END_REFUSED, [OUTCOME_PREEMPTED] = END_PREEMPTED};
     if (a->job_id)
         atomic_fetch_add(&counters->ends[ends[verdict.outcome]], 1);
     static const char *const words[] = {
         [OUTCOME_OK] = "is done",       [OUTCOME_INPUT] = "is refused",    [OUTCOME_CRASH] = "broke off",
         [OUTCOME_MEMORY] = "broke off", [OUTCOME_STOPPED] = "was stopped", [OUTCOME_BLOCKED] = "cannot go on",
-        [OUTCOME_LOST] = "is lost",     [OUTCOME_REFUSED] = "was refused"};
+        [OUTCOME_LOST] = "is lost",     [OUTCOME_REFUSED] = "was refused", [OUTCOME_PREEMPTED] = "was pre-empted"};
     if (a->job_id)
         log_info("job %lld: attempt %d %s%s%s", (long long)a->job_id, a->number, words[verdict.outcome],
                  verdict.reason[0] ? ": " : "", verdict.reason);

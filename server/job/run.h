@@ -15,6 +15,7 @@
 #include <poll.h>
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 
 #include "common/error.h"
 #include "common/json.h"
@@ -26,17 +27,18 @@ enum run_request {
 };
 
 enum run_way {
-    RUN_EXIT,   /* it ended by itself, with a status of server/worker/progress.h */
-    RUN_SIGNAL, /* a signal ended it */
-    RUN_MEMORY, /* where it ran, memory ran out, and the system chose it */
-    RUN_LOST,   /* nothing is known of it any more */
-    RUN_REFUSED /* where it was to run, it was not taken */
+    RUN_EXIT,     /* it ended by itself, with a status of server/worker/progress.h */
+    RUN_SIGNAL,   /* a signal ended it */
+    RUN_MEMORY,   /* where it ran, memory ran out, and the system chose it */
+    RUN_LOST,     /* nothing is known of it any more */
+    RUN_REFUSED,  /* where it was to run, it was not taken */
+    RUN_PREEMPTED /* its place was wanted for others; there may be a checkpoint */
 };
 
 struct run_end {
     enum run_way way;
     int code;         /* RUN_EXIT: the status; RUN_SIGNAL: its number */
-    char reason[256]; /* RUN_LOST, RUN_REFUSED: why; for users */
+    char reason[256]; /* RUN_LOST, _REFUSED, _PREEMPTED: why; for users */
 };
 
 /* What is to be done; borrowed until start returns. */
@@ -47,6 +49,9 @@ struct run_work {
     const char *outputs;  /* folder of another job's outputs that it reads; NULL: none */
     const char *files;    /* folder of files that were sent to the job; NULL: none */
     cJSON *order;         /* server/worker/order.h; the executor adds where scene, outputs and files lie */
+    int64_t job_id;       /* 0: it is no job's */
+    int attempt;          /* of the job */
+    double memory_bytes;  /* that it is foretold to need; 0: not known */
 };
 
 typedef void run_hear(void *user, const char *line, size_t length); /* without the newline */
@@ -69,12 +74,19 @@ struct run { /* an executor's own begins with it */
     const struct run_kind *kind;
     char place[64];    /* for the daemon's log: "process 123" */
     size_t long_lines; /* lines dropped because they were longer than PROGRESS_LINE_MAX */
+    bool outlives;     /* it goes on without this daemon, and a later one resumes it */
+    double slow_sec;   /* how much later than at once it may hear what it is asked */
 };
 
 struct executor {     /* likewise */
     const char *name; /* in state.db: at most 31 bytes */
+    int max_running;  /* jobs at once */
     enum status (*start)(const struct executor *executor, const struct run_work *work, struct run **run,
                          struct error *err);
+    /* The run of an attempt that an earlier daemon has started; STATUS_NOT_FOUND: it was none, or cannot go on. NULL: no
+     * run outlives its daemon. */
+    enum status (*resume)(const struct executor *executor, int64_t job_id, int attempt, struct run **run,
+                          struct error *err);
 };
 
 /* All of these take NULL for a run that never was: it says nothing and does not end. */
@@ -92,6 +104,6 @@ char *run_last_words(const struct run *run, size_t limit);
 /* The descriptors that become readable when there is something to read or to end; returns their number. *look_sec: look
  * after so much time all the same; infinite: never. */
 size_t run_poll(const struct run *run, struct pollfd fds[RUN_FDS], double *look_sec);
-void run_free(struct run *run); /* it must have ended */
+void run_free(struct run *run); /* it must have ended, or outlives the daemon */
 
 #endif

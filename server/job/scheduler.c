@@ -26,9 +26,12 @@
 #include "server/job/deliveries.h"
 #include "server/job/disk.h"
 #include "server/job/worker_messages.h"
+#include "server/store/remote.h"
 #include "server/job/housekeeping.h"
 #include "server/job/measure.h"
 #include "server/job/outcome.h"
+#include "server/job/executors.h"
+#include "server/job/resume.h"
 
 #define HOUSEKEEPING_SEC 600.0
 #define RETRY_SEC 5.0 /* after a failure of the store or of a start */
@@ -41,6 +44,7 @@ struct scheduler {
     atomic_int running;
     struct counters counters;
     atomic_ulong rounds;
+    struct executors places;
     size_t main_slots, job_slots, slot_count;
     struct attempt *slot; /* [slot_count]; the first job_slots run jobs, of those from main_slots on small renders */
     struct checks checks;
@@ -54,6 +58,16 @@ struct scheduler {
     struct deliveries deliveries;
     struct pollfd *poll; /* [1 + RUN_FDS * (slot_count + DELIVERIES_AT_ONCE)] */
 };
+
+/* Attempts that go on without a daemon: the limits may have been higher when they began. */
+static size_t count_elsewhere(struct store *store) {
+    struct remote_row *rows;
+    size_t count;
+    struct error err;
+    (void)store_remote_list(store, NULL, &rows, &count, &err); /* none where that fails, and the start of it all will */
+    mem_free(rows);
+    return count;
+}
 
 enum status scheduler_new(struct scheduler **out, const struct scheduler_config *config, struct store *store,
                           struct error *err) {
@@ -72,7 +86,8 @@ enum status scheduler_new(struct scheduler **out, const struct scheduler_config 
         cpu_set_t set;
         s->config.thread_count = sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : 1;
     }
-    s->main_slots = (size_t)(config->max_running > 0 ? config->max_running : 1);
+    executors_init(&s->places, config);
+    s->main_slots = s->places.slots + count_elsewhere(store);
     s->job_slots = s->main_slots + (size_t)config->small_renders;
     if (config->small_renders == 0)
         s->config.small_render_cost = 0.0; /* without a lane of their own they wait with the others */
@@ -89,6 +104,9 @@ void scheduler_free(struct scheduler *s) {
     if (!s)
         return;
     close(s->wake_fd);
+    for (size_t i = 0; i < s->slot_count; i++) /* what outlives this daemon, and what could not be entered */
+        attempt_empty(&s->slot[i]);
+    executors_release(&s->places);
     mem_free(s->slot);
     mem_free(s->poll);
     mem_free(s);
@@ -119,11 +137,11 @@ static void retry_later(struct scheduler *s, const char *what, const struct erro
     s->must_retry = true;
 }
 
-/* Threads for one more job: an equal share among the jobs that run or could run now. A worker keeps the threads it
- * started with, so the shares are approximate. */
+/* Threads of this machine for one more job: an equal share among the jobs that run or could run now. A worker keeps the
+ * threads it started with, so the shares are approximate. */
 static int thread_share(struct scheduler *s) {
     struct store_counts counts;
-    int64_t limit = (int64_t)s->main_slots, sharing = 1;
+    int64_t limit = s->config.max_running > 0 ? s->config.max_running : 1, sharing = 1;
     if (store_count(s->store, &counts, NULL) == STATUS_OK)
         sharing = counts.jobs_by_state[JOB_QUEUED] + counts.jobs_by_state[JOB_RUNNING];
     sharing = sharing < 1 ? 1 : sharing > limit ? limit : sharing;
@@ -149,14 +167,15 @@ static int small_thread_share(const struct scheduler *s) {
     return share > 0 ? share : 1;
 }
 
-/* Whether there is memory for the job beside those that run. */
+/* Whether there is memory on this machine for the job beside those that run on it. */
 static enum status ask_admission(struct scheduler *s, bool is_small, int64_t id, bool *may, double *need,
                                  struct error *err) {
     size_t running = 0;
     double used = 0.0;
     for (size_t i = 0; i < s->job_slots; i++) {
-        running += s->slot[i].phase == ATTEMPT_ALIVE;
-        used += s->slot[i].phase == ATTEMPT_ALIVE ? s->slot[i].memory_bytes : 0.0;
+        bool is_here = s->slot[i].phase == ATTEMPT_ALIVE && s->slot[i].executor == s->config.executor;
+        running += is_here;
+        used += is_here ? s->slot[i].memory_bytes : 0.0;
     }
     struct admission *a = is_small ? &s->small_admission : &s->admission;
     enum status status = admission_ask(a, s->store, id, running, used, may, need, err);
@@ -164,33 +183,62 @@ static enum status ask_admission(struct scheduler *s, bool is_small, int64_t id,
     return status;
 }
 
+/* The job of the lane whose turn it is, of those that may begin somewhere, and where. STATUS_NOT_FOUND: there is none. */
+static enum status next_job(struct scheduler *s, bool is_small, int64_t *id, const struct executor **where,
+                            double *need, struct error *err) {
+    struct job_lane lane = {.small_cost = s->config.small_render_cost, .is_small = is_small};
+    for (bool may = false; !may;) {
+        char *names = is_small ? NULL : executors_free(&s->places), *wish = NULL;
+        if (!names && !is_small)
+            return error_set(err, STATUS_NOT_FOUND, "no place is free");
+        charge_all(s);
+        lane.executors = names;
+        lane.anywhere = executors_for(&s->places, "") != NULL;
+        enum status status = store_job_next(s->store, s->config.user_max_running, &lane, id, err);
+        mem_free(names);
+        if (status == STATUS_OK)
+            status = store_job_executor(s->store, *id, &wish, err);
+        struct executor_use *use = status == STATUS_OK && !is_small ? executors_for(&s->places, wish) : NULL;
+        mem_free(wish);
+        *where = use ? use->executor : s->config.executor;
+        if (status == STATUS_OK && !use && !is_small)
+            return error_set(err, STATUS_NOT_FOUND, "its place is taken");
+        if (status != STATUS_OK || *where != s->config.executor)
+            return status;
+        status = ask_admission(s, is_small, *id, &may, need, err);
+        if (status != STATUS_OK)
+            return status;
+        if (!may && !use)
+            return error_set(err, STATUS_NOT_FOUND, "there is no memory for it");
+        if (!may)
+            use->is_closed = true; /* for all behind it, too; elsewhere there may be a place */
+    }
+    return STATUS_OK;
+}
+
 /* Fills the slots of a lane. */
 static void start_lane(struct scheduler *s, bool is_small) {
-    const struct job_lane lane = {s->config.small_render_cost, is_small};
     size_t end = is_small ? s->job_slots : s->main_slots;
+    executors_count(&s->places, s->slot, s->main_slots);
     for (size_t i = is_small ? s->main_slots : 0; i < end; i++) {
-        struct error err;
-        bool may = true;
-        double need = 0.0;
         /* The slot stays empty if the job left the queue without starting: take the next one. */
         while (s->slot[i].phase == ATTEMPT_EMPTY) {
+            struct scheduler_config with = s->config;
+            struct error err;
+            double need = 0.0;
             int64_t id;
-            charge_all(s);
-            enum status status = store_job_next(s->store, s->config.user_max_running, &lane, &id, &err);
+            enum status status = next_job(s, is_small, &id, &with.executor, &need, &err);
             if (status == STATUS_NOT_FOUND)
                 return;
             if (status == STATUS_OK)
-                status = ask_admission(s, is_small, id, &may, &need, &err);
-            if (status == STATUS_OK && !may)
-                return;
-            if (status == STATUS_OK)
-                status = attempt_start_job(&s->slot[i], &s->config, s->store, &s->counters, id,
+                status = attempt_start_job(&s->slot[i], &with, s->store, &s->counters, id,
                                            is_small ? small_thread_share(s) : thread_share(s), &err);
             if (status != STATUS_OK) {
                 retry_later(s, "cannot start a job", &err);
                 return;
             }
             s->slot[i].memory_bytes = need;
+            executors_add(&s->places, is_small ? NULL : s->slot[i].executor);
         }
     }
 }
@@ -246,7 +294,7 @@ static void ask_to_stop(struct scheduler *s, struct attempt *a) {
     if (a->phase != ATTEMPT_ALIVE || a->stopping)
         return;
     a->stopping = true;
-    a->kill_at_sec = clock_sec() + s->config.stop_grace_sec;
+    a->kill_at_sec = clock_sec() + s->config.stop_grace_sec + a->run->slow_sec;
     run_ask(a->run, RUN_STOP);
 }
 
@@ -300,9 +348,11 @@ static void follow_wishes(struct scheduler *s) {
     mem_free(ids);
 }
 
+static bool outlives(const struct attempt *a) { return a->run && a->run->outlives; }
+
 static bool any_alive(const struct scheduler *s) {
     for (size_t i = 0; i < s->slot_count; i++)
-        if (s->slot[i].phase == ATTEMPT_ALIVE)
+        if (s->slot[i].phase == ATTEMPT_ALIVE && !(atomic_load(&s->stopping) && outlives(&s->slot[i])))
             return true;
     return false;
 }
@@ -395,7 +445,7 @@ static void keep_house(struct scheduler *s) {
 enum status scheduler_run(struct scheduler *s, struct error *err) {
     size_t requeued;
     housekeeping_after_kill(&s->config, s->store);
-    enum status status = store_reconcile(s->store, &requeued, err);
+    enum status status = resume_all(s->slot, s->job_slots, &s->places, &s->config, s->store, &requeued, err);
     if (status == STATUS_OK)
         status = store_scene_check_again(s->store, err);
     if (status != STATUS_OK)
@@ -409,7 +459,8 @@ enum status scheduler_run(struct scheduler *s, struct error *err) {
         listen_and_settle(s);
         if (stopping) {
             for (size_t i = 0; i < s->slot_count; i++)
-                ask_to_stop(s, &s->slot[i]);
+                if (!outlives(&s->slot[i]))
+                    ask_to_stop(s, &s->slot[i]);
             if (!any_alive(s))
                 break;
         } else {

@@ -249,32 +249,47 @@ enum status store_job_explain(struct store *store, int64_t only, const char *rea
     }
 }
 
-static enum status requeue_one(struct store *store, int64_t *id, struct error *err) {
+/* Inside a transaction: the first running job behind `after` that is not kept; *id 0: there is none. */
+static enum status find_stray(struct store *store, const int64_t *kept, size_t kept_count, int64_t after, int64_t *id,
+                              struct error *err) {
+    for (bool is_kept = true; is_kept; after = *id) {
+        enum status status = sql_int(&store->sql, 0, id, err, "SELECT min(id) FROM jobs WHERE state = ? AND id > ?",
+                                     "ni", (int)JOB_RUNNING, after);
+        if (status != STATUS_OK)
+            return status;
+        is_kept = false;
+        for (size_t i = 0; i < kept_count && *id; i++)
+            is_kept |= kept[i] == *id;
+    }
+    return STATUS_OK;
+}
+
+static enum status requeue_one(struct store *store, int64_t id, struct error *err) {
     struct present now;
-    enum status status =
-        sql_int(&store->sql, 0, id, err, "SELECT id FROM jobs WHERE state = ? LIMIT 1", "n", (int)JOB_RUNNING);
-    if (status != STATUS_OK || *id == 0)
-        return status;
-    status = transition_look(store, *id, &now, err);
+    enum status status = transition_look(store, id, &now, err);
     now.ending = ENDING_RESTARTED;
     if (status == STATUS_OK)
-        status = sql_run(&store->sql, err, "UPDATE jobs SET disk_bytes = -1 WHERE id = ?", "i", *id);
+        status = sql_run(&store->sql, err, "UPDATE jobs SET disk_bytes = -1 WHERE id = ?", "i", id);
     return status == STATUS_OK ? transition_move(store, &now, JOB_QUEUED, "the daemon was restarted", "", err) : status;
 }
 
-enum status store_reconcile(struct store *store, size_t *requeued, struct error *err) {
+enum status store_reconcile(struct store *store, const int64_t *kept, size_t kept_count, size_t *requeued,
+                            struct error *err) {
+    int64_t id = 0, after = 0;
     *requeued = 0;
     for (;;) {
-        int64_t id = 0;
         enum status status = store_begin_freeing(store, err);
         if (status != STATUS_OK)
             return status;
-        status = requeue_one(store, &id, err);
+        status = find_stray(store, kept, kept_count, after, &id, err);
+        if (status == STATUS_OK && id)
+            status = requeue_one(store, id, err);
         status = store_end(store, status, id ? id : STORE_NOTHING_CHANGED, err);
         if (status == STATUS_NO_SPACE && store_reserve_spend(store))
             continue;
         if (status != STATUS_OK || id == 0)
             return status;
+        after = id;
         ++*requeued;
     }
 }

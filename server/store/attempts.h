@@ -61,22 +61,30 @@ enum status store_job_stop(struct store *store, int64_t id, int attempt, const c
 /* The attempt cannot continue until somebody acts (disk full): paused. */
 enum status store_job_block(struct store *store, int64_t id, int attempt, const char *reason, const char *hint,
                             struct error *err);
-/* At start: every running job is queued again (or paused, cancelled, as requested). It does not count as a failed
- * attempt: the job is not at fault when the daemon or the machine dies. The disk usage of such a job becomes
+/* At start: every running job but kept[kept_count] is queued again (or paused, cancelled, as requested). It does not count
+ * as a failed attempt: the job is not at fault when the daemon or the machine dies. The disk usage of such a job becomes
  * unknown. */
-enum status store_reconcile(struct store *store, size_t *requeued, struct error *err);
+enum status store_reconcile(struct store *store, const int64_t *kept, size_t kept_count, size_t *requeued,
+                            struct error *err);
 
 /* Two lanes, so that small renders do not wait behind hours of work. */
 struct job_lane {
     double small_cost; /* renders of at most this cost (job.h) are small; 0: none is */
     bool is_small;     /* the lane of the small ones; else that of all others */
+    /* Names of executors with a blank before and after each, " process slurm ": of the jobs that must run on a certain one
+     * only theirs come into question. NULL: all. */
+    const char *executors;
+    bool anywhere; /* and those that may run on any */
 };
-/* The queued job to start next in that lane (NULL: there is but one), among those whose scene has been checked (ready, or rejected: such a job is started
- * only to fail); a render needs no scene. STATUS_NOT_FOUND if none. Among the users with fewer than user_max_running
- * running jobs in the lane (0: no limit), the one with the least recent CPU time; of that user's jobs the one of highest priority, then the first in
- * turn. */
+/* The queued job to start next in that lane (NULL: there is but one), among those whose scene has been checked (ready, or
+ * rejected: such a job is started only to fail); a render needs no scene. STATUS_NOT_FOUND if none. Among the users with
+ * fewer than user_max_running running jobs in the lane (0: no limit), the one with the least recent CPU time; of that
+ * user's jobs the one of highest priority, then the first in turn. */
 enum status store_job_next(struct store *store, int user_max_running, const struct job_lane *lane, int64_t *id,
                            struct error *err);
+/* The executor on which the job must run: the one that its user has chosen, JOB_EXECUTOR_HERE for all kinds but
+ * reconstructions, "": any. The caller's (mem_free). */
+enum status store_job_executor(struct store *store, int64_t id, char **executor, struct error *err);
 /* Running jobs and the requests to them, for the scheduler. Fills ids[limit], wanted[limit]. */
 enum status store_job_running(struct store *store, size_t limit, int64_t *ids, enum job_wanted *wanted, size_t *count,
                               struct error *err);

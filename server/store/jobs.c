@@ -149,8 +149,9 @@ static enum status insert(struct store *store, const struct job_new *job, const 
     enum status status = sql_run(
         &store->sql, err,
         "INSERT INTO jobs (scene_id, name, labels, settings, priority, attempts_left, created_ms, idempotency_key,"
-        " request_sha256, owner_id, shared, kind, source_id, cost, state, reason, hint, disk_bytes, turn)"
-        " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 0, (SELECT ifnull(max(turn), 0) + 1 FROM jobs))",
+        " request_sha256, owner_id, shared, kind, source_id, cost, state, reason, hint, disk_bytes, turn, executor)"
+        " VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, 0,"
+        " (SELECT ifnull(max(turn), 0) + 1 FROM jobs), iif(json_valid(?4), ifnull(json_extract(?4, '$.executor'), ''), ''))",
         "ttttnnittinnidntt", job->scene_id, job->name, job->labels, job->settings, job->priority, job->max_attempts,
         store_now_ms(), key, job->request_sha256, job->owner_id, (int)job->is_shared, (int)job->kind, job->source_id,
         job->cost, (int)(waits ? JOB_PAUSED : JOB_QUEUED), waits ? JOB_FILES_REASON : "", waits ? JOB_FILES_HINT : "");

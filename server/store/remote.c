@@ -116,6 +116,22 @@ enum status store_remote_begin(struct store *store, const struct remote_row *row
     return store_end(store, status, STORE_NOTHING_CHANGED, err);
 }
 
+enum status store_remote_rename(struct store *store, int64_t job_id, int number, const char *name,
+                                const char *token_sha256, struct error *err) {
+    enum status status = store_begin(store, err);
+    if (status != STATUS_OK)
+        return status;
+    status = store_fence(store, job_id, number, err);
+    if (status == STATUS_OK)
+        status = sql_run(&store->sql, err,
+                         "UPDATE remote SET name = ?, token_sha256 = ?, external_id = ''"
+                         " WHERE job_id = ? AND part = 0 AND number = ? AND phase < ?",
+                         "ttinn", name, token_sha256, job_id, number, (int)REMOTE_CLAIMED);
+    if (status == STATUS_OK && sql_changes(&store->sql) == 0)
+        status = error_set(err, STATUS_CONFLICT, "attempt %d of job %lld is claimed", number, (long long)job_id);
+    return store_end(store, status, STORE_NOTHING_CHANGED, err);
+}
+
 enum status store_remote_submitted(struct store *store, int64_t job_id, int number, const char *external_id,
                                    struct error *err) {
     enum status status = store_begin(store, err);

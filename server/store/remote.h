@@ -72,6 +72,10 @@ struct remote_row {
 /* An attempt that the job runs begins to be submitted. */
 enum status store_remote_begin(struct store *store, const struct remote_row *row, const char *token_sha256,
                                struct error *err);
+/* It is submitted once more, and whatever came of it before does not count: that knows another name and token.
+ * STATUS_CONFLICT where it is claimed or over. */
+enum status store_remote_rename(struct store *store, int64_t job_id, int number, const char *name,
+                                const char *token_sha256, struct error *err);
 /* The site has it under that id. Nothing changes where it is claimed or ended already, but for an unknown id. */
 enum status store_remote_submitted(struct store *store, int64_t job_id, int number, const char *external_id,
                                    struct error *err);

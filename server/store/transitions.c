@@ -161,6 +161,9 @@ enum status store_job_extend(struct store *store, int64_t id, int max_attempts, 
     if (status == STATUS_OK)
         status = revive(store, &now, max_attempts, limits, err);
     if (status == STATUS_OK)
-        status = sql_run(&store->sql, err, "UPDATE jobs SET settings = ? WHERE id = ?", "ti", settings, id);
+        status = sql_run(
+            &store->sql, err,
+            "UPDATE jobs SET settings = ?1, executor = iif(json_valid(?1), ifnull(json_extract(?1, '$.executor'), ''), '') WHERE id = ?2",
+            "ti", settings, id);
     return store_end(store, status, id, err);
 }

@@ -5,6 +5,9 @@
 /* Whether a job is in the lane: ?5 the cost of a small render at the most, ?6 which lane. */
 #define IN_LANE "((jobs.kind = 1 AND jobs.cost > 0 AND jobs.cost <= ?5) = ?6)"
 
+/* Where a job must run; "": anywhere. */
+#define MUST_RUN_ON "iif(jobs.kind = 0, jobs.executor, '" JOB_EXECUTOR_HERE "')"
+
 enum status store_job_next(struct store *store, int user_max_running, const struct job_lane *lane, int64_t *id,
                            struct error *err) {
     const struct job_lane only = {0}, *l = lane ? lane : &only;
@@ -18,12 +21,29 @@ enum status store_job_next(struct store *store, int user_max_running, const stru
                 " LEFT JOIN usage ON usage.owner_id = jobs.owner_id"
                 " WHERE jobs.state = ?2 AND (kind = 1 OR scenes.state >= ?3) AND " IN_LANE
                 "  AND (?4 = 0 OR jobs.owner_id = 0 OR ifnull(busy.count, 0) < ?4)"
+                "  AND (?7 IS NULL OR (?8 AND " MUST_RUN_ON " = '') OR instr(?7, ' ' || " MUST_RUN_ON " || ' '))"
                 " ORDER BY usage.weight IS NOT NULL, usage.weight, jobs.owner_id,"
                 "  priority DESC, turn LIMIT 1",
-                "nnnndn", (int)JOB_RUNNING, (int)JOB_QUEUED, (int)SCENE_READY, user_max_running, l->small_cost,
-                (int)l->is_small);
+                "nnnndntn", (int)JOB_RUNNING, (int)JOB_QUEUED, (int)SCENE_READY, user_max_running, l->small_cost,
+                (int)l->is_small, l->executors, (int)l->anywhere);
     store_unlock(store);
     return status == STATUS_OK && *id == 0 ? error_set(err, STATUS_NOT_FOUND, "no job waits to be run") : status;
+}
+
+enum status store_job_executor(struct store *store, int64_t id, char **executor, struct error *err) {
+    sqlite3_stmt *stmt;
+    bool found = false;
+    *executor = NULL;
+    store_lock(store);
+    enum status status =
+        sql_first(&store->sql, &stmt, &found, err, "SELECT " MUST_RUN_ON " FROM jobs WHERE id = ?", "i", id);
+    if (found) {
+        *executor = sql_dup(stmt, 0);
+        sqlite3_reset(stmt);
+    }
+    store_unlock(store);
+    return status == STATUS_OK && !found ? error_set(err, STATUS_NOT_FOUND, "there is no job %lld", (long long)id)
+                                         : status;
 }
 
 enum status store_queue_check(struct store *store, int64_t owner_id, const struct count_limits *limits,

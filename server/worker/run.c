@@ -197,8 +197,8 @@ static enum status load_checkpoint(void *user, struct state_array *array, size_t
  * out of memory). */
 static char *fingerprint_of(const struct order *order) {
     char hex[SHA256_HEX_SIZE];
-    static const char *const apart[] = {"iterations",           "time_limit_sec", "refine_looks",
-                                        "texels_per_iteration", "listing1_looks", "fit"};
+    static const char *const apart[] = {
+        "iterations", "time_limit_sec", "refine_looks", "texels_per_iteration", "listing1_looks", "fit", "executor"};
     cJSON *kept = cJSON_Duplicate(order->settings, true);
     for (size_t i = 0; i < sizeof apart / sizeof *apart; i++)
         cJSON_DeleteItemFromObjectCaseSensitive(kept, apart[i]);

@@ -44,7 +44,7 @@ static void serve(const char *folder, FILE *in, FILE *out) {
     snprintf(rig.dir, sizeof rig.dir, "%s", folder);
     rig_open(&rig, &rig_patient, 60, 100, 10);
     rig.api->config.queue_limit = 1000000;
-    rig_must(store_reconcile(rig.store, &requeued, &err), &err, "store_reconcile");
+    rig_must(store_reconcile(rig.store, NULL, 0, &requeued, &err), &err, "store_reconcile");
     rig_scene(&rig);
     fprintf(out, "%u\n", listener_port(rig.listener));
     fflush(out);

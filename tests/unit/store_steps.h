@@ -228,7 +228,7 @@ static enum status explain(void) { return store_job_explain(store, 0, "it waits"
 static enum status explain_no_more(void) { return store_job_explain(store, 0, "", "it", "", &err); }
 static enum status reconcile(void) {
     size_t requeued;
-    return store_reconcile(store, &requeued, &err);
+    return store_reconcile(store, NULL, 0, &requeued, &err);
 }
 static enum status pay(void) {
     store->unpaid = mem_realloc_array(store->unpaid, 1, sizeof *store->unpaid);

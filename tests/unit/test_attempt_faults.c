@@ -90,7 +90,7 @@ static void put_right(int64_t id, const struct error *why, bool is_entered) {
     if (job.state == JOB_PAUSED)
         OK(store_job_resume(store, id, NULL, &err));
     job_release(&job);
-    OK(store_reconcile(store, &requeued, &err));
+    OK(store_reconcile(store, NULL, 0, &requeued, &err));
 }
 
 /* False where there is no n-th call. */

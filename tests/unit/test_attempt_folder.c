@@ -166,7 +166,7 @@ static bool adopt_once(const char *call, long n) {
         OK(store_attempt_list(store, ids[i], 4, rows, &count, &err));
         CHECK(count == 1 && rows[0].number == 2 && rows[0].phase == (i ? ATTEMPT_ROW_RUNNING : ATTEMPT_ROW_ENDED));
     }
-    OK(store_reconcile(store, &requeued, &err));
+    OK(store_reconcile(store, NULL, 0, &requeued, &err));
     OK(store_attempt_list(store, ids[1], 4, rows, &count, &err));
     CHECK(requeued > 0 && count == 1 && rows[0].phase == ATTEMPT_ROW_ENDED);
     CHECK_STRING(rows[0].ending, ENDING_RESTARTED);

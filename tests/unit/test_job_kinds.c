@@ -162,7 +162,7 @@ static void check_files(void) {
 }
 
 static void check_lanes(void) {
-    const struct job_lane small = {1000.0, true}, others = {1000.0, false};
+    const struct job_lane small = {.small_cost = 1000.0, .is_small = true}, others = {.small_cost = 1000.0};
     int64_t source = add_source(), large = add_reader(JOB_RENDER, source, 1001.0);
     int64_t unknown = add_reader(JOB_RENDER, source, 0.0), quick = add_reader(JOB_RENDER, source, 1000.0);
     int64_t evaluation = add_reader(JOB_EVALUATE, source, 0.0), room = add_job(store, SCENE_A, 0);
@@ -179,7 +179,7 @@ static void check_lanes(void) {
 
 /* One user's jobs of one lane do not count in the other. */
 static void check_limits(void) {
-    const struct job_lane small = {1000.0, true}, others = {1000.0, false};
+    const struct job_lane small = {.small_cost = 1000.0, .is_small = true}, others = {.small_cost = 1000.0};
     int64_t source = add_source(), user, id, jobs[4];
     int attempt;
     char token[TOKEN_SIZE];

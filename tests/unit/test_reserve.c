@@ -149,7 +149,7 @@ int main(void) {
     store_close(store);
     fill_disk();
     OK(store_open(&store, dir, &err));
-    OK(store_reconcile(store, &requeued, &err));
+    OK(store_reconcile(store, NULL, 0, &requeued, &err));
     CHECK(requeued == 1);
     OK(store_job_cancel(store, id, &err));
     store_close(store);

@@ -146,8 +146,8 @@ static void test_unsettled(struct daemon *d) {
 
 /* A start that fails says why, whichever of its statements it is. */
 static void test_start(struct daemon *d) {
-    static const char *const statements[] = {"SELECT id FROM jobs WHERE state = ? LIMIT 1",
-                                             "UPDATE scenes SET problems = '[]'"};
+    static const char *const statements[] = {"SELECT min(id) FROM jobs WHERE state = ? AND id > ?",
+                                             "SELECT id, wanted FROM jobs", "UPDATE scenes SET problems = '[]'"};
     struct scheduler_config config = {
         .data_dir = d->dir, .executor = process_executor_init(&at_home, "/proc/self/exe", d->dir), .max_running = 1};
     OK(store_open(&d->store, d->dir, &err));

@@ -290,10 +290,10 @@ static void test_killed(void) {
     write_file(out, "b.exr", 512);
     store_close(store);
     OK(store_open(&store, dir, &err));
-    OK(store_reconcile(store, &requeued, &err));
+    OK(store_reconcile(store, NULL, 0, &requeued, &err));
     store_close(store); /* and killed again */
     OK(store_open(&store, dir, &err));
-    OK(store_reconcile(store, &requeued, &err));
+    OK(store_reconcile(store, NULL, 0, &requeued, &err));
     measure_unknown(&config, store);
     CHECK(requeued == 0 && disk_of(id) == size_of(folder) && disk_of(id) >= (512 + 128 + 64) * KIB);
     CHECK(kept_by(BOB) == before + disk_of(id));

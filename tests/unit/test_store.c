@@ -163,7 +163,7 @@ static void test_reconcile(void) {
         id[i] = job_in(store, (enum condition)i, &attempt);
     store_close(store);
     OK(store_open(&store, dir, &err));
-    OK(store_reconcile(store, &requeued, &err));
+    OK(store_reconcile(store, NULL, 0, &requeued, &err));
     CHECK(requeued == 3);
     static const enum condition after[CONDITIONS] = {
         [QUEUED] = QUEUED, [RUNNING] = QUEUED,      [PAUSING] = PAUSED, [CANCELLING] = CANCELLED,
@@ -174,7 +174,7 @@ static void test_reconcile(void) {
     OK(store_job_get(store, id[RUNNING], &job, &err));
     CHECK(job.attempts_left == 2); /* a restart is not the job's fault */
     job_release(&job);
-    OK(store_reconcile(store, &requeued, &err));
+    OK(store_reconcile(store, NULL, 0, &requeued, &err));
     CHECK(requeued == 0);
     store_close(store);
     drop_dir(dir);

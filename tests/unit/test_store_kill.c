@@ -39,7 +39,7 @@ static void child(const char *dir, int first_key, int fd) {
     struct store *store;
     size_t requeued;
     bool existed, replayed;
-    if (store_open(&store, dir, &err) != STATUS_OK || store_reconcile(store, &requeued, &err) != STATUS_OK ||
+    if (store_open(&store, dir, &err) != STATUS_OK || store_reconcile(store, NULL, 0, &requeued, &err) != STATUS_OK ||
         store_scene_add(store, SCENE, "s", 1, 0, &existed, &err) != STATUS_OK)
         _exit(2);
     if (!existed)
@@ -166,7 +166,7 @@ int main(void) {
         struct store_counts counts;
         size_t requeued;
         OK(store_open(&store, dir, &err));
-        OK(store_reconcile(store, &requeued, &err));
+        OK(store_reconcile(store, NULL, 0, &requeued, &err));
         for (int key = 0; key < next_key; key++)
             verify(store, &last[key]);
         /* At most the one job that was written but not acknowledged; its key is used again. */
