@@ -143,8 +143,6 @@ void pack_close(struct pack *p) {
     mem_free(p);
 }
 
-bool pack_is_folder(const struct pack *p) { return p->is_folder; }
-
 size_t pack_file_count(const struct pack *p) { return p->count; }
 
 uint64_t pack_content_bytes(const struct pack *p) { return p->content_bytes; }

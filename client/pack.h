@@ -20,7 +20,6 @@ struct pack; /* opaque */
 enum status pack_open(struct pack **pack, const char *path, struct error *err);
 void pack_close(struct pack *pack);
 
-bool pack_is_folder(const struct pack *pack);
 size_t pack_file_count(const struct pack *pack);
 /* Sum of the files' sizes: bytes to read; slightly less than the bytes to send. */
 uint64_t pack_content_bytes(const struct pack *pack);

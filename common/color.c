@@ -13,7 +13,7 @@ const struct color_primaries color_rec709 = {{0.64, 0.33}, {0.30, 0.60}, {0.15, 
 const struct color_primaries color_display_p3 = {{0.680, 0.320}, {0.265, 0.690}, {0.150, 0.060}, {0.3127, 0.3290}};
 const struct color_primaries color_dci_p3 = {{0.680, 0.320}, {0.265, 0.690}, {0.150, 0.060}, {0.314, 0.351}};
 const struct color_primaries color_rec2020 = {{0.708, 0.292}, {0.170, 0.797}, {0.131, 0.046}, {0.3127, 0.3290}};
-const struct color_primaries color_adobe_rgb = {{0.64, 0.33}, {0.21, 0.71}, {0.15, 0.06}, {0.3127, 0.3290}};
+static const struct color_primaries adobe_rgb = {{0.64, 0.33}, {0.21, 0.71}, {0.15, 0.06}, {0.3127, 0.3290}};
 const struct color_primaries color_rec601_525 = {{0.630, 0.340}, {0.310, 0.595}, {0.155, 0.070}, {0.3127, 0.3290}};
 const struct color_primaries color_rec601_625 = {{0.64, 0.33}, {0.29, 0.60}, {0.15, 0.06}, {0.3127, 0.3290}};
 
@@ -182,7 +182,7 @@ void color_set(struct color *color, const char *name, const struct color_primari
 }
 
 void color_set_adobe_rgb(struct color *color, int bits) {
-    color_set(color, "Adobe RGB", &color_adobe_rgb, COLOR_POWER, 563.0 / 256.0, bits);
+    color_set(color, "Adobe RGB", &adobe_rgb, COLOR_POWER, 563.0 / 256.0, bits);
 }
 
 /* --- pixels -------------------------------------------------------------------------------- */

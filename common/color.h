@@ -26,8 +26,8 @@ enum color_transfer {
 struct color_primaries {
     double red[2], green[2], blue[2], white[2];
 };
-extern const struct color_primaries color_rec709, color_display_p3, color_dci_p3, color_rec2020, color_adobe_rgb,
-    color_rec601_525, color_rec601_625;
+extern const struct color_primaries color_rec709, color_display_p3, color_dci_p3, color_rec2020, color_rec601_525,
+    color_rec601_625;
 
 struct color {
     char name[COLOR_NAME_SIZE];       /* name for people: "Display P3"; "" if unspecified */

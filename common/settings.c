@@ -138,7 +138,8 @@ const struct setting *settings_find(const char *name) {
     return i < 0 ? NULL : &table[i];
 }
 
-const char *settings_nearest(const char *name) {
+/* The valid name nearest to `name` by edit distance, or NULL when none is near. */
+static const char *nearest_name(const char *name) {
     struct nearest nearest;
     nearest_init(&nearest, name);
     for (size_t i = 0; i < TABLE_COUNT; i++)
@@ -441,7 +442,7 @@ static void add_fault(struct faults *f, const char *name, const char *reason, co
 
 static void add_unknown(struct faults *f, const char *name) {
     char hint[128] = "";
-    const char *nearest = settings_nearest(name);
+    const char *nearest = nearest_name(name);
     if (nearest)
         snprintf(hint, sizeof hint, "did you mean %s?", nearest);
     if (f->count < UNKNOWN_MAX)

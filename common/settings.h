@@ -31,9 +31,6 @@ struct setting {
 const struct setting *settings_table(size_t *count);
 const struct setting *settings_find(const char *name);
 
-/* The valid name nearest to `name` by edit distance, or NULL when none is near. */
-const char *settings_nearest(const char *name);
-
 /* What the user says of one segment: "emitters.27": "on". */
 struct segment_setting {
     uint32_t segment;

@@ -10,7 +10,8 @@ static void set(cJSON *data, const char *name, cJSON *value) {
     json_add(data, name, value);
 }
 
-void event_text_add(struct buf *text, bool is_ndjson, const struct event_row *row, cJSON *data) {
+/* Appends one event. Takes data, an object, and sets its `at`, `job` and `attempt`. */
+static void add(struct buf *text, bool is_ndjson, const struct event_row *row, cJSON *data) {
     char at[CLOCK_TEXT_SIZE];
     clock_text(row->at_ms, at);
     set(data, "at", json_new_string(at));
@@ -29,7 +30,7 @@ void event_text_add(struct buf *text, bool is_ndjson, const struct event_row *ro
 
 void event_text_add_row(struct buf *text, bool is_ndjson, const struct event_row *row) {
     cJSON *object = cJSON_Parse(row->data);
-    event_text_add(text, is_ndjson, row, object ? object : cJSON_CreateObject());
+    add(text, is_ndjson, row, object ? object : cJSON_CreateObject());
 }
 
 void event_text_add_snapshot(struct buf *text, bool is_ndjson, int64_t job_id, int64_t id, cJSON *view) {
@@ -37,14 +38,14 @@ void event_text_add_snapshot(struct buf *text, bool is_ndjson, int64_t job_id, i
     struct event_row row = {
         .id = id, .job_id = job_id, .at_ms = clock_unix_ms(), .type = EVENT_STATE, .attempt = attempt->valueint};
     json_add_bool(view, "snapshot", true);
-    event_text_add(text, is_ndjson, &row, view);
+    add(text, is_ndjson, &row, view);
 }
 
 void event_text_add_resync(struct buf *text, bool is_ndjson, int64_t id, const char *reason) {
     cJSON *data = cJSON_CreateObject();
     json_add_string(data, "reason", reason);
     struct event_row row = {.id = id, .at_ms = clock_unix_ms(), .type = EVENT_RESYNC};
-    event_text_add(text, is_ndjson, &row, data);
+    add(text, is_ndjson, &row, data);
 }
 
 void event_text_add_keepalive(struct buf *text, bool is_ndjson) {

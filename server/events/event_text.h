@@ -8,8 +8,6 @@
 #include "common/json.h"
 #include "server/store/store.h"
 
-/* Appends one event. Takes data, an object, and sets its `at`, `job` and `attempt`. */
-void event_text_add(struct buf *text, bool is_ndjson, const struct event_row *row, cJSON *data);
 /* Appends an event of the store, whose data is JSON text. */
 void event_text_add_row(struct buf *text, bool is_ndjson, const struct event_row *row);
 /* Appends the current state of a job, its view; takes it. The event's id is the one that the client already has, so that

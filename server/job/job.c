@@ -57,16 +57,6 @@ const char *scene_state_name(enum scene_state state) {
     return (unsigned)state < SCENE_STATE_COUNT ? scene_names[state] : "unknown";
 }
 
-bool scene_state_parse(const char *name, enum scene_state *state) {
-    for (unsigned i = 0; i < SCENE_STATE_COUNT; i++) {
-        if (strcmp(name, scene_names[i]) == 0) {
-            *state = (enum scene_state)i;
-            return true;
-        }
-    }
-    return false;
-}
-
 bool job_is_terminal(enum job_state state) {
     return state == JOB_SUCCEEDED || state == JOB_FAILED || state == JOB_CANCELLED;
 }

@@ -52,7 +52,6 @@ const char *job_kind_name(enum job_kind kind);
 bool job_kind_parse(const char *name, enum job_kind *kind);
 const char *job_wanted_name(enum job_wanted wanted); /* "run", "pause", "cancel" */
 const char *scene_state_name(enum scene_state state);
-bool scene_state_parse(const char *name, enum scene_state *state);
 bool job_is_terminal(enum job_state state);
 /* Whether the diagram above has an arrow between the states. */
 bool job_may_become(enum job_state from, enum job_state to);

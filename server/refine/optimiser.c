@@ -16,13 +16,15 @@
  * ten where a tenth of it is. */
 #define MAX_VISITS 10.0
 
-void optimiser_keep_since(struct optimiser *o, int format, const char *name, void *data, size_t bytes) {
+/* As optimiser_keep, for an array that checkpoints of formats before `format` (state_array.h) lack: it is left as it is
+ * then. */
+static void keep_since(struct optimiser *o, int format, const char *name, void *data, size_t bytes) {
     assert(o->state_count < OPTIMISER_ARRAYS);
     o->state[o->state_count++] = (struct state_array){name, data, bytes, format};
 }
 
 void optimiser_keep(struct optimiser *o, const char *name, void *data, size_t bytes) {
-    optimiser_keep_since(o, 1, name, data, bytes);
+    keep_since(o, 1, name, data, bytes);
 }
 
 /* Hash of the numbering of texels and segments, which the arrays of a checkpoint depend on. */
@@ -46,11 +48,11 @@ static void keep_common(struct optimiser *o) {
     optimiser_keep(o, "emission.adam", o->emission.adam.record, adam_bytes(&o->emission.adam));
     optimiser_keep(o, "emission.evidence", in->evidence, segments * sizeof *in->evidence);
     optimiser_keep(o, "environment.factor", in->sky_factor, sizeof *in->sky_factor);
-    optimiser_keep_since(o, 3, "light", in->light, sizeof *in->light);
+    keep_since(o, 3, "light", in->light, sizeof *in->light);
     optimiser_keep(o, "sun.irradiance", in->sun_irradiance, sizeof *in->sun_irradiance);
     optimiser_keep(o, "emission.is_emitter", in->is_emitter, segments * sizeof *in->is_emitter);
-    optimiser_keep_since(o, 2, "plan", &o->plan, sizeof o->plan);
-    optimiser_keep_since(o, 2, STATE_SURFACE, &o->surface, sizeof o->surface);
+    keep_since(o, 2, "plan", &o->plan, sizeof o->plan);
+    keep_since(o, 2, STATE_SURFACE, &o->surface, sizeof o->surface);
 }
 
 struct optimiser *optimiser_new(const struct optimiser_input *input, bool derivatives,

@@ -92,9 +92,6 @@ void optimiser_free(struct optimiser *o);
 /* Adds data[bytes] to the checkpoints. Borrows both name and data. */
 void optimiser_keep(struct optimiser *o, const char *name, void *data, size_t bytes);
 
-/* The same for an array that checkpoints of formats before `format` (state_array.h) lack: it is left as it is then. */
-void optimiser_keep_since(struct optimiser *o, int format, const char *name, void *data, size_t bytes);
-
 /* Loads the newest checkpoint that fits, if any; saves one. */
 enum status optimiser_load(struct optimiser *o, bool *found, struct error *err);
 enum status optimiser_save(struct optimiser *o, struct error *err);

@@ -105,7 +105,7 @@ static void test_reads_back(void) {
     struct buf all;
     char *path = mem_printf("%s/a", root);
     CHECK(pack_open(&p, path, &err) == STATUS_OK);
-    CHECK(pack_is_folder(p) && pack_file_count(p) == 5 && pack_content_bytes(p) == 70615);
+    CHECK(pack_file_count(p) == 5 && pack_content_bytes(p) == 70615);
     buf_init(&all, 64 << 20);
     CHECK(drain(p, 65536, &all, &err) == STATUS_OK);
     struct archive *reader = archive_read_new();
@@ -199,7 +199,6 @@ static void test_file(void) {
     uint64_t length;
     put("archive", "room.zip", 200001, 0644);
     CHECK(pack_open(&p, path, &err) == STATUS_OK);
-    CHECK(!pack_is_folder(p));
     CHECK(pack_measure(p, NULL, NULL, &length, packed, &err) == STATUS_OK);
     CHECK(sha256_of_file(path, direct, &err) == STATUS_OK);
     CHECK(length == 200001);

@@ -18,10 +18,6 @@ int main(void) {
     }
     enum job_state state;
     CHECK(!job_state_parse("sleeping", &state));
-    for (int i = 0; i < SCENE_STATE_COUNT; i++) {
-        enum scene_state parsed;
-        CHECK(scene_state_parse(scene_state_name((enum scene_state)i), &parsed) && (int)parsed == i);
-    }
     CHECK(job_is_terminal(JOB_SUCCEEDED) && job_is_terminal(JOB_FAILED));
     CHECK(job_is_terminal(JOB_CANCELLED) && !job_is_terminal(JOB_PAUSED));
     CHECK_STRING(job_wanted_name(JOB_WANT_PAUSE), "pause");

@@ -40,7 +40,8 @@ enum status transforms_file_read(const struct source_place *place, const char *p
     return STATUS_OK;
 }
 
-void transforms_file_rebase(const char *folder, struct frames *t) {
+/* Puts the folder (a base) before the paths of meshes; photo_folder.h does it for photographs and masks. */
+static void rebase(const char *folder, struct frames *t) {
     char **path[2] = {&t->mesh, &t->point_cloud};
     for (int i = 0; i < 2; i++) {
         char *old = *path[i];
@@ -59,7 +60,7 @@ static char *recognise(const struct listing *l, const char *base) {
 static enum status read(const struct source_place *place, struct frames *t, struct findings *f, struct error *err) {
     char *folder = mem_strndup(place->found, (size_t)(path_base(place->found) - place->found));
     enum status status = transforms_file_read(place, place->found, t, f, err);
-    transforms_file_rebase(folder, t);
+    rebase(folder, t);
     photo_folder_settle(place->listing, folder, false, t, f);
     photo_folder_settle_masks(place->listing, folder, t, f);
     mem_free(folder);
@@ -108,7 +109,7 @@ static enum status read_split(const struct source_place *place, struct frames *t
                               struct error *err) {
     static const char *const names[] = {"transforms_val.json", "transforms_test.json"};
     enum status status = transforms_file_read(place, place->found, t, f, err);
-    transforms_file_rebase(place->base, t);
+    rebase(place->base, t);
     photo_folder_settle(place->listing, place->base, false, t, f);
     photo_folder_settle_masks(place->listing, place->base, t, f);
     for (int i = 0; i < 2 && status == STATUS_OK; i++) {
@@ -119,7 +120,7 @@ static enum status read_split(const struct source_place *place, struct frames *t
         status = transforms_file_read(place, file->path, &held_out, f, err);
         photo_folder_settle(place->listing, place->base, false, &held_out, f);
         photo_folder_settle_masks(place->listing, place->base, &held_out, f);
-        transforms_file_rebase(place->base, &held_out);
+        rebase(place->base, &held_out);
         drop_absent(place->listing, file->path, &held_out, f);
         append(t, &held_out);
     }

@@ -7,7 +7,5 @@
 /* Reads the file at `path`; results and errors as source->read has them, with paths as the file has them. */
 enum status transforms_file_read(const struct source_place *place, const char *path, struct frames *t,
                                  struct findings *f, struct error *err);
-/* Puts the folder (a base) before the paths of meshes; photo_folder.h does it for photographs and masks. */
-void transforms_file_rebase(const char *folder, struct frames *t);
 
 #endif
