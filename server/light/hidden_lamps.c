@@ -17,7 +17,7 @@
 #define SOLVE_STEPS 8
 /* Prior odds: lamps expected among all candidates. */
 #define LAMPS_EXPECTED 1.0
-/* Odds that are asked for beyond that, as a logarithm: 20 to 1. */
+/* Logarithm of the odds that are asked for: 20 to 1, as a false lamp costs more than a missed one. */
 #define SURE 3.0
 #define NO_LIGHT (-1e3) /* the logarithm of no radiance to speak of */
 
@@ -111,8 +111,12 @@ static int by_gain(const void *a, const void *b) {
     return (first->segment > second->segment) - (first->segment < second->segment);
 }
 
-/* Nats that a lamp must gain, as one of `count` candidates. */
-static double needed(size_t count) { return LIGHT_PATCHES_ALIKE * (log((double)count / LAMPS_EXPECTED) + SURE); }
+/* Logarithm of the odds that a lamp, one of `count` candidates, is there, over those that are asked for, if the loss is
+ * `gain` lower with it. How alike patches are is measured with it: without, what it lights agrees. */
+static double odds(struct light_model *m, double gain, size_t count) {
+    light_model_measure(m);
+    return gain / m->patches_alike - log((double)count / LAMPS_EXPECTED) - SURE;
+}
 
 /* Gives what unseen surfaces send its prior value: it must not keep explaining what a lamp explains better. */
 static void forget_guesses(struct joint_fit *fit, size_t first) {
@@ -147,14 +151,14 @@ static bool add_best(struct lamp_search *s) {
     struct light_model *m = s->m;
     size_t sources = m->fit.source_count, best = SIZE_MAX, bytes = (sources + 1) * sizeof *m->fit.source;
     struct joint_source *kept = mem_array(sources + 1, sizeof *kept), *fitted = mem_array(sources + 1, sizeof *fitted);
-    double without = joint_fit_loss(&m->fit), least = without - needed(s->count);
+    double without = joint_fit_loss(&m->fit), greatest = 0.0;
     memcpy(kept, m->fit.source, bytes - sizeof *kept);
     size_t likeliest = find_likeliest(s);
     for (size_t i = 0; i < likeliest && s->candidate[i].gain > 0.0; i++) {
         joint_fit_add(&m->fit, &s->candidate[i].source, s->candidate[i].all);
-        double loss = joint_fit_solve(&m->fit, SOLVE_STEPS);
-        if (loss < least) {
-            least = loss, best = i;
+        double likely = odds(m, without - joint_fit_solve(&m->fit, SOLVE_STEPS), s->count);
+        if (likely > greatest) {
+            greatest = likely, best = i;
             memcpy(fitted, m->fit.source, bytes);
         }
         joint_fit_remove(&m->fit, sources);
@@ -189,7 +193,7 @@ static bool remove_one(struct lamp_search *s) {
         source->value = source->mean = NO_LIGHT;
         double gain = joint_fit_loss(&m->fit) - with;
         *source = kept;
-        if (gain > needed(s->count + 1))
+        if (odds(m, gain, s->count + 1) > 0.0)
             continue;
         light_model_remove_hidden(m, i);
         joint_fit_solve(&m->fit, SOLVE_STEPS);

@@ -14,9 +14,6 @@
 _Static_assert(LIGHT_SATURATED_MOST *LIGHT_ALIKE_MOST + LIGHT_HIDDEN_MOST + 1 <= ESTIMATED_MOST,
                "all lamps and the sky are reported");
 
-/* Errors of neighbouring patches agree: so many of them are worth one. */
-#define LIGHT_PATCHES_ALIKE 4.0
-
 /* A segment, several that look alike, or the saturated part of the sky, whose radiance is then a factor of the map's. */
 struct light_lamp {
     enum estimated_kind kind;
@@ -41,6 +38,7 @@ struct light_model {
     struct light_lamp lamp[LIGHT_LAMPS_MOST];
     struct joint_point *joint; /* [points.count] means of the channels; owned */
     struct joint_fit fit;
+    double patches_alike;                   /* so many patches are worth one (joint_alike.h) */
     bool has_sky;                           /* unseen sky lights the points: */
     size_t first_cell;                      /* its sources in the fit, UNSEEN_CELLS of them */
     size_t first_guess;                     /* unseen surfaces: LIGHT_REGIONS factors of their fill */
@@ -63,6 +61,9 @@ void light_model_survey(struct light_model *m, const struct views *views, const 
 void light_model_add_hidden(struct light_model *m, uint32_t segment, const struct joint_source *source, float *lit);
 /* Removes a hidden lamp. */
 void light_model_remove_hidden(struct light_model *m, size_t lamp);
+
+/* Measures m->patches_alike at the fit's values. */
+void light_model_measure(struct light_model *m);
 
 /* The prior of a hidden lamp. */
 struct joint_source light_model_hidden_prior(const struct light_model *m);

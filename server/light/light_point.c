@@ -235,7 +235,7 @@ void light_points_init(struct light_points *p, const struct survey *survey, cons
     }
     g.edge_m = PATCH_PART * (float)sqrt(area);
     parallel_for(survey->r->pool, survey->count, gather_point, &g);
-    *p = (struct light_points){survey->count, g.point};
+    *p = (struct light_points){survey->count, g.point, g.edge_m};
     qsort(p->point, p->count, sizeof *p->point, by_patch);
     float dark = fmaxf(DARK * median_radiance, 1e-20f);
     for (size_t i = 0; i < p->count; i++) {

@@ -25,6 +25,7 @@ struct light_point {
 struct light_points {
     size_t count;
     struct light_point *point; /* [count] by segment and patch; owned */
+    float edge_m;              /* of a patch */
 };
 
 /* Makes the points from a survey, the world lit by light_sky_known. Observed radiance is that of `observed` around each,

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "common/rng.h"
+#include "server/light/joint_alike.h"
 #include "server/light/joint_fit.h"
 #include "tests/check.h"
 
@@ -213,6 +214,31 @@ static void test_patches(struct parallel *pool) {
     CHECK_THAT(error[1] < error[0] && error[1] > 0.35 * error[0], "%g and %g", error[0], error[1]);
 }
 
+/* Where errors of patches are drawn for each patch they count one by one; where one is drawn for each square of four, four
+ * count as one. */
+static void test_patches_alike(struct parallel *pool) {
+    const float x[2] = {0.0f, 0.0f};
+    double mean[2] = {0.0, 0.0};
+    for (uint64_t seed = 1; seed <= 8; seed++) {
+        for (int together = 0; together < 2; together++) {
+            static vec3 position[POINTS];
+            struct joint_fit f;
+            make_floor(seed, 0.5f, x, 0.0f);
+            for (size_t i = 0; i < POINTS; i++) {
+                uint32_t row = point[i].patch / (SIDE / PATCH), column = point[i].patch % (SIDE / PATCH);
+                uint32_t draw = together ? row / 2 * SIDE + column / 2 : row * SIDE + column;
+                position[i] = (vec3){0.1f * PATCH * (float)column, 0.0f, 0.1f * PATCH * (float)row};
+                point[i].observed *= expf(0.15f * deviate(seed, draw, 7));
+            }
+            start(&f, pool);
+            mean[together] += joint_alike(&f, position, 0.6f) / 8.0;
+            joint_fit_release(&f);
+        }
+    }
+    CHECK_THAT(mean[0] >= 1.0 && mean[0] < 1.3, "%g", mean[0]);
+    CHECK_NEAR(mean[1], 4.0, 0.8);
+}
+
 static void test_threads(void) {
     const float x[2] = {60.0f, 25.0f};
     double value[2][3];
@@ -244,6 +270,7 @@ int main(void) {
     test_try(pool);
     test_minimum(pool);
     test_patches(pool);
+    test_patches_alike(pool);
     test_threads();
     parallel_free(pool);
     return check_result();
