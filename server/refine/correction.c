@@ -224,43 +224,53 @@ static void log_ratios(const struct correction_sums *s, float log_ratio[3]) {
         log_ratio[k] = s->observed[k] > 0.0f && s->rendered[k] > 0.0f ? logf(s->observed[k] / s->rendered[k]) : 0.0f;
 }
 
-/* Adds to factor[count][3] the logarithms of one kind (and channel, of a tint). Starts from 0, not from the previous
- * solution, so that applying twice gives the same result. */
-static void add_kind(const struct correction *c, int kind, int channel, float room, float (*factor)[3]) {
+/* Logarithms by gray, and by the tints of the three channels: four independent systems, solved at once. */
+enum { SYSTEM_GRAY, SYSTEM_TINTS, SYSTEMS = SYSTEM_TINTS + 3 };
+
+struct factor_job {
+    const struct correction *correction;
+    float room[CORRECTION_KINDS];
+    double *value[SYSTEMS]; /* [count] the solutions; owned */
+};
+
+/* Starts from 0, not from the previous solution, so that applying twice gives the same result. */
+static void solve_system(void *user, size_t number, int thread) {
+    const struct factor_job *job = user;
+    const struct correction *c = job->correction;
+    int kind = number == SYSTEM_GRAY ? CORRECTION_GRAY : CORRECTION_TINT;
+    int channel = number == SYSTEM_GRAY ? 0 : (int)number - SYSTEM_TINTS;
     struct normal_equations l = {.correction = c,
                                  .prior = 1.0 / (factor_deviation[kind] * factor_deviation[kind]),
                                  .smoothness = 1.0 / (difference_deviation[kind] * difference_deviation[kind]),
                                  .precision = mem_array(c->count, sizeof *l.precision)};
     const struct conjugate_system system = {c->count, equations_multiply, equations_precondition, &l};
-    double *value = mem_calloc(c->count, sizeof *value), *residual = mem_array(c->count, sizeof *residual);
+    double *residual = mem_array(c->count, sizeof *residual);
+    (void)thread;
     for (size_t i = 0; i < c->count; i++) {
         float log_ratio[3];
         log_ratios(&c->sums[i], log_ratio);
         float gray = mean_by(log_ratio, c->sums[i].weight);
-        l.precision[i] = (double)precision_of(&c->sums[i], kind, channel, room);
+        l.precision[i] = (double)precision_of(&c->sums[i], kind, channel, job->room[kind]);
         residual[i] = l.precision[i] * (double)(kind == CORRECTION_GRAY ? gray : log_ratio[channel] - gray);
     }
     double goal = RESIDUAL_PART * conjugate_dot(residual, residual, c->count);
-    conjugate_solve(&system, MAX_STEPS, goal, residual, value);
-    for (size_t i = 0; i < c->count; i++)
-        for (int k = 0; k < 3; k++)
-            factor[i][k] += kind == CORRECTION_GRAY || k == channel ? (float)value[i] : 0.0f;
+    conjugate_solve(&system, MAX_STEPS, goal, residual, job->value[number]);
     mem_free(l.precision);
     mem_free(residual);
-    mem_free(value);
 }
 
-static void find_factors(struct correction *c) {
-    float(*factor)[3] = mem_calloc(c->count, sizeof *factor);
-    float room[CORRECTION_KINDS];
-    room_variance(c, room);
-    add_kind(c, CORRECTION_GRAY, 0, room[CORRECTION_GRAY], factor);
-    for (int channel = 0; channel < 3; channel++)
-        add_kind(c, CORRECTION_TINT, channel, room[CORRECTION_TINT], factor);
+static void find_factors(struct correction *c, struct parallel *pool) {
+    struct factor_job job = {.correction = c};
+    room_variance(c, job.room);
+    for (size_t k = 0; k < SYSTEMS; k++)
+        job.value[k] = mem_calloc(c->count, sizeof *job.value[k]);
+    parallel_for(pool, SYSTEMS, solve_system, &job);
     for (size_t i = 0; i < c->count; i++)
-        for (int k = 0; k < 3; k++)
-            c->sums[i].factor[k] = clampf(factor[i][k], -MAX_LOG_FACTOR, MAX_LOG_FACTOR);
-    mem_free(factor);
+        for (size_t k = 0; k < 3; k++)
+            c->sums[i].factor[k] = clampf((float)job.value[SYSTEM_GRAY][i] + (float)job.value[SYSTEM_TINTS + k][i],
+                                          -MAX_LOG_FACTOR, MAX_LOG_FACTOR);
+    for (size_t k = 0; k < SYSTEMS; k++)
+        mem_free(job.value[k]);
 }
 
 /* --- texels ------------------------------------------------------------------------------------- */
@@ -303,6 +313,6 @@ static void apply_row(void *user, size_t row, int thread) {
 }
 
 void correction_apply(struct correction *c, struct parallel *pool) {
-    find_factors(c);
+    find_factors(c, pool);
     parallel_for(pool, c->inverse->height, apply_row, c);
 }
