@@ -40,14 +40,14 @@
 #define CHUNK ((size_t)64 << 10)
 /* Readers go on with at least so many chunks, however small the budget: one per array and row that a few threads read. */
 #define LEAST_CHUNKS 64
-/* Part of the budget that the hand frees at a time, so that threads interrupt each other seldom; by hand. */
+/* Part of the budget that the hand frees at a time, so that threads interrupt each other seldom. Moves time only. */
 #define FREED_SHARE 8
 /* Part of the budget that mapped pages may have in any case, however much is in memory. */
 #define LEAST_SHARE 8
 /* The keeper's: time between two looks, and the part of the budget beyond it that it leaves alone. */
 #define KEEPER_INTERVAL_MS 10
 #define KEEPER_SHARE 16
-#define KEEPER_STEP ((size_t)32 << 20) /* unmapped at once; by hand */
+#define KEEPER_STEP ((size_t)32 << 20) /* unmapped at once; moves time only */
 /* Addresses for the file, as a multiple of the space that the disk has: space that is given back is reserved again at
  * other addresses. At most what a program under the thread sanitizer has room for. */
 #define ADDRESSES_SHARE 8

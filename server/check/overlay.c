@@ -11,7 +11,7 @@
 #define RAYS_EVERY 2   /* pixels of the picture */
 #define CREASE_REACH 3 /* rays on either side by which a crease is measured */
 /* Relative bends of the inverse depth: of a step between neighbouring rays; of a crease over CREASE_REACH (a right
- * angle at two metres bends by some .03). By hand. */
+ * angle at two metres bends by some .03). They move drawings only. */
 #define STEP_LEAST 0.02f
 #define CREASE_LEAST 0.012f
 #define BEND_OF_NOISE 6.0f /* and this many times the picture's median bend, which is the mesh's noise */

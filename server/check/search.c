@@ -15,10 +15,10 @@ static const struct consistency_effort screening = {16, 48, 0}, refining = {24, 
 #define KEPT 4         /* of the screened hypotheses, to be measured in full */
 #define GRID_STEP 1.12 /* of scales: the score falls by a third at 5 % in the rooms that it was measured on */
 #define ROUNDS 3       /* of changing one thing at a time */
-#define AGREES 0.12    /* score above which poses are near the right ones: wrong ones stay below .05, by hand */
-#define PROMISING 0.6  /* of the best score so far, at low effort: below it nothing is measured in full; by hand */
+#define AGREES 0.12    /* score above which poses are near the right ones: wrong ones stay below .05 */
+#define PROMISING 0.6  /* of the best score so far, at low effort: below it nothing is measured in full */
 /* The score must fall by this factor where the mesh is larger or smaller by PARALLAX_STEP: turns alone make distant
- * things agree, whatever their distance. By hand: right scales fall to .2 to .45. */
+ * things agree, whatever their distance. Right scales fall to .2 to .45. */
 #define PARALLAX_FALL 0.7
 #define PARALLAX_STEP 1.3
 #define SURE 3.0           /* standard errors by which another hypothesis is taken up */

@@ -8,12 +8,12 @@
 #include "server/scene/rgb_half.h"
 
 #define TAPS 4 /* pixels averaged along each axis of a thumbnail's pixel, at most */
-/* Half the side of the neighbourhood, pixels of the thumbnail: shading of a whole wall is no detail; by hand. */
+/* Half the side of the neighbourhood, pixels of the thumbnail: shading of a whole wall is no detail. */
 #define NEIGHBOURHOOD 8
 #define FLOOR_SHARE 0.05f    /* of the median, added before the logarithm: noise in the dark is no detail */
 #define DETAIL_OF_NOISE 1.0f /* detail is more than this; it is three times the noise of the mean of 3 x 3 pixels */
 #define MEDIAN_OF_MAX 2048   /* values */
-#define CONTRAST_LEAST 0.02f /* of the compression's half-way point; by hand */
+#define CONTRAST_LEAST 0.02f /* of the compression's half-way point: half of the noise that averaged pixels may have */
 
 /* Mean luminance of a block of the photograph's pixels; NAN where none is usable. */
 static float block_mean(const struct photograph *photo, const uint32_t from[2], const uint32_t to[2]) {

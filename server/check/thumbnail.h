@@ -19,7 +19,7 @@ struct thumbnail {
     float brightness; /* median luminance of the stored pixels */
 };
 
-#define THUMBNAIL_DETAIL 0.05f /* of the log luminance: 5 %, above the noise of averaged pixels; by hand */
+#define THUMBNAIL_DETAIL 0.05f /* of the log luminance: 5 %, above the noise of averaged pixels */
 
 void thumbnail_make(struct thumbnail *t, const struct photograph *photo);
 void thumbnail_release(struct thumbnail *t);

@@ -16,9 +16,9 @@
 #define DISPLAY_MEDIAN 0.2
 /* XORed with the seed: random numbers distinct from the optimiser's. */
 #define REPORT_SEED UINT64_C(0x7265706f7274)
-/* Least emitted share of a segment that is listed though it does not emit. */
-/* A card within this of its reflectance is right: noise and texture of one texel; by hand. */
+/* A card within this of its reflectance is right: noise and texture of one texel. Chooses words of the report only. */
 #define CARD_TOLERANCE 0.1
+/* Least emitted share of a segment that is listed though it does not emit. */
 #define MIN_REPORTED_SHARE 0.05f
 
 /* The photograph's radiance as an R G B picture; masked pixels become NaN. */

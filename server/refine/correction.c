@@ -15,15 +15,15 @@
 static const double factor_deviation[CORRECTION_KINDS] = {0.2, 0.03};
 static const double difference_deviation[CORRECTION_KINDS] = {0.02, 0.006};
 /* Observations with the room's mean variance that are added to a cell's own, which are too few for a variance. */
-#define ROOM_OBSERVATIONS 64.0f
-#define MAX_LOG_FACTOR 0.1f /* bound of a logarithm */
+#define ROOM_OBSERVATIONS 64.0f /* +25 %: +0.01 dB */
+#define MAX_LOG_FACTOR 0.1f     /* bound of a logarithm; +25 %: 0 dB */
 /* Conjugate gradients end at this part of the squared residual, or after MAX_STEPS steps. The wide prior on factors
  * makes the system ill-conditioned. */
-#define RESIDUAL_PART 1e-8
-#define MAX_STEPS 2000
-#define MIXED_WEIGHT 0.01f /* weight in a cell's light of a texel observed only in mixed pixels */
+#define RESIDUAL_PART 1e-8 /* +25 %: 0 dB */
+#define MAX_STEPS 2000     /* +25 %: no change */
+#define MIXED_WEIGHT 0.01f /* weight in a cell's light of a texel observed only in mixed pixels; +25 %: no change */
 /* Lower bound of corrected base colour: no factor could raise 0 again. */
-#define MIN_COLOR 0.002f
+#define MIN_COLOR 0.002f /* +25 %: 0 dB */
 
 /* --- cells -------------------------------------------------------------------------------------- */
 

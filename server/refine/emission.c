@@ -6,12 +6,12 @@
 #include "common/mem.h"
 
 /* Time constants of 10 and 100 iterations; a run has about a thousand. */
-#define BETA1 0.9f
-#define BETA2 0.99f
+#define BETA1 0.9f  /* to .925: 0 dB */
+#define BETA2 0.99f /* to .9925: 0 dB */
 
 /* Keep the logarithm finite: e^-20 is 2e-9, no light in any room's units, e^20 is 5e8. */
-#define LOG_RADIANCE_MIN (-20.0f)
-#define LOG_RADIANCE_MAX 20.0f
+#define LOG_RADIANCE_MIN (-20.0f) /* +25 %: no change */
+#define LOG_RADIANCE_MAX 20.0f    /* +25 %: no change */
 
 /* Factor of an emitter's base colour steps: it reflects a few hundredths of what it sends, so an error of its radiance
  * would move its base colour twenty times as far. */

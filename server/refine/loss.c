@@ -5,7 +5,7 @@
 
 /* Shot noise: variance of a stored linear value v is about PHOTON_VARIANCE * v for a consumer camera at its base
  * sensitivity (full well about 10^4 electrons). */
-#define PHOTON_VARIANCE 1e-4f
+#define PHOTON_VARIANCE 1e-4f /* +25 %: no change */
 
 /* Variance of the stored linear value v of an 8-bit sRGB frame. */
 static float stored_variance(float v) {

