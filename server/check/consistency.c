@@ -8,16 +8,17 @@
 #include "common/quantile.h"
 #include "common/rng.h"
 
-#define OTHERS_MAX 8 /* other photographs a point is compared with; a random subset where more see it */
+/* Other photographs a point is compared with; a random subset where more see it. */
+#define OTHERS_MAX 8 /* +25 %: no verdict */
 /* Cosine of the steepest view: at grazing angles a mesh's noise moves points by many pixels. */
-#define COSINE_LEAST 0.15f
+#define COSINE_LEAST 0.15f /* +25 %: no verdict */
 /* Part of the way from a point to a camera that must be free: noisy scans hide what lies just behind. */
-#define FREE_SHARE 0.97f
+#define FREE_SHARE 0.97f /* to .98: no verdict */
 /* From so many photographs on, the spread between them is known well enough; the difference must be so many standard
  * errors by it. Few photographs may have little in common with one another. */
-#define FEW_PHOTOGRAPHS 12.0
-#define PHOTOGRAPHS_SURE 3.0
-#define EDGE_SHARE 0.03f /* border of the picture that has no points */
+#define FEW_PHOTOGRAPHS 12.0 /* +25 %: no verdict */
+#define PHOTOGRAPHS_SURE 3.0 /* +25 %: no verdict */
+#define EDGE_SHARE 0.03f     /* border of the picture that has no points; +25 %: 1 verdict of 96 */
 
 /* A pixel of a photograph. */
 struct ray_point {

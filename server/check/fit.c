@@ -7,35 +7,35 @@
 
 /* Standard deviations of the score for wrong poses. Among some 2,000 hypotheses the best wrong one reaches 3.5 by
  * chance. */
-#define SIGNIFICANT 6.0
-#define SUSPECTED 3.0
+#define SIGNIFICANT 6.0 /* +25 %: no verdict */
+#define SUSPECTED 3.0   /* +25 %: no verdict */
 /* A remedy agrees better by so many standard deviations (consistency_compare), and by this factor: small errors of
  * poses are no misfit. */
-#define REMEDY_SURE 5.0
-#define REMEDY_GAIN 1.15
+#define REMEDY_SURE 5.0  /* +25 %: 4 verdicts of 96 */
+#define REMEDY_GAIN 1.15 /* +25 %: no verdict */
 /* It is taken without asking where it is also plain. A mesh at a wrong place or scale has walls at about the right
  * distance now and then: with the poses of six rooms moved by 7 m, the best of all hypotheses reached a correlation of
  * .09 to .35, most with a scale of no unit; right ones reach .44 to .91, or .3 where the poses drift. Such a mesh suits
  * some photographs and not others: their lower quartile over the mean is 0 to .3 (once .78), that of right ones .71 to
  * .97. */
-#define TAKEN_SURE 8.0
-#define TAKEN_GAIN 1.2
-#define TAKEN_CORRELATION 0.4
-#define TAKEN_CORRELATION_SCALED 0.5 /* with a scale of no unit */
-#define TAKEN_EVENNESS 0.5           /* of EVEN_PHOTOGRAPHS or more */
-#define EVEN_PHOTOGRAPHS 12
+#define TAKEN_SURE 8.0               /* +25 %: no verdict */
+#define TAKEN_GAIN 1.2               /* +25 %: no verdict */
+#define TAKEN_CORRELATION 0.4        /* +25 %: no verdict */
+#define TAKEN_CORRELATION_SCALED 0.5 /* with a scale of no unit; +25 %: no verdict */
+#define TAKEN_EVENNESS 0.5           /* of EVEN_PHOTOGRAPHS or more; +25 %: no verdict */
+#define EVEN_PHOTOGRAPHS 12          /* +25 %: no verdict */
 /* Correlation at common points, by the same figures: above it poses and mesh fit, below the other they do not. */
-#define CORRELATION_FITS 0.2
-#define CORRELATION_LOW 0.08
+#define CORRELATION_FITS 0.2 /* +25 %: no verdict */
+#define CORRELATION_LOW 0.08 /* +25 %: no verdict */
 /* Share of rays that meet the mesh: above .75 in rooms that fit, also through windows and where ceilings are
  * missing. */
-#define HITS_FEW 0.3
-#define HITS_SOME 0.6
+#define HITS_FEW 0.3  /* +25 %: no verdict */
+#define HITS_SOME 0.6 /* +25 %: no verdict */
 /* Standard deviations that a fitting room's score (at least EXPECTED_CORRELATION of what is common) would be above
  * wrong poses: below it the pictures cannot tell. */
-#define POWER 10.0
-#define EXPECTED_CORRELATION 0.2
-#define DETAIL_LEAST 0.15 /* share of the area */
+#define POWER 10.0               /* +25 %: no verdict */
+#define EXPECTED_CORRELATION 0.2 /* +25 %: 1 verdict of 96 */
+#define DETAIL_LEAST 0.15        /* share of the area; +25 %: no verdict */
 
 static void tell(struct fit_result *fit, char *sentence) {
     if (fit->evidence_count < FIT_EVIDENCE_MAX)

@@ -6,27 +6,29 @@
 #include <stdlib.h>
 
 /* Points of all photographs together in a full measurement: few photographs have more each. */
-#define FULL_POINTS 7680
+#define FULL_POINTS 7680 /* +25 %: no verdict */
 static const struct consistency_effort screening = {16, 48, 0}, refining = {24, 96, 0};
 
 #define SCREENING_SEED 1
 #define REFINING_SEED 2
 #define FULL_SEED 3
-#define KEPT 4         /* of the screened hypotheses, to be measured in full */
-#define GRID_STEP 1.12 /* of scales: the score falls by a third at 5 % in the rooms that it was measured on */
-#define ROUNDS 3       /* of changing one thing at a time */
-#define AGREES 0.12    /* score above which poses are near the right ones: wrong ones stay below .05 */
-#define PROMISING 0.6  /* of the best score so far, at low effort: below it nothing is measured in full */
+#define KEPT 4 /* of the screened hypotheses, to be measured in full; to 5: no verdict */
+/* Of scales: the score falls by a third at 5 % in the rooms that it was measured on. */
+#define GRID_STEP 1.12 /* +25 %: no verdict */
+#define ROUNDS 3       /* of changing one thing at a time; to 4: no verdict */
+#define AGREES 0.12 /* score above which poses are near the right ones: wrong ones stay below .05; +25 %: no verdict */
+/* Of the best score so far, at low effort: below it nothing is measured in full. */
+#define PROMISING 0.6 /* +25 %: no verdict */
 /* The score must fall by this factor where the mesh is larger or smaller by PARALLAX_STEP: turns alone make distant
  * things agree, whatever their distance. Right scales fall to .2 to .45. */
-#define PARALLAX_FALL 0.7
-#define PARALLAX_STEP 1.3
-#define SURE 3.0           /* standard errors by which another hypothesis is taken up */
-#define OFFSET_ROUNDS 2    /* of all directions, at each length of step */
-#define OFFSET_GAIN 1.02   /* of a step: less is chance */
-#define SNAP 0.015         /* relative distance at which a scale is that of a unit */
-#define NEAR_DIAGONALS 2.0 /* of the mesh's: cameras farther from its centre cannot see a room */
-#define SPREAD_LEAST 0.004 /* of the cameras, in diagonals of the mesh: a walk of 4 cm in 10 m */
+#define PARALLAX_FALL 0.7  /* +25 %: no verdict */
+#define PARALLAX_STEP 1.3  /* +25 %: 1 verdict of 96 */
+#define SURE 3.0           /* standard errors by which another hypothesis is taken up; +25 %: no verdict */
+#define OFFSET_ROUNDS 2    /* of all directions, at each length of step; to 3: no verdict */
+#define OFFSET_GAIN 1.02   /* of a step: less is chance; +25 %: no verdict */
+#define SNAP 0.015         /* relative distance at which a scale is that of a unit; +25 %: no verdict */
+#define NEAR_DIAGONALS 2.0 /* of the mesh's: cameras farther from its centre cannot see a room; +25 %: no verdict */
+#define SPREAD_LEAST 0.004 /* of the cameras, in diagonals of the mesh: a walk of 4 cm in 10 m; +25 %: no verdict */
 
 static const double unit_scales[] = {1e-3,         1e-2, 0.0254,       0.1,   0.3048, 1.0,
                                      1.0 / 0.3048, 10.0, 1.0 / 0.0254, 100.0, 1e3};

@@ -10,7 +10,7 @@
 
 #include "server/scene/photograph.h"
 
-#define THUMBNAIL_WIDTH 160 /* pixels; also the largest height */
+#define THUMBNAIL_WIDTH 160 /* pixels; also the largest height; +25 %: no verdict, correlations -0.07 to +0.00 */
 
 struct thumbnail {
     uint32_t width, height;
@@ -19,7 +19,7 @@ struct thumbnail {
     float brightness; /* median luminance of the stored pixels */
 };
 
-#define THUMBNAIL_DETAIL 0.05f /* of the log luminance: 5 %, above the noise of averaged pixels */
+#define THUMBNAIL_DETAIL 0.05f /* of the log luminance: 5 %, above the noise of averaged pixels; +25 %: no verdict */
 
 void thumbnail_make(struct thumbnail *t, const struct photograph *photo);
 void thumbnail_release(struct thumbnail *t);

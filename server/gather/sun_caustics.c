@@ -10,7 +10,7 @@
 #include "server/scene/surface.h"
 
 /* Photons in all, about, and at most from one texel: bounds of time and memory (28 bytes each). The sum is the same in
- * the mean; fewer are noisier. */
+ * the mean; fewer are noisier. Not measured, as the next: the demo room has no sun. */
 #define MAX_PHOTONS 1000000
 #define MAX_PHOTONS_PER_TEXEL 64
 #define CHUNK 1024           /* texels a work item */

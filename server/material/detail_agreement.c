@@ -18,8 +18,8 @@
 #define MIN_SHARE 0.05f    /* a lower share counts as 0; +25 %: 0 dB */
 /* Scales of the integer sums: COUNT_SCALE until the greatest sum of weights is known, then the largest that cannot
  * overflow. Weights differ by orders of magnitude: with a coarse scale the least are lost, and steps are too long. */
-#define COUNT_SCALE 4096.0f
-#define MAX_SUM 1e9f /* +25 %: 0 dB */
+#define COUNT_SCALE 4096.0f /* +25 %: 0 dB */
+#define MAX_SUM 1e9f        /* +25 %: 0 dB */
 
 enum { WEIGHT, RESIDUAL };   /* the sums in use here: weights, and weighted residuals */
 #define ALL_PHOTOGRAPHS (-1) /* in place of a split */

@@ -24,7 +24,7 @@ static inline size_t specular_candidate(size_t k, size_t m) { return 1 + k * HIG
 
 /* Prior of rougher lobes is 0: they cannot be distinguished from diffuse reflection. At .8 large walls still tell by 3
  * to 10 standard errors. */
-#define SPECULAR_MAX_ROUGHNESS 0.8f
+#define SPECULAR_MAX_ROUGHNESS 0.8f /* +25 %: no change */
 
 struct specular_evidence {
     bool is_observed; /* the segment has enough observations; else the other fields are undefined */

@@ -5,13 +5,13 @@
 
 /* Added to the expected radiance in denominators, part of the median radiance: darker places show as much of
  * a lens's stray light. */
-#define DIFFERENCE_FLOOR 0.003f
+#define DIFFERENCE_FLOOR 0.003f /* +25 %: 0 dB */
 
 /* Deviations of noise at which an observation has half its weight. Large: path-traced photographs are rarely much too
  * bright and often a little too dark, so that rejecting the former would darken everything. */
-#define NOISE_WIDTH 8.0f
+#define NOISE_WIDTH 8.0f /* +25 %: 0 dB */
 /* Relative variance of an observation without noise of the photograph: that of a render with few paths. */
-#define RENDER_VARIANCE 0.1f
+#define RENDER_VARIANCE 0.1f /* +25 %: +0.01 dB */
 
 struct comparison comparison_make(const struct photograph_sample *reference, const rgb *radiance, int sample_count,
                                   rgb expected, rgb noise, float median_radiance) {

@@ -15,7 +15,7 @@
 
 /* Factor of an emitter's base colour steps: it reflects a few hundredths of what it sends, so an error of its radiance
  * would move its base colour twenty times as far. */
-#define EMITTER_SLOWDOWN 0.05f
+#define EMITTER_SLOWDOWN 0.05f /* +25 %: 0 dB */
 
 static float log_radiance(float radiance) {
     return radiance > 0.0f ? fmaxf(logf(radiance), LOG_RADIANCE_MIN) : LOG_RADIANCE_MIN;

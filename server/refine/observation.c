@@ -8,7 +8,7 @@
 
 /* Weight of a pixel that mixes surfaces: it matters only where there is no clean observation, of which
  * one outweighs fifty. */
-#define MIXED_WEIGHT 0.02f
+#define MIXED_WEIGHT 0.02f /* +25 %: -0.02 dB */
 
 void observation_batch_init(struct observation_batch *b, const struct surface *surface, const struct world *world,
                             const struct views *views, const struct path_settings *path, int cameras, int samples,
