@@ -205,6 +205,10 @@ soak: deps ## many clients for a long time; writes build/soak.json; T=name runs 
 	@+$(BUILD) tests
 	@tests/long.sh soak $(B) "$(T)"
 
+blender: deps ## render scene.usda in Blender (PyPI's bpy, 350 MB) and compare with our picture of the room
+	@+$(BUILD) tests
+	@tests/render/blender.sh $(abspath $(B))
+
 FUZZ_SECONDS ?= 60
 FUZZ_RUNS ?= -1
 fuzz: deps ## search for crashes with libFuzzer, FUZZ_SECONDS (60) or FUZZ_RUNS a target; writes build/fuzz.json; T=name runs one

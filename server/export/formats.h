@@ -5,9 +5,14 @@
 #include "server/export/input.h"
 #include "server/export/parts.h"
 
-/* These files must be in the folder first; the second (emission_texture.h) only if an emitter has a pattern. */
+/* These files must be in the folder first; the second (emission_texture.h) only if an emitter has a pattern, the next
+ * where there is distant light, the last (sky.h) where there is also a sun. */
 #define FORMATS_BASE_COLOR "base_color.png"
 #define FORMATS_EMISSION "emission.png"
+#define FORMATS_ENVIRONMENT "environment.exr"
+#define FORMATS_SKY "sky.exr"
+
+#define FORMATS_USD_LAYER "scene.usda"
 
 struct format {
     const char *name, *content_type, *about;
@@ -16,7 +21,7 @@ struct format {
                          struct error *err);
 };
 
-#define FORMATS_COUNT 5
+#define FORMATS_COUNT 7
 extern const struct format formats[FORMATS_COUNT]; /* in the order in which they are written */
 
 #endif

@@ -13,6 +13,7 @@
 #include "common/protocol.h"
 #include "server/export/emission_texture.h"
 #include "server/export/sink.h"
+#include "server/export/upright.h"
 
 #define MAGIC 0x46546c67 /* "glTF" */
 #define CHUNK_JSON 0x4e4f534a
@@ -238,40 +239,19 @@ static void add_cameras(struct glb *g) {
         cJSON_Delete(cameras);
 }
 
-static double along(const double v[3], int axis, double sign) { return v[axis] != 0.0 ? sign * v[axis] : 0.0; }
-
-/* Where upright() puts the mesh's offset. */
+/* Where the turn puts the mesh's offset. */
 static void add_translation(cJSON *room, const double o[3], vec3 up) {
-    double sign = up.x + up.y + up.z < 0.0f ? -1.0 : 1.0;
-    double at[3] = {along(o, 0, 1.0), along(o, 1, sign), along(o, 2, sign)};
-    if (up.x != 0.0f) {
-        at[0] = along(o, 1, -sign);
-        at[1] = along(o, 0, sign);
-        at[2] = along(o, 2, 1.0);
-    } else if (up.z != 0.0f) {
-        at[0] = along(o, 0, 1.0);
-        at[1] = along(o, 2, sign);
-        at[2] = along(o, 1, -sign);
-    }
+    double at[3];
+    upright_turn(up, o, at);
     if (o[0] != 0.0 || o[1] != 0.0 || o[2] != 0.0)
         json_add(room, "translation", cJSON_CreateDoubleArray(at, 3));
-}
-
-/* The rotation, as a quaternion x y z w, that brings an axis to +y. */
-static const float *upright(vec3 up) {
-    static const float rotation[6][4] = {
-        {0, 0, 0.70710678f, 0.70710678f},  {0, 0, 0, 1}, {-0.70710678f, 0, 0, 0.70710678f},
-        {0, 0, -0.70710678f, 0.70710678f}, {1, 0, 0, 0}, {0.70710678f, 0, 0, 0.70710678f},
-    };
-    int axis = up.x != 0.0f ? 0 : up.z != 0.0f ? 2 : 1;
-    return rotation[axis + (up.x + up.y + up.z < 0.0f ? 3 : 0)];
 }
 
 static void add_room(struct glb *g) {
     cJSON *room = append(g->nodes);
     g->node_count++;
     json_add_string(room, "name", "room");
-    add_numbers(room, "rotation", upright(g->in->up), 4);
+    add_numbers(room, "rotation", upright_quaternion(g->in->up), 4);
     add_translation(room, g->in->mesh->offset, g->in->up);
     if (g->in->environment) {
         cJSON *extras = add_object(room, "extras");

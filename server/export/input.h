@@ -26,6 +26,14 @@ struct export_comparison {
     const struct camera *camera; /* that took it */
 };
 
+/* A sun that no photograph shows. It is drawn in `environment`, too. */
+struct export_sun {
+    bool is_there;
+    vec3 direction;   /* unit, towards its middle */
+    float radius_rad; /* angular radius */
+    rgb irradiance;   /* of a surface that faces it */
+};
+
 /* All borrowed. */
 struct export_input {
     const char *title; /* the job's or the scene's name */
@@ -50,6 +58,7 @@ struct export_input {
     vec3 up;                       /* the axis of the room that points up, see scene_up; 0: y */
     bool has_materials;            /* false: materials are only their neutral start, which no preview shows */
     const uint16_t (*radiance)[3]; /* [height][width] measured light, half precision; NULL while not known */
+    struct export_sun sun;
 };
 
 #endif

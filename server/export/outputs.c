@@ -14,6 +14,7 @@
 #include "server/export/pictures.h"
 #include "server/export/report_html.h"
 #include "server/export/segments_json.h"
+#include "server/export/sky.h"
 #include "server/export/views_json.h"
 
 #define MIME_PLY "model/ply"
@@ -65,11 +66,20 @@ static enum status put_environment_preview(struct export *e, struct error *err) 
     return status;
 }
 
+static enum status put_sky(struct export *e, struct error *err) {
+    struct image sky;
+    sky_without_sun(e->input, &sky);
+    enum status status = output_files_image(&e->files, EVENT_OUTPUT, FORMATS_SKY, &sky, OUTPUT_EXR_FLOAT,
+                                            "distant light without the sun, for formats that have a sun", err);
+    image_release(&sky);
+    return status;
+}
+
 static enum status put_environment(struct export *e, struct error *err) {
     const struct export_input *in = e->input;
     if (!in->environment)
         return STATUS_OK;
-    enum status status = output_files_image(&e->files, EVENT_OUTPUT, "environment.exr", in->environment,
+    enum status status = output_files_image(&e->files, EVENT_OUTPUT, FORMATS_ENVIRONMENT, in->environment,
                                             OUTPUT_EXR_FLOAT, ENVIRONMENT_ABOUT, err);
     if (status == STATUS_OK)
         status = output_files_image(&e->files, EVENT_OUTPUT, "environment_confidence.exr", in->environment_confidence,
@@ -77,7 +87,7 @@ static enum status put_environment(struct export *e, struct error *err) {
                                     "photographs by direction, 0 where it was filled in, and the spread of what "
                                     "they show",
                                     err);
-    return status;
+    return status == STATUS_OK && in->sun.is_there ? put_sky(e, err) : status;
 }
 
 static enum status put_radiance_preview(struct export *e, struct error *err) {

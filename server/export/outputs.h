@@ -22,6 +22,8 @@
  *   scene.glb        all of it but distant light, as glTF (glb.h)
  *   scene.obj scene.mtl   the mesh, with base_color.png (mesh_obj.h)
  *   scene.xml scene.serialized   the room for Mitsuba 3, with the EXR files (mitsuba.h)
+ *   sky.exr          environment.exr without a sun that no photograph shows, where there is one
+ *   scene.usda scene.usdz   the room as OpenUSD, with lights and cameras (usd.h)
  *   compare/NNN.png  a held-out photograph | its re-render | their difference
  *   views.json       the cameras of these (views_json.h)
  *   report.json      every setting, version, stage time and metric
@@ -29,9 +31,9 @@
  *
  * Coordinates are relative to the mesh's offset (report.json: "offset"), which is 0 unless the input lies far from its
  * origin. scene.ply and scene.obj have it as a comment, "unbake offset X Y Z", which our readers add; scene.glb as the
- * translation of its root node; scene.xml as a comment; the cameras of views.json contain it.
+ * translation of its root node; scene.xml as a comment; scene.usda as the transform of /Room; the cameras of views.json contain it.
  *
- * Those of glb.h, mesh_obj.h and mitsuba.h are left out where they would have too many objects or bytes;
+ * Those of glb.h, mesh_obj.h, mitsuba.h and usd.h are left out where they would have too many objects or bytes;
  * report.json says so under "left_out". */
 #ifndef UNBAKE_EXPORT_OUTPUTS_H
 #define UNBAKE_EXPORT_OUTPUTS_H

@@ -48,7 +48,8 @@ static void write_outputs(const char *dir, const struct reconstruction *r) {
                               r->report,
                               {0.0f, 1.0f, 0.0f},
                               true,
-                              NULL};
+                              NULL,
+                              {0}};
     CHECK_THAT(export_outputs(dir, &in, NULL, NULL, &err) == STATUS_OK, "%s", err.message);
 }
 

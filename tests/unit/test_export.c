@@ -157,7 +157,7 @@ static void test_report(const char *dir, const struct export_input *in) {
     CHECK(json_read(path, 1 << 24, &report, &err) == STATUS_OK);
     CHECK(cJSON_GetArraySize(cJSON_GetObjectItem(report, "segments")) == (int)in->segments->count);
     test_means(cJSON_GetObjectItem(report, "segments"), in);
-    CHECK(cJSON_GetArraySize(cJSON_GetObjectItem(report, "files")) == 19);
+    CHECK(cJSON_GetArraySize(cJSON_GetObjectItem(report, "files")) == 21);
     CHECK(cJSON_GetNumberValue(cJSON_GetObjectItem(report, "seed")) == 1.0);
     CHECK(cJSON_GetNumberValue(cJSON_GetArrayItem(cJSON_GetObjectItem(report, "offset"), 1)) == in->mesh->offset[1]);
     cJSON_Delete(report);
@@ -299,7 +299,7 @@ static void test_left_out(const char *dir, struct parallel *pool) {
     CHECK(access(old, F_OK) != 0);
     CHECK(json_read(path, 1 << 24, &written, &err) == STATUS_OK);
     const cJSON *left_out = cJSON_GetObjectItem(written, "left_out"), *first = cJSON_GetArrayItem(left_out, 0);
-    CHECK(cJSON_GetArraySize(left_out) == 5);
+    CHECK(cJSON_GetArraySize(left_out) == 7);
     CHECK_STRING(cJSON_GetStringValue(cJSON_GetObjectItem(first, "name")), "scene.glb");
     CHECK(strstr(cJSON_GetStringValue(cJSON_GetObjectItem(first, "reason")), "16385 segments"));
     CHECK_STRING(heard.last, "report.html");
@@ -368,7 +368,8 @@ int main(void) {
                               report,
                               {0.0f, 1.0f, 0.0f},
                               true,
-                              NULL};
+                              NULL,
+                              {0}};
 
     struct announced heard = {.dir = dir};
     CHECK(export_preview(dir, &in, hear, &heard, &err) == STATUS_OK);
@@ -377,7 +378,7 @@ int main(void) {
     heard = (struct announced){.dir = dir};
     enum status status = export_outputs(dir, &in, hear, &heard, &err);
     CHECK_THAT(status == STATUS_OK, "%s", err.message);
-    CHECK_THAT(heard.previews == 5 && heard.outputs == 16, "%d, %d", heard.previews, heard.outputs);
+    CHECK_THAT(heard.previews == 5 && heard.outputs == 18, "%d, %d", heard.previews, heard.outputs);
     CHECK_STRING(heard.last, "report.html");
     test_textures(dir, &in);
     test_mesh(dir, &room.mesh);
