@@ -16,6 +16,7 @@ struct response *node_body_begin(struct api *api, struct request *r) {
     const char *digest = request_field(r, "Repr-Digest");
     char hex[SHA256_HEX_SIZE];
     struct error err;
+    r->is_routine = true;
     if (r->has_body && r->content_length < 0)
         return problem(r, 400, "the length of the file must be given");
     if (!digest || !field_digest(digest, hex))

@@ -167,6 +167,15 @@ static void say_no_space(struct relay *r, const struct error *why) {
     cJSON_Delete(line);
 }
 
+/* Whether the machine's scheduler has ended it. Signals to all processes of a job reach the worker, too, which may have
+ * stopped before this process has seen its own. */
+static bool was_taken_back(const struct relay *r, bool has_run) {
+    bool has_exited = has_run && r->end.way == RUN_EXIT;
+    if (has_exited && r->end.code == PROGRESS_EXIT_STOPPED && !r->has_stopped)
+        return true;
+    return r->is_taken_back && !(has_exited && r->end.code == PROGRESS_EXIT_OK);
+}
+
 /* How it ended; `why` where the node gave it up, with `status`. */
 static struct link_end judge(struct relay *r, enum status status, const struct error *why) {
     struct link_end end = {.way = "exit", .code = r->end.code, .reason = "", .last_words = ""};
@@ -174,7 +183,7 @@ static struct link_end judge(struct relay *r, enum status status, const struct e
     if (status == STATUS_NO_SPACE) {
         say_no_space(r, why);
         end.code = PROGRESS_EXIT_NO_SPACE;
-    } else if (r->is_taken_back && !(has_run && r->end.way == RUN_EXIT && r->end.code == PROGRESS_EXIT_OK)) {
+    } else if (was_taken_back(r, has_run)) {
         end.way = "preempted";
         end.reason = "its machine was taken back";
     } else if (status == STATUS_CANCELLED) { /* before it began, as the daemon wished */

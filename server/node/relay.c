@@ -14,9 +14,9 @@
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
-#include "common/sha256.h"
 #include "server/data/layout.h"
 #include "server/data/work_file.h"
+#include "server/node/hash.h"
 #include "server/node/scene_cache.h"
 
 /* A batch system that cancels kills 30 s after SIGTERM (Slurm's KillWait): some of that is left to say what happened. One
@@ -128,15 +128,22 @@ enum status relay_may_begin(struct relay *r, struct error *err) {
 
 /* --- files ------------------------------------------------------------------------------------- */
 
+static bool keep_on(void *user, struct error *err) {
+    struct relay *r = user;
+    relay_beat(r);
+    if (link_state(&r->link) != LINK_OPEN)
+        error_set(err, STATUS_CANCELLED, "%s", r->link.why);
+    return link_state(&r->link) == LINK_OPEN;
+}
+
 /* Sends the open file, if it is a plain one that has the digest `wanted` (NULL: any); *is_sent: it was. */
 static enum status send_open(struct relay *r, int fd, const char *what, const char *name, const char *query,
                              const char *wanted, bool *is_sent, struct error *err) {
-    char self[64], hex[SHA256_HEX_SIZE];
+    char hex[SHA256_HEX_SIZE];
     struct stat info;
     if (fstat(fd, &info) != 0 || !S_ISREG(info.st_mode))
         return STATUS_OK;
-    snprintf(self, sizeof self, "/proc/self/fd/%d", fd); /* the name may already be another file's */
-    enum status status = sha256_of_file(self, hex, err);
+    enum status status = hash_file(fd, keep_on, r, hex, err);
     if (status != STATUS_OK || (wanted && strcmp(hex, wanted) != 0))
         return status;
     *is_sent = true;

@@ -12,8 +12,8 @@
 
 #include "common/file.h"
 #include "common/mem.h"
-#include "common/sha256.h"
 #include "server/node/cache_room.h"
+#include "server/node/hash.h"
 
 #define WAIT_MS 200
 #define TRIES_MAX 20 /* of a file whose transfers are cut off without an error */
@@ -45,12 +45,20 @@ static enum status read_file_entry(const cJSON *file, const char **name, uint64_
     return status;
 }
 
-/* Whether the file is there with that size and digest. */
-static bool is_right(const char *path, uint64_t bytes, const char *sha256) {
+/* Whether the file is there with that size and digest. STATUS_CANCELLED only. */
+static enum status check_file(const char *path, uint64_t bytes, const char *sha256, const struct scene_source *source,
+                              bool *is_right, struct error *err) {
     struct stat info;
-    char hex[SHA256_HEX_SIZE];
-    return lstat(path, &info) == 0 && S_ISREG(info.st_mode) && (uint64_t)info.st_size == bytes &&
-           sha256_of_file(path, hex, NULL) == STATUS_OK && strcmp(hex, sha256) == 0;
+    char hex[SHA256_HEX_SIZE] = "";
+    enum status status = STATUS_OK;
+    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
+    bool is_candidate = fd >= 0 && fstat(fd, &info) == 0 && S_ISREG(info.st_mode) && (uint64_t)info.st_size == bytes;
+    if (is_candidate)
+        status = hash_file(fd, source->go_on, source->user, hex, err);
+    if (fd >= 0)
+        close(fd);
+    *is_right = status == STATUS_OK && is_candidate && strcmp(hex, sha256) == 0;
+    return status == STATUS_CANCELLED ? status : STATUS_OK; /* what cannot be read is not right */
 }
 
 /* One try, which goes on where the last one was cut off; *size: of what is there then. */
@@ -85,9 +93,11 @@ enum status scene_cache_fetch_file(const char *path, const cJSON *file, const st
         status = fetch_once(part, name, bytes, source, &size, err);
         if (status != STATUS_OK || size < bytes) /* cut off: what has come may be right */
             continue;
-        is_good = is_right(part, bytes, sha256);
-        wrong_count += !is_good;
-        if (!is_good && unlink(part) != 0)
+        status = check_file(part, bytes, sha256, source, &is_good, err);
+        if (status != STATUS_OK || is_good)
+            continue;
+        wrong_count++;
+        if (unlink(part) != 0)
             status = error_set_errno(err, errno, "cannot remove %s", part);
     }
     if (status == STATUS_OK && !is_good)
@@ -158,11 +168,14 @@ static enum status look(const char *files, const cJSON *list, bool *missing, uin
             return status;
         if (!source->go_on(source->user, err))
             return STATUS_CANCELLED;
+        bool is_right;
         char *path = file_join(files, name);
-        missing[i] = !is_right(path, size, sha256);
-        *bytes += missing[i] ? size : 0;
+        status = check_file(path, size, sha256, source, &is_right, err);
+        missing[i++] = !is_right;
+        *bytes += is_right ? 0 : size;
         mem_free(path);
-        i++;
+        if (status != STATUS_OK)
+            return status;
     }
     return STATUS_OK;
 }

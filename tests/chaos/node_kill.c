@@ -15,7 +15,7 @@
 #define LIVES_PER_JOB 12
 #define LEASE_SEC 10 /* a report a second */
 #define PATIENCE_SEC 240.0
-#define ITERATIONS 800L
+#define ITERATIONS 400L
 #define ENDLESS 10000000L /* iterations of a job that is not to come to its end */
 #define SETTINGS                                                                                                       \
     "\"texture_size\":64,\"iterations\":%ld,\"texels_per_iteration\":128,\"cameras_per_texel\":1,"                     \
@@ -42,7 +42,7 @@ struct remote_attempt {
     int64_t job;
     int number, lease_sec;
     pid_t pid;
-    long checkpoints, outputs; /* lines that were read */
+    long checkpoints, outputs, no_space_count; /* lines that were read */
     struct remote_row row;
 };
 
@@ -95,6 +95,7 @@ static void check_line(struct remote_attempt *a, const char *text, size_t length
     OK(json_string(line, "type", "line", "", &type, &err));
     CHECK(strcmp(type, "part") != 0);
     a->checkpoints += strcmp(type, "checkpoint") == 0;
+    a->no_space_count += strcmp(type, "end") == 0 && strstr(text, "no-space") != NULL;
     if (strcmp(type, "output") == 0 || strcmp(type, "preview") == 0) {
         char *dir = layout_attempt(rig.dir, a->job, a->number);
         OK(json_string(line, "name", "line", "", &name, &err));
@@ -187,7 +188,7 @@ static void show_log(void) {
     struct buf text;
     char *log = file_join(rig.dir, "node.log");
     buf_init(&text, 1 << 22);
-    if (check_failed_count > 0 && file_read(log, &text, NULL) == STATUS_OK)
+    if ((check_failed_count > 0 || getenv("UNBAKE_SHOW")) && file_read(log, &text, NULL) == STATUS_OK)
         fprintf(stderr, "%s\n", buf_text(&text));
     buf_release(&text);
     mem_free(log);
@@ -285,6 +286,19 @@ static void test_wishes(void) {
     }
 }
 
+/* The daemon's disk is full: the job waits for room, and says so. */
+static void test_full_disk(void) {
+    struct remote_attempt a = {.lease_sec = LEASE_SEC};
+    uint64_t before = rig.api->config.min_free_bytes;
+    rig.api->config.min_free_bytes = (uint64_t)1 << 60;
+    begin(&a, rig_job(&rig), 2, ENDLESS);
+    a.pid = start_node(&a);
+    CHECK(follow(&a, -1, 0.0, 0) == 74);
+    CHECK(strcmp(a.row.end.way, "exit") == 0 && a.row.end.code == 74 && a.no_space_count == 1);
+    rig.api->config.min_free_bytes = before;
+    lose(&a);
+}
+
 /* Answers are lost on the way: every request may have been carried out, and nothing is done twice or missed. */
 static void test_lost_answers(unsigned seed) {
     struct remote_attempt a = {.lease_sec = 60};
@@ -351,6 +365,7 @@ int main(int argc, char **argv) {
     if (atoi(argv[3]) > 10)
         test_taken_back(SIGTERM);
     test_wishes();
+    test_full_disk();
     test_lost_answers(random_);
     test_cut_off();
     show_log();
