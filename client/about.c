@@ -7,7 +7,13 @@
 #include "common/mem.h"
 #include "common/nearest.h"
 #include "common/protocol.h"
+#include "common/render_settings.h"
 #include "common/settings.h"
+
+const struct client_option settings_options[] = {
+    {"kind", 'k', OPTION_TEXT, "KIND", "of which jobs: reconstruct (the default) or render"},
+    {0},
+};
 
 void setting_values(struct buf *out, const cJSON *setting) {
     const char *type = member_text(setting, "type"), *unit = member_text(setting, "unit");
@@ -85,12 +91,18 @@ int settings_run(struct client *c, const struct options *o) {
     int code = CLIENT_OK;
     cJSON *items = NULL;
     reply_init(&reply);
-    enum status status = request_get(c->request, "/v1/settings", &reply, &err);
+    const char *kind = options_text(o, "kind", JOB_KIND_RECONSTRUCT);
+    bool is_render = strcmp(kind, JOB_KIND_RENDER) == 0;
+    char path[64];
+    snprintf(path, sizeof path, "/v1/settings%s", is_render ? "?kind=" JOB_KIND_RENDER : "");
+    enum status status = is_render || strcmp(kind, JOB_KIND_RECONSTRUCT) == 0
+                             ? request_get(c->request, path, &reply, &err)
+                             : error_set(&err, STATUS_INPUT, "--kind must be reconstruct or render, not %.60s", kind);
     if (status == STATUS_OK) {
         items = cJSON_DetachItemFromObjectCaseSensitive(reply.json, "items");
     } else if (status == STATUS_UNAVAILABLE) {
         client_note(c, "%s; these are the settings that version " UNBAKE_VERSION " knows", err.message);
-        items = settings_describe();
+        items = is_render ? render_settings_describe() : settings_describe();
         status = STATUS_OK;
         reply.code = 0;
     }

@@ -55,6 +55,7 @@ extern const struct command_exit {
     int status;
     const char *meaning;
 } command_exit_statuses[];
+const char *command_option_help(const struct client_option *option);
 extern const char *const command_job_states[], *const command_job_kinds[]; /* end with NULL */
 /* Writes the help of the program (command NULL) or of one command. */
 void command_help(const struct command *command, FILE *out);

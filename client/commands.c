@@ -7,6 +7,7 @@
 
 #include "client/collection.h"
 #include "common/protocol.h"
+#include "common/render_settings.h"
 
 #define ANY_NUMBER ((size_t)-1)
 
@@ -38,6 +39,18 @@ static const struct command table[] = {
      "where they do not, how they would. Ends with 4 when the room is rejected, with 6 when it does not fit.\n",
      "  unbake check living-room/ --pictures check\n  unbake check living-room/ --scene-set mesh_axes='x -z y'\n", 0, 1,
      check_options, check_run},
+    {"render", "JOB", "render a reconstruction in another light",
+     "JOB is a reconstruction that has succeeded; nothing of it is sent again. --set says anything of lights,\n"
+     "environment, cameras, passes and format; the options below are short for some of it. Files that settings name\n"
+     "(an environment map, a mesh, a transforms.json) are sent along. A small picture does not wait behind\n"
+     "reconstructions.\n",
+     "  unbake render 17 --lights off --sun 2026-06-21T15:00 --place 52.5,13.4 -o relit\n"
+     "  unbake render 17 --remove 27,28 --environment sky.hdr --set environment_turn=90 --view all --watch\n"
+     "  unbake render last --set light.27=off --set light.28=2,1.8,1.2 --set passes=radiance,depth --set format=exr\n",
+     1, 1, render_options, render_run},
+    {"evaluate", "JOB", "compare a reconstruction with the truth of its room",
+     "The room must have come with it: truth/ beside its photographs, as `unbaked demo` writes it.\n",
+     "  unbake evaluate 17 -o figures\n", 1, 1, evaluate_options, evaluate_run},
     {"list", "", "list jobs, newest first", "", "  unbake list\n  unbake list --state failed --limit 5\n", 0, 0,
      list_options, list_run},
     {"show", "JOB", "show one job: state, settings, outputs", "",
@@ -99,7 +112,8 @@ static const struct command table[] = {
      "  unbake login --server https://lab.example.org\n  unbake login <token.txt\n", 0, 0, no_options, login_run},
     {"logout", "", "remove the stored token", "", "  unbake logout\n", 0, 0, no_options, logout_run},
     {"settings", "[NAME...]", "list what --set can set, with ranges and defaults", "",
-     "  unbake settings\n  unbake settings texture_size\n", 0, ANY_NUMBER, no_options, settings_run},
+     "  unbake settings\n  unbake settings texture_size\n  unbake settings --kind render\n", 0, ANY_NUMBER,
+     settings_options, settings_run},
     {"version", "", "print the versions of the client and of the server", "", "  unbake version --json\n", 0, 0,
      no_options, version_run},
     {"manual", "PAGE", "write unbake.1, or the completion for bash or zsh", "",
@@ -120,6 +134,10 @@ const struct command *command_find(const char *name) {
     return NULL;
 }
 
+const char *command_option_help(const struct client_option *option) {
+    return option->help ? option->help : render_settings_find(option->name, NULL)->help;
+}
+
 static void print_options(const struct client_option *option, FILE *out) {
     for (; option->name; option++) {
         char left[64], letter[5] = "    ";
@@ -127,7 +145,7 @@ static void print_options(const struct client_option *option, FILE *out) {
             snprintf(letter, sizeof letter, "-%c, ", option->letter);
         snprintf(left, sizeof left, "%s--%s%s%s", letter, option->name, option->value ? " " : "",
                  option->value ? option->value : "");
-        fprintf(out, "  %-22s %s\n", left, option->help);
+        fprintf(out, "  %-22s %s\n", left, command_option_help(option));
     }
 }
 

@@ -7,13 +7,16 @@
 /* submit.c */
 extern const struct client_option submit_options[];
 int submit_run(struct client *c, const struct options *o);
-/* Adds "key=value" to an object of labels. */
-enum status label_add(cJSON *labels, const char *text, struct error *err);
 
 /* check.c */
 extern const struct client_option check_options[];
 int check_run(struct client *c, const struct options *o);
 int check_set_run(struct client *c, const struct options *o); /* `scenes set` */
+
+/* render.c */
+extern const struct client_option render_options[], evaluate_options[];
+int render_run(struct client *c, const struct options *o);
+int evaluate_run(struct client *c, const struct options *o);
 
 /* watch.c */
 extern const struct client_option watch_options[], logs_options[];
@@ -41,6 +44,8 @@ int extend_run(struct client *c, const struct options *o);
 /* get.c */
 extern const struct client_option get_options[];
 int get_run(struct client *c, const struct options *o);
+/* All outputs of a job into the folder `dir`. */
+int get_job(struct client *c, int64_t job, const char *dir);
 /* Whether a name from the server may become a file below the folder asked for. */
 bool get_name_is_safe(const char *name);
 
@@ -64,6 +69,7 @@ int manual_run(struct client *c, const struct options *o);
  * its default. */
 void setting_values(struct buf *out, const cJSON *setting);
 void setting_default(struct buf *out, const cJSON *setting);
+extern const struct client_option settings_options[];
 int settings_run(struct client *c, const struct options *o);
 int version_run(struct client *c, const struct options *o);
 

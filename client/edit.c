@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "client/commands.h"
+#include "client/new_job.h"
 #include "client/retention.h"
 #include "common/mem.h"
 

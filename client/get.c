@@ -104,7 +104,7 @@ static enum status look_up(struct fetch *f) {
 
 /* Every word must match an output, before anything is fetched. */
 static enum status check_words(struct fetch *f, const struct options *o) {
-    for (size_t i = 1; i < o->word_count; i++) {
+    for (size_t i = 1; o && i < o->word_count; i++) {
         struct nearest nearest;
         bool matched = false;
         const cJSON *item;
@@ -125,10 +125,10 @@ static enum status check_words(struct fetch *f, const struct options *o) {
 }
 
 static bool wanted(const struct options *o, const char *name) {
-    for (size_t i = 1; i < o->word_count; i++)
+    for (size_t i = 1; o && i < o->word_count; i++)
         if (fnmatch(o->word[i], name, 0) == 0)
             return true;
-    return o->word_count == 1;
+    return !o || o->word_count == 1;
 }
 
 /* --- NAME.part ----------------------------------------------------------------------------- */
@@ -392,26 +392,42 @@ static void print_results(struct client *c, const char *dir, const cJSON *result
         printf(" (%s%s)\n", size, present ? "; the others were there" : "");
 }
 
+/* Fetches what the words after the first name (o NULL: all). `status`: of what led here; f->job is known where it is
+ * STATUS_OK. */
+static int get(struct fetch *f, const struct options *o, enum status status) {
+    struct client *c = f->client;
+    struct error *err = f->err;
+    int code = CLIENT_OK;
+    cJSON *results = cJSON_CreateArray();
+    if (status == STATUS_OK)
+        status = fetch_all(f, o, results);
+    if (status == STATUS_CANCELLED)
+        error_hint(err, "`unbake get %lld -o DIR` continues where this stopped", (long long)f->job);
+    if (status != STATUS_OK)
+        code = client_fail(c, &f->reply, err);
+    else
+        print_results(c, f->dir, results);
+    cJSON_Delete(results);
+    cJSON_Delete(f->outputs);
+    reply_release(&f->reply);
+    return code;
+}
+
 int get_run(struct client *c, const struct options *o) {
     struct error err;
     struct fetch f = {.client = c, .err = &err, .fd = -1};
-    int code = CLIENT_OK;
-    cJSON *results = cJSON_CreateArray();
     reply_init(&f.reply);
     enum status status = client_job_id(c, o->word[0], &f.job, &f.reply, &err);
     char *fallback = mem_printf("job-%lld", (long long)f.job);
     f.dir = options_text(o, "output", fallback);
-    if (status == STATUS_OK)
-        status = fetch_all(&f, o, results);
-    if (status == STATUS_CANCELLED)
-        error_hint(&err, "the same command continues where this one stopped");
-    if (status != STATUS_OK)
-        code = client_fail(c, &f.reply, &err);
-    else
-        print_results(c, f.dir, results);
+    int code = get(&f, o, status);
     mem_free(fallback);
-    cJSON_Delete(results);
-    cJSON_Delete(f.outputs);
-    reply_release(&f.reply);
     return code;
+}
+
+int get_job(struct client *c, int64_t job, const char *dir) {
+    struct error err;
+    struct fetch f = {.client = c, .err = &err, .fd = -1, .job = job, .dir = dir};
+    reply_init(&f.reply);
+    return get(&f, NULL, STATUS_OK);
 }

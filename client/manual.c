@@ -6,6 +6,7 @@
 #include "common/manual.h"
 #include "common/protocol.h"
 #include "common/reading.h"
+#include "common/render_settings.h"
 #include "common/settings.h"
 
 static void option_list(const struct client_option *option) {
@@ -15,12 +16,12 @@ static void option_list(const struct client_option *option) {
             snprintf(word, sizeof word, "-%c, --%s", option->letter, option->name);
         else
             snprintf(word, sizeof word, "--%s", option->name);
-        manual_item(stdout, word, option->value, option->help);
+        manual_item(stdout, word, option->value, command_option_help(option));
     }
 }
 
-static void setting_list(void) {
-    cJSON *settings = settings_describe();
+/* Takes settings. */
+static void setting_list(cJSON *settings) {
     const cJSON *setting;
     cJSON_ArrayForEach(setting, settings) {
         struct buf text;
@@ -57,7 +58,11 @@ static void page_1(void) {
     }
     manual_section(stdout, "SETTINGS");
     manual_text(stdout, "What `submit --set NAME=VALUE` takes. `unbake settings` asks the server for its own.\n");
-    setting_list();
+    setting_list(settings_describe());
+    manual_section(stdout, "SETTINGS OF RENDERS");
+    manual_text(stdout, "What `render --set NAME=VALUE` takes; # stands for a number, that of a segment, a lamp or a "
+                        "thing. `unbake settings --kind render` asks the server for its own.\n");
+    setting_list(render_settings_describe());
     manual_section(stdout, "EXIT STATUS");
     for (size_t i = 0; command_exit_statuses[i].meaning; i++) {
         char status[12];
@@ -102,6 +107,10 @@ static void completion(bool zsh) {
     completion_words(stdout, "--scene-set");
     for (size_t i = 0; reading_keys[i]; i++)
         completion_word(stdout, reading_keys[i], "=");
+    completion_words_end(stdout);
+    completion_words(stdout, "--kind");
+    for (size_t i = 0; command_job_kinds[i]; i++)
+        completion_word(stdout, command_job_kinds[i], "");
     completion_words_end(stdout);
     completion_words(stdout, "--state");
     for (size_t i = 0; command_job_states[i]; i++)

@@ -22,7 +22,7 @@ struct client_option {
     char letter;      /* 0: no short form */
     enum option_kind kind;
     const char *value; /* what the help calls the value: "DIR"; NULL for a flag */
-    const char *help;
+    const char *help;  /* NULL: that of the render setting of this name */
 };
 
 struct options_given {

@@ -5,14 +5,12 @@
  * 2. The room is sent, unless its content is there already, and checked by the server (client_room.h). A job on a room
  *    that is rejected, or whose mesh and photographs do not fit, is not queued.
  * 3. The job is queued under an idempotency key: however often the request is sent, one job results. */
-#include <errno.h>
-#include <stdlib.h>
 #include <string.h>
-#include <sys/random.h>
 
 #include "client/commands.h"
 #include "client/findings.h"
 #include "client/client_room.h"
+#include "client/new_job.h"
 #include "common/mem.h"
 #include "common/protocol.h"
 #include "common/settings.h"
@@ -20,13 +18,10 @@
 const struct client_option submit_options[] = {
     {"name", 'n', OPTION_TEXT, "NAME", "what people will call the job; else the room's name"},
     {"set", 's', OPTION_LIST, "KEY=VALUE", "a setting; `unbake settings` lists them"},
-    {"priority", 'p', OPTION_WHOLE, "N", "-100 to 100, larger goes first (0)"},
-    {"label", 'l', OPTION_LIST, "KEY=VALUE", "a label of your own"},
+    NEW_JOB_OPTIONS,
     ROOM_OPTIONS,
     {"share", 0, OPTION_FLAG, NULL, "let every user of the server look at the job and its room"},
-    {"webhook", 0, OPTION_TEXT, "URL",
-     "is told of the job's states, signed with $UNBAKE_WEBHOOK_SECRET (whsec_ and base64)"},
-    {"watch", 'w', OPTION_FLAG, NULL, "follow the job to its end, as `unbake watch` does"},
+    WATCH_OPTION,
     {"dry-run", 0, OPTION_FLAG, NULL, "check the settings and the room, which is sent for that; queue nothing"},
     {0},
 };
@@ -36,53 +31,6 @@ struct submission {
     struct client_room room;
     cJSON *job; /* the body of POST /v1/jobs; owned */
 };
-
-/* --- the job ------------------------------------------------------------------------------- */
-
-enum status label_add(cJSON *labels, const char *text, struct error *err) {
-    const char *equals = strchr(text, '=');
-    if (!equals || equals == text)
-        return error_set(err, STATUS_INPUT, "label \"%.100s\" is not of the form key=value", text);
-    char *key = mem_strndup(text, (size_t)(equals - text));
-    enum status status = STATUS_OK;
-    if (cJSON_GetObjectItemCaseSensitive(labels, key))
-        status = error_set(err, STATUS_INPUT, "label %s is given twice", key);
-    else
-        json_add_string(labels, key, equals + 1);
-    mem_free(key);
-    return status;
-}
-
-static enum status describe_job(struct submission *s, const struct options *o, struct error *err) {
-    enum status status = STATUS_OK;
-    cJSON *settings = cJSON_CreateObject(), *labels = cJSON_CreateObject();
-    s->job = cJSON_CreateObject();
-    for (size_t i = 0; i < o->given_count && status == STATUS_OK; i++) {
-        const struct options_given *given = &o->given[i];
-        if (strcmp(given->option->name, "set") == 0)
-            status = settings_parse_assignment(given->text, settings, err);
-        else if (strcmp(given->option->name, "label") == 0)
-            status = label_add(labels, given->text, err);
-    }
-    json_add(s->job, "settings", settings);
-    json_add(s->job, "labels", labels);
-    if (options_flag(o, "share"))
-        json_add_bool(s->job, "shared", true);
-    json_add_int(s->job, "priority", options_whole(o, "priority", 0));
-    const char *name = options_text(o, "name", NULL), *url = options_text(o, "webhook", NULL);
-    const char *secret = getenv("UNBAKE_WEBHOOK_SECRET"); /* a command line is for all to read */
-    if (name)
-        json_add_string(s->job, "name", name);
-    if (url && !(secret && *secret) && status == STATUS_OK) {
-        error_set(err, STATUS_INPUT, "--webhook needs a secret to sign its messages with");
-        status = error_hint(err, "put 16 characters or more into UNBAKE_WEBHOOK_SECRET");
-    } else if (url && status == STATUS_OK) {
-        cJSON *webhook = cJSON_AddObjectToObject(s->job, "webhook");
-        json_add_string(webhook, "url", url);
-        json_add_string(webhook, "secret", secret);
-    }
-    return status;
-}
 
 /* --- queueing ------------------------------------------------------------------------------ */
 
@@ -104,18 +52,6 @@ static enum status check(struct submission *s, bool is_to_change, struct reply *
         return status;
     bool does_not_fit = reply->code == 409;
     return does_not_fit || (reply->code == 422 && only_scene_is_missing(reply)) ? STATUS_OK : status;
-}
-
-static enum status queue(struct submission *s, struct reply *reply, struct error *err) {
-    unsigned char random[16];
-    char header[64] = "Idempotency-Key: ";
-    if (getrandom(random, sizeof random, 0) != (ssize_t)sizeof random)
-        return error_set_errno(err, errno, "cannot get random numbers");
-    for (size_t i = 0; i < sizeof random; i++)
-        snprintf(header + 17 + 2 * i, 3, "%02x", random[i]);
-    struct request_call call = {
-        .method = "POST", .path = "/v1/jobs", .header = {header}, .body = s->job, .same_twice = true};
-    return request_run(s->client->request, &call, reply, err);
 }
 
 static void print_dry_run(struct submission *s, const struct reply *reply) {
@@ -156,7 +92,8 @@ static void print_job(struct submission *s, const cJSON *job) {
 static enum status submit(struct submission *s, const struct options *o, struct reply *reply, struct error *err) {
     struct client_room *room = &s->room;
     bool dry_run = options_flag(o, "dry-run");
-    enum status status = describe_job(s, o, err);
+    s->job = cJSON_CreateObject();
+    enum status status = new_job_describe(s->job, o, settings_parse_assignment, err);
     if (status == STATUS_OK)
         status = client_room_open(room, s->client, o, reply, err);
     if (status != STATUS_OK)
@@ -178,7 +115,7 @@ static enum status submit(struct submission *s, const struct options *o, struct 
         findings_note(s->client, room->found);
     if (status != STATUS_OK)
         return status;
-    return dry_run ? check(s, false, reply, err) : queue(s, reply, err);
+    return dry_run ? check(s, false, reply, err) : new_job_queue(s->client, s->job, reply, err);
 }
 
 /* A refusal's JSON tells what the check has found, too. */
