@@ -5,6 +5,7 @@
 
 #include "common/mem.h"
 #include "server/light/changing_light.h"
+#include "server/light/lambert_mean.h"
 #include "server/light/sky_doubt.h"
 #include "server/material/emission_pattern.h"
 #include "server/reconstruct/inputs.h"
@@ -48,24 +49,11 @@ void solve_emitters_light(struct solve_emitters *s) {
     world_update_lights(&r->world);
 }
 
-/* Sums of Lambert radiance over a segment's texels: all, and those about as bright as the segment. The latter are used
- * if there are any: next to a window light falls off steeply, and a dim end must not be compared with a bright one. */
-struct lambert_sums {
-    double all[4], bright[4]; /* red, green, blue, texels */
-};
-
-static void add_lambert(double sum[4], rgb lambert) {
-    sum[0] += (double)lambert.r;
-    sum[1] += (double)lambert.g;
-    sum[2] += (double)lambert.b;
-    sum[3] += 1.0;
-}
-
 /* Fills evidence.lambert with means over the observed texels; all texels of a segment that was observed only in mixed
  * pixels, such as a lamp thinner than a pixel. */
 static void average_lambert(const struct solve_emitters *s) {
     const struct reconstruction *r = s->r;
-    struct lambert_sums *sum = mem_calloc(r->segments.count, sizeof *sum);
+    struct lambert_mean *sum = mem_calloc(r->segments.count, sizeof *sum);
     for (size_t i = 0; i < r->inverse.valid_count; i += EVIDENCE_STRIDE) {
         uint32_t texel = r->inverse.valid[i];
         size_t segment = reconstruction_segment(r, texel);
@@ -73,16 +61,13 @@ static void average_lambert(const struct solve_emitters *s) {
         bool is_seen = r->fused.count[texel] > 0.0f || r->evidence[segment].only_mixed;
         if (!is_seen || !divide_lambert(s->divide, texel, &lambert))
             continue;
-        add_lambert(sum[segment].all, lambert);
-        if (evidence_is_bright(r, texel))
-            add_lambert(sum[segment].bright, lambert);
+        lambert_mean_add(&sum[segment], &r->evidence[segment], fused_radiance(&r->fused, texel), lambert);
     }
     for (size_t i = 0; i < r->segments.count; i++) {
         struct emitter_evidence *e = &r->evidence[i];
-        const double *from = sum[i].bright[3] > 0.0 ? sum[i].bright : sum[i].all;
-        rgb lambert = e->radiance; /* without evidence a segment counts as a reflector */
-        if (from[3] > 0.0)
-            lambert = rgb_make((float)(from[0] / from[3]), (float)(from[1] / from[3]), (float)(from[2] / from[3]));
+        rgb lambert;
+        if (!lambert_mean_of(&sum[i], &lambert))
+            lambert = e->radiance; /* without evidence a segment counts as a reflector */
         evidence_set_lambert(e, lambert);
     }
     mem_free(sum);
