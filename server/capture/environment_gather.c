@@ -15,7 +15,7 @@
 #include "server/scene/latlong.h"
 
 /* Metres: distance of a point that every camera of a room sees in the same direction; +25 %: no change. */
-#define FAR_M 1e6f
+#define FAR_M 1e6f /* +25 %: no change */
 /* Sample points along each side of a pixel of the map, at most. Photographs at most four times as fine as the map are
  * averaged whole; the map is finer than half the median photograph, so few are finer. */
 #define MAX_GRID 4 /* +25 %: no change */

@@ -28,15 +28,18 @@
 #define POSE_CELL_ROWS 6 /* as coarse as 8 columns in a picture of 4 : 3; to 7: no change */
 #define POSE_CELLS (POSE_CELL_COLUMNS * POSE_CELL_ROWS)
 #define POSE_OBSERVATIONS_MAX (TRACK_OTHERS + 1) /* of a track, with its own photograph */
-#define POSE_HELD_OUT_EVERY 3    /* one track in so many is held out: 50 of TRACKS_MIN judge a photograph */
+/* One track in so many is held out: 50 of TRACKS_MIN judge a photograph. */
+#define POSE_HELD_OUT_EVERY 3    /* to 4: no change */
 #define POSE_MIN_OBSERVATIONS 60 /* finite ones, for a photograph to be moved: ten an unknown */
-#define POSE_ROUNDS 12           /* Gauss-Newton steps at each level: 18 of its pixels at POSE_STEP_PX */
-#define POSE_STEP_PX 1.5 /* pixels of a level: largest step; slopes of the 1 2 1 smoothed level hold for as far */
+#define POSE_ROUNDS 12 /* Gauss-Newton steps at each level: 18 of its pixels at POSE_STEP_PX; +25 %: no change */
+/* Pixels of a level: largest step; slopes of the 1 2 1 smoothed level hold for as far. */
+#define POSE_STEP_PX 1.5 /* +25 %: no change */
 /* Pixels, rms: smaller corrections are not applied, as a look-up averages over a pixel. */
-#define POSE_MIN_SHIFT_PX 0.15
-#define POSE_DAMPING 0.01 /* share of the diagonal that is added to it (Levenberg-Marquardt): shortens steps by 1 % */
+#define POSE_MIN_SHIFT_PX 0.15 /* +25 %: no change */
+/* Share of the diagonal that is added to it (Levenberg-Marquardt): shortens steps by 1 %. */
+#define POSE_DAMPING 0.01 /* +25 %: no change */
 /* Of log residuals: bounds weights where photographs agree; twice the rounding of 8-bit sRGB. */
-#define POSE_MIN_SCALE 0.01
+#define POSE_MIN_SCALE 0.01 /* +25 %: no change */
 
 struct pose { /* camera_from_world */
     double r[3][3], t[3];

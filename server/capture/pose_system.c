@@ -12,12 +12,13 @@
 #include "server/capture/conjugate.h"
 
 /* Standard deviation of the offsets' prior, in logarithms: what is left of vignettes and reflections. */
-#define OFFSET_SIGMA 0.3
+#define OFFSET_SIGMA 0.3 /* +25 %: no change */
 /* pixels: scale of the prior, which is weak: redkitchen's drift is shared by neighbouring frames */
-#define PRIOR_PX 1.0
-#define PRIOR_LEAST_PX 0.2 /* pixels: the prior is quadratic below this, about where corrections are not applied */
-#define CG_STEPS 40        /* of conjugate gradients, at most */
-#define CG_TOLERANCE 1e-3  /* of the residual's norm, over that of the right-hand side */
+#define PRIOR_PX 1.0 /* +25 %: no change */
+/* Pixels: the prior is quadratic below this, about where corrections are not applied. */
+#define PRIOR_LEAST_PX 0.2 /* +25 %: no change */
+#define CG_STEPS 40        /* of conjugate gradients, at most; +25 %: no change */
+#define CG_TOLERANCE 1e-3  /* of the residual's norm, over that of the right-hand side; +25 %: no change */
 
 double pose_prior(const struct pose_frame *frame) {
     double squares = conjugate_dot(frame->total, frame->total, POSE_UNKNOWNS);

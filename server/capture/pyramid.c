@@ -6,7 +6,8 @@
 #include "common/mem.h"
 #include "server/capture/views.h"
 
-#define EDGE_DISTANCE 2 /* pixels around a depth edge that are masked: a lens and a pose off by a pixel mix as far */
+/* Pixels around a depth edge that are masked: a lens and a pose off by a pixel mix as far. */
+#define EDGE_DISTANCE 2 /* to 3: no change */
 
 static float gray_of(const struct photograph *photo, uint32_t x, uint32_t y, float floor) {
     struct photograph_sample s;

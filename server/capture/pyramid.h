@@ -16,7 +16,7 @@
 
 /* The coarsest has an eighth of the width: 80 pixels of the 640 of a level 0 (tracks.c), just above what is used
  * (COARSEST_PX of calibrate_poses.c). */
-#define PYRAMID_LEVELS 4
+#define PYRAMID_LEVELS 4 /* to 5: no change */
 
 struct pyramid {
     float scale; /* pixels of level 0 per pixel of the photograph: 1, 1/2, 1/4, ... */

@@ -6,10 +6,10 @@
 #include "server/scene/rgb_half.h"
 #include "server/scene/surface.h"
 
-#define BLOCK 4 /* texels a side: a sixteenth of the work of fuse.c */
+#define BLOCK 4 /* texels a side: a sixteenth of the work of fuse.c; to 5: no change */
 /* Photographs used at most, evenly spaced: the first ones alone would show one end of the room. Time
  * is proportional; fuse.c takes all. */
-#define MAX_PHOTOGRAPHS 64
+#define MAX_PHOTOGRAPHS 64 /* +25 %: no change */
 
 struct preview_job {
     uint16_t (*radiance)[3];

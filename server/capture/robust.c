@@ -6,7 +6,7 @@
 
 /* Tuning constant of Cauchy's weight, deviations: 95 % efficient for normal noise when iterated to convergence (Holland
  * and Welsch 1977); a single step from the median, as here, has 91 %. */
-#define EFFICIENT 2.385f
+#define EFFICIENT 2.385f /* +25 %: 0 dB */
 
 static int compare_gray(const void *a, const void *b) {
     float x = ((const struct robust_sample *)a)->gray, y = ((const struct robust_sample *)b)->gray;

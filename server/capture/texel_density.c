@@ -6,10 +6,11 @@
 
 #include "common/mem.h"
 
-#define PIXEL_STRIDE 2 /* along both axes, of the pixels traced, for time: what is seen at all covers more */
+/* Along both axes, of the pixels traced, for time: what is seen at all covers more. */
+#define PIXEL_STRIDE 2 /* to 3: +0.58 dB, roughness +0.15, specular +0.12 */
 /* Linear texel density of unseen surfaces relative to seen ones: they reflect light, which needs no detail, and take a
  * sixteenth of the texels. */
-#define UNSEEN_DENSITY 0.25f
+#define UNSEEN_DENSITY 0.25f /* +25 %: -0.22 dB, roughness +0.07 */
 
 struct density_job {
     const struct views *views;

@@ -9,18 +9,18 @@
 
 /* Tracks in all, for time and memory; for each photograph at least 25 a pose's unknown, at most one in a square of 22
  * pixels of PYRAMID_MAX. */
-#define TRACKS_TOTAL 50000
-#define TRACKS_MIN 150
-#define TRACKS_MAX 600
+#define TRACKS_TOTAL 50000               /* +25 %: no change */
+#define TRACKS_MIN 150                   /* +25 %: no change */
+#define TRACKS_MAX 600                   /* +25 %: no change */
 #define PYRAMID_TOTAL ((size_t)64 << 20) /* pixels of all level 0, also of held-out photographs: 256 MiB */
 #define PYRAMID_MAX ((size_t)640 * 480)  /* pixels of level 0, at most: finer ones add time, and noise */
 /* Random positions of which the strongest gradient is taken: an order statistic, no maximum, for spread. */
-#define PLACES_PER_CELL 8
-#define DISTANCE_RATIO 1.7f /* of two cameras' distances, at most: within the pyramid's factor of 2 */
+#define PLACES_PER_CELL 8   /* +25 %: no change */
+#define DISTANCE_RATIO 1.7f /* of two cameras' distances, at most: within the pyramid's factor of 2; +25 %: no change */
 /* Least gradient of a track, log luminance per pixel: the noise of a pixel of 1 % is then a pixel's shift. */
-#define MIN_SLOPE 0.01f
+#define MIN_SLOPE 0.01f /* +25 %: no change */
 /* Radiance added before logarithms, as a share of the median: noise of dark pixels counts less. */
-#define FLOOR_SHARE 0.05f
+#define FLOOR_SHARE 0.05f /* +25 %: no change */
 
 static void make_pyramid(void *user, size_t t, int thread) {
     (void)thread;

@@ -9,10 +9,11 @@
 #include "server/capture/pyramid.h"
 #include "server/capture/views.h"
 
-#define TRACK_OTHERS 10 /* photographs a track besides its own, at most: time and memory are proportional */
+/* Photographs a track besides its own, at most: time and memory are proportional. */
+#define TRACK_OTHERS 10 /* +25 %: no change */
 /* Between normal and view, for a photograph to be used: 78 degrees, where a pixel is five times as long on the surface
  * as across. */
-#define TRACK_MIN_COSINE 0.2f
+#define TRACK_MIN_COSINE 0.2f /* +25 %: no change */
 
 struct track {
     float x, y; /* position in its own photograph, pixels */

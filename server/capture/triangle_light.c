@@ -9,13 +9,14 @@
 
 /* Photographs a point and points a triangle, at most: 48 observations, of which a quantile is off by 7 % of their
  * number. */
-#define OBSERVATIONS_PER_POINT 6
-#define MAX_POINTS 8
-#define PIXELS_PER_POINT 16.0f /* pixels of a triangle for each point: 4 x 4, whose look-ups share none */
+#define OBSERVATIONS_PER_POINT 6 /* to 7: no change */
+#define MAX_POINTS 8             /* +25 %: no change */
+/* Pixels of a triangle for each point: 4 x 4, whose look-ups share none. */
+#define PIXELS_PER_POINT 16.0f /* +25 %: no change */
 /* Share of observations that reach the value: so many must agree that it is as bright; the rest may be occluded or
  * beside it, as poses are not calibrated yet. */
-#define BRIGHTER_SHARE 0.7f
-#define KEY_POINTS 29 /* separates these random numbers from others of the triangle */
+#define BRIGHTER_SHARE 0.7f /* +25 %: no change */
+#define KEY_POINTS 29       /* separates these random numbers from others of the triangle */
 
 struct measure_job {
     const struct views *views;

@@ -15,10 +15,10 @@
 #include "server/scene/scene.h"
 #include "server/scene/segment.h"
 
-#define VIEWS_PICK_MAX 64 /* views that views_pick returns at most; bounds its stack */
+#define VIEWS_PICK_MAX 64 /* views that views_pick returns at most; bounds its stack; +25 %: no change */
 /* Stored value of 8-bit photographs below which a pixel tells little: 50 of a full well of 10^4 electrons, 14 % of shot
  * noise, and 2 % of rounding to 8-bit sRGB. */
-#define VIEWS_NOISE_VALUE 0.005f
+#define VIEWS_NOISE_VALUE 0.005f /* +25 %: no change */
 
 /* Class of a pixel: one surface; several with a depth edge; none (open); several that touch. */
 enum { VIEWS_SURFACE, VIEWS_MIXED, VIEWS_OPEN, VIEWS_SEAM };

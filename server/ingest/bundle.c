@@ -281,6 +281,9 @@ enum status bundle_load(const char *dir, const struct reading *given, const stru
     scene->pose_axes = reading.axes != AXES_OF_FORMAT ? reading.axes : t.axes;
     if (status == STATUS_OK && has_frames)
         status = load_photographs(root, name, &t, limits, pool, scene, &f, err);
+    if (status == STATUS_OK && f.problem_count > 0 && listing.link_count > 0)
+        findings_warning(&f, "links are not searched, %s for one (%zu in all); unbake submit sends what they point to",
+                         listing.link, listing.link_count);
     if (status == STATUS_OK && f.problem_count > 0)
         status = sum_up(&f, err);
     if (status == STATUS_OK) {

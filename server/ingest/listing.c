@@ -59,6 +59,9 @@ static enum status add_below(struct growing *g, const char *base, int depth, str
             char *inner = mem_printf("%s/", path);
             status = add_below(g, inner, depth + 1, err);
             mem_free(inner);
+        } else if (S_ISLNK(info.st_mode) && g->l->link_count++ == 0) {
+            g->l->link = path;
+            path = NULL;
         }
         mem_free(path);
         mem_free(full);
@@ -128,6 +131,7 @@ void listing_release(struct listing *l) {
     mem_free(l->file);
     mem_free(l->folder);
     mem_free(l->root);
+    mem_free(l->link);
     *l = (struct listing){0};
 }
 

@@ -23,6 +23,8 @@ struct listing {
     char *root; /* folder on the disk, or NULL; owned */
     size_t count;
     struct listed_file *file; /* [count] sorted by path; owned */
+    size_t link_count;        /* links that were passed over */
+    char *link;               /* path of the first of them, or NULL; owned */
     size_t folder_count;
     char **folder; /* [folder_count] bases, "" first, then the shallower first, then sorted; owned */
 };

@@ -20,7 +20,7 @@
 #define SPECULAR_VIEWS 10 /* observations of a point, at most; bounds time and memory; +25 %: no change */
 /* Points of a segment, at most; bounds memory and the share of one segment. */
 #define SPECULAR_MAX_POINTS 1024 /* +25 %: no change */
-#define SPECULAR_MIN_PATCH 8.0f /* least side of a patch, texels; +25 %: +0.08 dB, roughness -0.29 */
+#define SPECULAR_MIN_PATCH 8.0f  /* least side of a patch, texels; +25 %: +0.08 dB, roughness -0.29 */
 
 /* Roughness and specular of the candidates. */
 extern const struct highlight_levels specular_levels;

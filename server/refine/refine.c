@@ -9,7 +9,7 @@
 
 /* Cells of the correction along the longer side of the texture: 16 texels of 2048, twice a probe's block (solve.c), as
  * errors of light are no finer. */
-#define CELLS_ACROSS 128 /* +25 %: no change */
+#define CELLS_ACROSS 128 /* +25 %: -0.08 dB at 256 texels */
 /* Growth of the number of observations from one correction of base colour to the next: each costs one solve of all
  * cells, ten of them for ten times the observations. */
 #define OBSERVATIONS_GROWTH 1.25 /* +25 %: 0 dB */

@@ -249,6 +249,13 @@ static void names(void) {
     put_copy("images/\xe4.jpg", PLAIN, SIZE_MAX);
     put_frames("images/a.jpg", "images/b.JPG", "images/c.png", NULL);
     CHECK_THAT(load(work), "%s", told);
+    /* a mesh that is a link is not found, and the reason is told */
+    char *mesh = file_join(work, "mesh.ply"), *other = file_join(work, "mesh");
+    CHECK(rename(mesh, other) == 0 && symlink("mesh", mesh) == 0);
+    CHECK_THAT(!load(work) && strstr(told, "links are not searched, mesh.ply for one (1 in all)"), "%s", told);
+    CHECK(rename(other, mesh) == 0);
+    mem_free(other);
+    mem_free(mesh);
     /* a list of frames by another name is told */
     char *list = file_join(work, "transforms.json"), *renamed = file_join(work, "frames_b.json");
     CHECK(rename(list, renamed) == 0);
