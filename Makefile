@@ -33,7 +33,10 @@ CLIENT_COMMON_SRC = $(filter-out common/image.c common/image_%.c common/exr_%.c 
 CLIENT_SRC = $(wildcard client/*.c)
 SERVER_SRC = $(wildcard server/*.c server/*/*.c server/*/*/*.c)
 SERVER_LIB_SRC = $(filter-out server/main.c,$(SERVER_SRC))
-EMBEDDED = server/http/openapi.json server/web/index.html server/web/page.css server/web/page.js
+# The web page: server/web/, and three.js of Debian's libjs-three.
+PAGE_FILES = $(wildcard server/web/*.css server/web/*.js)
+THREE_JS = /usr/share/javascript/three/three.module.js
+EMBEDDED = server/http/openapi.json server/web/index.html $(PAGE_FILES)
 CLIENT_LIB_SRC = $(filter-out client/main.c,$(CLIENT_SRC))
 TEST_SRC = $(wildcard tests/unit/*.c tests/gradient/*.c tests/render/*.c tests/api/*.c tests/chaos/*.c \
                       tests/soak/*.c)
@@ -82,12 +85,28 @@ $(B)/obj/%.o: %.c
 	$(CC) $(ALL_CFLAGS) -MMD -MP -c -o $@ $<
 
 # Files that travel inside the binary, as C arrays; declared in server/http/embedded.h.
+embed = symbol=$$(printf %s '$(notdir $(1))' | tr -c 'a-zA-Z0-9' _); \
+	{ printf '\#include "server/http/embedded.h"\nextern const unsigned char embedded_%s[];\nextern const size_t embedded_%s_size;\n' "$$symbol" "$$symbol"; \
+	  printf 'const unsigned char embedded_%s[] = {\n' "$$symbol"; od -An -v -tx1 $< | sed 's/[0-9a-f][0-9a-f]/0x&,/g'; \
+	  printf '};\nconst size_t embedded_%s_size = sizeof embedded_%s;\n' "$$symbol" "$$symbol"; } > $@
 $(B)/embed/%.c: %
 	@mkdir -p $(@D)
-	@symbol=$$(printf %s '$(notdir $*)' | tr -c 'a-zA-Z0-9' _); \
-	{ printf '#include "server/http/embedded.h"\nconst unsigned char embedded_%s[] = {\n' "$$symbol"; \
-	  od -An -v -tx1 $< | sed 's/[0-9a-f][0-9a-f]/0x&,/g'; \
-	  printf '};\nconst size_t embedded_%s_size = sizeof embedded_%s;\n' "$$symbol" "$$symbol"; } > $@
+	@$(call embed,$*)
+$(B)/embed/three.module.js.c: $(THREE_JS)
+	@mkdir -p $(@D)
+	@$(call embed,three.module.js)
+$(THREE_JS):
+	@echo "$@ is missing: make deps installs libjs-three" >&2; exit 1
+# The page's files by name. It is written anew where a file has come or gone.
+$(B)/embed/page.c: server/web Makefile
+	@mkdir -p $(@D)
+	@names='$(notdir $(PAGE_FILES) $(THREE_JS))'; symbols() { echo "$$1" | tr -c 'a-zA-Z0-9\n' _; }; \
+	{ echo '#include "server/http/embedded.h"'; \
+	  for n in $$names; do s=$$(symbols "$$n"); \
+	    echo "extern const unsigned char embedded_$$s[]; extern const size_t embedded_$${s}_size;"; done; \
+	  echo 'const struct embedded_file embedded_page[] = {'; \
+	  for n in $$names; do s=$$(symbols "$$n"); \
+	    echo "    {\"$$n\", embedded_$$s, &embedded_$${s}_size},"; done; echo '    {0}};'; } > $@
 $(B)/obj/embed/%.o: $(B)/embed/%.c
 	@mkdir -p $(@D)
 	$(CC) $(ALL_CFLAGS) -MMD -MP -c -o $@ $<
@@ -95,7 +114,7 @@ $(B)/obj/embed/%.o: $(B)/embed/%.c
 $(B)/libcommon.a: $(call obj,$(COMMON_SRC))
 	@rm -f $@
 	ar rcs $@ $^
-$(B)/libserver.a: $(call obj,$(SERVER_LIB_SRC)) $(patsubst %,$(B)/obj/embed/%.o,$(EMBEDDED))
+$(B)/libserver.a: $(call obj,$(SERVER_LIB_SRC)) $(patsubst %,$(B)/obj/embed/%.o,$(EMBEDDED) three.module.js page)
 	@rm -f $@
 	ar rcs $@ $^
 $(B)/libclient.a: $(call obj,$(CLIENT_LIB_SRC))

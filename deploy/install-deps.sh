@@ -8,7 +8,7 @@
 set -eu
 packages="gcc make pkg-config libc6-dev libembree-dev libopenexr-dev libmicrohttpd-dev libgnutls28-dev libcjson-dev
 libsqlite3-dev libarchive-dev libpng-dev libjpeg62-turbo-dev|libjpeg-dev libtiff-dev libwebp-dev libheif-dev
-liblcms2-dev libmeshoptimizer-dev libcurl4-openssl-dev libseccomp-dev libexpat1-dev libunistring-dev zlib1g-dev
+liblcms2-dev libmeshoptimizer-dev libcurl4-openssl-dev libseccomp-dev libexpat1-dev libunistring-dev zlib1g-dev libjs-three
 curl jq sqlite3 zip zstd ca-certificates"
 fuzz_packages="clang libclang-rt-14-dev|libclang-rt-19-dev|libclang-rt-18-dev"
 coverage_packages="gcovr"

@@ -4,6 +4,7 @@
 
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "common/file.h"
 #include "common/mem.h"
@@ -160,12 +161,12 @@ static enum status put_textures(struct export *e, struct error *err) {
     return status;
 }
 
-static enum status put_mesh(struct export *e, struct error *err) {
+static enum status put_mesh(struct export *e, const char *type, struct error *err) {
     const struct export_input *in = e->input;
     char *path = file_join(e->files.dir, "scene.ply");
     enum status status = mesh_ply_write(path, in->mesh, in->segments, in->atlas, err);
     if (status == STATUS_OK)
-        status = output_files_list(&e->files, EVENT_OUTPUT, "scene.ply", MIME_PLY,
+        status = output_files_list(&e->files, type, "scene.ply", MIME_PLY,
                                    "the mesh with its atlas coordinates s, t and its segments", err);
     mem_free(path);
     return status;
@@ -271,6 +272,10 @@ static enum status put_report(struct export *e, struct error *err) {
     cJSON *report = cJSON_Duplicate(e->input->report, true);
     json_add_string(report, "title", e->input->title);
     json_add(report, "offset", cJSON_CreateDoubleArray(e->input->mesh->offset, 3));
+    vec3 up = e->input->up;
+    bool is_known = up.x != 0.0f || up.y != 0.0f || up.z != 0.0f;
+    double axis[3] = {(double)up.x, is_known ? (double)up.y : 1.0, (double)up.z};
+    json_add(report, "up", cJSON_CreateDoubleArray(axis, 3));
     json_add(report, "segments", segments_json(e->input));
     json_add(report, "files", cJSON_Duplicate(e->files.written, true));
     if (e->files.left_out->child)
@@ -286,10 +291,20 @@ static enum status put_report(struct export *e, struct error *err) {
 
 /* --- entry points ------------------------------------------------------------------------- */
 
+/* The mesh as it is by now, once: what is drawn of the room while the job goes on. Of the texture's charts and the
+ * triangles nothing changes later; segments may be split. */
+static enum status put_early_mesh(struct export *e, struct error *err) {
+    char *path = file_join(e->files.dir, "scene.ply");
+    bool is_there = access(path, F_OK) == 0;
+    mem_free(path);
+    return is_there ? STATUS_OK : put_mesh(e, EVENT_PREVIEW, err);
+}
+
 enum status export_preview(const char *dir, const struct export_input *input, export_announce *announce, void *user,
                            struct error *err) {
     struct export e = {input, {.dir = dir, .announce = announce, .user = user}};
-    return put_previews(&e, err);
+    enum status status = put_early_mesh(&e, err);
+    return status == STATUS_OK ? put_previews(&e, err) : status;
 }
 
 enum status export_outputs(const char *dir, const struct export_input *input, export_announce *announce, void *user,
@@ -301,7 +316,7 @@ enum status export_outputs(const char *dir, const struct export_input *input, ex
     if (status == STATUS_OK)
         status = put_environment(&e, err);
     if (status == STATUS_OK)
-        status = put_mesh(&e, err);
+        status = put_mesh(&e, EVENT_OUTPUT, err);
     if (status == STATUS_OK)
         status = put_formats(&e, err);
     if (status == STATUS_OK)

@@ -42,7 +42,7 @@
 #include "server/export/input.h"
 #include "server/export/output_files.h"
 
-/* Writes what is known by now to preview/ under the folder `dir`, which exists. Needs no report and no comparisons. */
+/* Writes what is known by now to preview/ under the folder `dir`, which exists, and scene.ply if it is not there. Needs no report and no comparisons. */
 enum status export_preview(const char *dir, const struct export_input *input, export_announce *announce, void *user,
                            struct error *err);
 

@@ -7,8 +7,14 @@
 extern const unsigned char embedded_openapi_json[];
 extern const size_t embedded_openapi_json_size; /* bytes; not NUL-terminated */
 
-/* The web page: server/web/. */
-extern const unsigned char embedded_index_html[], embedded_page_css[], embedded_page_js[];
-extern const size_t embedded_index_html_size, embedded_page_css_size, embedded_page_js_size;
+/* The web page: index.html, and the files that it loads, by name; the last has the name NULL. */
+extern const unsigned char embedded_index_html[];
+extern const size_t embedded_index_html_size;
+struct embedded_file {
+    const char *name;
+    const unsigned char *bytes;
+    const size_t *size;
+};
+extern const struct embedded_file embedded_page[];
 
 #endif

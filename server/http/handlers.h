@@ -5,10 +5,11 @@
 #include "server/http/api.h"
 #include "server/transport/message.h"
 
+/* page.c */
+struct response *page_file(struct api *api, struct request *r);
+
 /* system.c */
 struct response *system_root(struct api *api, struct request *r);
-struct response *system_page_css(struct api *api, struct request *r);
-struct response *system_page_js(struct api *api, struct request *r);
 struct response *system_healthz(struct api *api, struct request *r);
 struct response *system_readyz(struct api *api, struct request *r);
 struct response *system_metrics(struct api *api, struct request *r);

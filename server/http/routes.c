@@ -18,8 +18,7 @@
 
 static const struct route table[] = {
     {METHOD_GET, "/", ROUTE_PUBLIC, system_root, 0, PACE_AT_ONCE, ""},
-    {METHOD_GET, "/page.css", ROUTE_PUBLIC, system_page_css, 0, PACE_AT_ONCE, ""},
-    {METHOD_GET, "/page.js", ROUTE_PUBLIC, system_page_js, 0, PACE_AT_ONCE, ""},
+    {METHOD_GET, "/web/{name}", ROUTE_PUBLIC, page_file, 0, PACE_AT_ONCE, ""},
     {METHOD_GET, "/healthz", ROUTE_PUBLIC, system_healthz, 0, PACE_AT_ONCE, ""},
     {METHOD_GET, "/readyz", ROUTE_PUBLIC, system_readyz, 0, PACE_SLOW, ""},
     {METHOD_GET, "/metrics", ROUTE_VIEWER, system_metrics, 0, PACE_QUICK, ""},

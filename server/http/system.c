@@ -1,4 +1,4 @@
-/* system.c -- the web page, health, metrics, version, settings, API description. */
+/* system.c -- the root, health, metrics, version, settings, API description. */
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
@@ -12,40 +12,18 @@
 #include "server/http/embedded.h"
 #include "server/http/handlers.h"
 #include "server/http/limits.h"
+#include "server/http/page.h"
 #include "server/http/readiness.h"
 #include "server/net/field.h"
 #include "server/transport/listener.h"
 #include "server/transport/problem.h"
-
-/* --- the web page -------------------------------------------------------------------------- */
-
-/* A file of the web page. It may only load from this origin and cannot be framed. */
-static struct response *page_part(const char *content_type, const void *text, size_t length) {
-    struct response *reply = response_static(content_type, text, length);
-    response_field(reply, "Content-Security-Policy",
-                   "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:;"
-                   " connect-src 'self'; form-action 'self'; frame-ancestors 'none'; base-uri 'none'");
-    response_field(reply, "Referrer-Policy", "no-referrer");
-    response_field(reply, "Cache-Control", "no-cache");
-    return reply;
-}
-
-struct response *system_page_css(struct api *api, struct request *r) {
-    (void)api, (void)r;
-    return page_part("text/css; charset=utf-8", embedded_page_css, embedded_page_css_size);
-}
-
-struct response *system_page_js(struct api *api, struct request *r) {
-    (void)api, (void)r;
-    return page_part("text/javascript; charset=utf-8", embedded_page_js, embedded_page_js_size);
-}
 
 /* The web page for browsers (Accept names text/html); links for others. */
 struct response *system_root(struct api *api, struct request *r) {
     (void)api;
     const char *accept = request_field(r, "Accept");
     if (accept && field_accepts(accept, "text/html")) {
-        struct response *page = page_part("text/html; charset=utf-8", embedded_index_html, embedded_index_html_size);
+        struct response *page = page_index();
         response_field(page, "Vary", "Accept");
         return page;
     }

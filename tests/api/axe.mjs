@@ -10,7 +10,7 @@ const puppeteer = require("puppeteer-core");
 const axe = require("axe-core");
 
 const browser = await puppeteer.launch({
-  executablePath: chromium, headless: true, args: ["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"],
+  executablePath: chromium, headless: true, args: ["--no-sandbox", "--disable-dev-shm-usage", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
 });
 let faults = 0;
 
@@ -52,8 +52,9 @@ async function pretend(page) {
 // checked again.
 async function checkARoom(page, scheme) {
   await pretend(page);
+  await page.$eval("#new", (details) => { details.open = true; });
   await (await page.$("#archive")).uploadFile(`${room}-${scheme}.tar`);
-  await page.$eval("#submit button", (button) => button.click());
+  await page.$eval("#submit-button", (button) => button.click());
   await page.waitForSelector("#check-pictures img[src]", { visible: true });
   await page.waitForFunction(() => document.getElementById("start-button").textContent === "Start all the same");
   await look(page, `check-${scheme}`);
@@ -72,15 +73,37 @@ async function checkARoom(page, scheme) {
 // What can be done with a job that runs: its button outlives the job's events.
 async function holdAnAction(page, scheme) {
   await page.$eval("#jobs tr:first-child button", (button) => button.click());
-  await page.waitForFunction(() => document.querySelector("#actions button")?.textContent === "pause");
+  await page.waitForFunction(() => document.querySelector("#job .actions button")?.textContent === "pause");
   await page.evaluate(() => {
-    window.held = document.querySelector("#actions button");
+    window.held = document.querySelector("#job .actions button");
     window.held.focus();
-    window.before = document.getElementById("job-progress").value;
+    window.before = document.querySelector("#job .job-progress").value;
   });
-  await page.waitForFunction(() => document.getElementById("job-progress").value !== window.before);
+  await page.waitForFunction(() => document.querySelector("#job .job-progress").value !== window.before);
   if (!(await page.evaluate(() => document.activeElement === window.held)))
     console.log(`job-${scheme}: the focus is lost`, ++faults);
+}
+
+// The room in three dimensions is drawn, its segments are picked by the mouse, and the slider moves.
+async function lookIntoTheRoom(page, scheme) {
+  await page.waitForFunction(() => document.querySelectorAll("#job .room-segment option").length > 1);
+  await page.$eval("#job .room-canvas", (canvas) => canvas.scrollIntoView({ block: "center" }));
+  await new Promise((done) => setTimeout(done, 300));
+  const box = await (await page.$("#job .room-canvas")).boundingBox();
+  await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
+  const values = await page.waitForFunction(() => document.querySelector("#job .room-values")?.textContent || false)
+    .then((handle) => handle.jsonValue());
+  if (!/roughness\d/.test(values)) console.log(`job-${scheme}: a segment's values are ${values}`, ++faults);
+  await page.click("#job .room-lamp");
+  const correct = await page.$eval("#job .room-correct", (button) => button.hidden ? "" : button.textContent);
+  if (!correct.includes("1 correction")) console.log(`job-${scheme}: the correction is not offered`, ++faults);
+  const drawn = () => page.$eval("#job .compare canvas", (canvas) => canvas.toDataURL());
+  const before = await drawn();
+  await page.$eval("#job .compare input", (range) => {
+    range.value = 90;
+    range.dispatchEvent(new Event("input"));
+  });
+  if ((await drawn()) === before) console.log(`job-${scheme}: the slider does nothing`, ++faults);
 }
 
 async function lookAtAll(scheme) {
@@ -107,17 +130,20 @@ async function lookAtAll(scheme) {
   if (!(await page.evaluate(() => document.activeElement === window.held && window.held.isConnected)))
     console.log(`list-${scheme}: the focus is lost`, ++faults);
   await page.$eval("#jobs tr:last-child button", (button) => button.click()); // the first job, which is done
-  await page.waitForSelector("#pictures img[src]");
+  await page.waitForSelector("#job .pictures img[src]");
+  await lookIntoTheRoom(page, scheme);
   // Not by the mouse: pictures that arrive move what is below them while it aims.
-  for (const summary of ["#job details:first-of-type summary", "#log-details summary"])
+  for (const summary of ["#job .files-details summary", "#job .log-details summary"])
     await page.$eval(summary, (element) => element.click());
-  await page.waitForFunction(() => document.querySelectorAll("#files a").length > 5);
+  await page.waitForFunction(() => document.querySelectorAll("#job .files a").length > 5);
   await new Promise((done) => setTimeout(done, 500));
   await look(page, `job-${scheme}`);
   await holdAnAction(page, scheme);
   await checkARoom(page, scheme);
-  await page.setViewport({ width: 420, height: 800 });
+  await page.setViewport({ width: 390, height: 800 });
   await look(page, `job-narrow-${scheme}`);
+  if (await page.evaluate(() => document.documentElement.scrollWidth > window.innerWidth))
+    console.log(`job-narrow-${scheme}: wider than the window`, ++faults);
   await page.goto(`file://${report}`);
   await look(page, `report-narrow-${scheme}`);
   await page.setViewport({ width: 1200, height: 900 });

@@ -23,17 +23,26 @@ grep -q 'unbaked .*libmicrohttpd .*sqlite .*embree .*libarchive' "$work/log" || 
 call GET /healthz; expect 200
 call GET /readyz; expect 200; equal "$(field .status)" ready
 call HEAD /; expect 200; equal "$(header content-type)" application/json
-# The web page: for browsers only, and running nothing but its own script.
+# The web page: for browsers only, and running nothing but its own scripts.
 call GET / -H 'Accept: text/html,*/*;q=0.8'; expect 200; equal "$(header content-type)" "text/html; charset=utf-8"
-for part in page.css page.js; do
+for part in web/page.css web/page.js; do
     grep -qF "\"$part\"" "$work/body" || fail "the page does not name $part"
 done
 cmp -s "$work/body" server/web/index.html || fail "the page is not the file"
 header content-security-policy | grep -q "default-src 'none'; script-src 'self'" || fail "the page may run anything"
-call GET /page.js; expect 200; cmp -s "$work/body" server/web/page.js || fail "the script is not the file"
-grep -qE 'innerHTML|insertAdjacentHTML|document\.write|eval\(' "$work/body" && fail "the script takes texts for markup"
-[ -z "$(command -v node)" ] || { cp "$work/body" "$work/page.mjs"; node --check "$work/page.mjs" || fail "the script is no JavaScript"; }
-for id in $(grep -o '\$("[a-z-]*")' server/web/page.js | tr -d '$()"' | sort -u); do
+for file in server/web/*.css server/web/*.js; do
+    call GET "/web/${file##*/}"; expect 200; cmp -s "$work/body" "$file" || fail "/web/${file##*/} is not $file"
+    case $file in *.js)
+        grep -nE 'innerHTML|insertAdjacentHTML|document\.write|eval\(' "$file" && fail "$file takes texts for markup"
+        [ -z "$(command -v node)" ] || { cp "$file" "$work/page.mjs"; node --check "$work/page.mjs" || fail "$file is no JavaScript"; }
+        for module in $(sed -nE 's|.*(from\|import\() ?"\./([a-z_.]*)".*|\2|p' "$file"); do
+            [ "$module" = three.module.js ] || [ -f "server/web/$module" ] || fail "$file imports $module, which is not there"
+        done
+    esac
+done
+call GET /web/three.module.js; expect 200; cmp -s "$work/body" /usr/share/javascript/three/three.module.js || fail "three.js is another"
+call GET /web/none.js; expect 404
+for id in $(cat server/web/*.js | grep -o '\$("[a-z-]*")' | tr -d '$()"' | sort -u); do
     grep -q "id=\"$id\"" server/web/index.html || fail "the page has no $id"
 done
 call GET /v1/version; equal "$(field .libraries.sqlite)" "$(sed -n 's/^sqlite //p' "$work/out")"

@@ -373,7 +373,9 @@ int main(void) {
 
     struct announced heard = {.dir = dir};
     CHECK(export_preview(dir, &in, hear, &heard, &err) == STATUS_OK);
-    CHECK(heard.previews == 4 && heard.outputs == 0); /* no confidence yet */
+    CHECK(heard.previews == 5 && heard.outputs == 0); /* with the mesh, no confidence yet */
+    heard = (struct announced){.dir = dir};
+    CHECK(export_preview(dir, &in, hear, &heard, &err) == STATUS_OK && heard.previews == 4); /* the mesh is there */
     in.confidence_count = count, in.confidence_spread = spread;
     heard = (struct announced){.dir = dir};
     enum status status = export_outputs(dir, &in, hear, &heard, &err);
