@@ -285,10 +285,12 @@ SHARE = $(DESTDIR)$(PREFIX)/share
 BASH_COMPLETIONS ?= $(PREFIX)/share/bash-completion/completions
 ZSH_COMPLETIONS ?= $(PREFIX)/share/zsh/site-functions
 install: all $(MANUALS) $(COMPLETIONS) ## install under PREFIX (/usr/local)
-	install -d $(DESTDIR)$(PREFIX)/bin $(SHARE)/unbake $(SHARE)/man/man1 $(SHARE)/man/man5 $(SHARE)/man/man8 \
+	install -d $(DESTDIR)$(PREFIX)/bin $(SHARE)/unbake/executors.d $(SHARE)/man/man1 $(SHARE)/man/man5 $(SHARE)/man/man8 \
 	    $(DESTDIR)$(BASH_COMPLETIONS) $(DESTDIR)$(ZSH_COMPLETIONS)
 	install -m 755 $(B)/unbaked $(B)/unbake $(DESTDIR)$(PREFIX)/bin
 	install -m 644 config/unbaked.conf $(SHARE)/unbake/unbaked.conf
+	install -m 644 config/executors.d/*.conf $(SHARE)/unbake/executors.d
+	install -m 755 config/executors.d/ssh-hosts $(SHARE)/unbake/executors.d
 	install -m 644 $(B)/man/unbake.1 $(SHARE)/man/man1
 	install -m 644 $(B)/man/unbaked.conf.5 $(SHARE)/man/man5
 	install -m 644 $(B)/man/unbaked.8 $(SHARE)/man/man8

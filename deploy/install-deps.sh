@@ -5,6 +5,7 @@
 # install-deps.sh bench: also what the benches against Mitsuba 3 need (Mitsuba itself comes from
 # PyPI, see tests/bench/run.sh). They can do without: where these packages are not to be had, that
 # is said and the exit status is still 0.
+# install-deps.sh slurm: a Slurm for tests/chaos/test_slurm.sh, which starts daemons of its own and leaves the system's alone.
 set -eu
 packages="gcc make pkg-config libc6-dev libembree-dev libopenexr-dev libmicrohttpd-dev libgnutls28-dev libcjson-dev
 libsqlite3-dev libarchive-dev libpng-dev libjpeg62-turbo-dev|libjpeg-dev libtiff-dev libwebp-dev libheif-dev
@@ -15,6 +16,7 @@ coverage_packages="gcovr"
 portable_packages="mmdebstrap"
 format_packages="clang-format-14|clang-format"
 room_packages="libllvm19 python3-venv sweethome3d-furniture"
+slurm_packages="slurmctld slurmd slurm-client munge"
 bench_packages="libllvm19 python3-venv"
 
 is_installed() {
@@ -81,6 +83,7 @@ coverage) install $coverage_packages ;;
 portable) install $portable_packages ;;
 format) install $format_packages ;;
 rooms) install $room_packages ;;
+slurm) install $slurm_packages ;;
 esac
 if [ "${1:-}" = bench ]; then
     # shellcheck disable=SC2086

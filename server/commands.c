@@ -9,6 +9,7 @@
 #include "server/demo/demo_command.h"
 #include "server/evaluate/evaluate_command.h"
 #include "server/evaluate/relight_command.h"
+#include "server/executor/executor_command.h"
 #include "server/node/node_command.h"
 #include "server/worker/worker.h"
 
@@ -30,6 +31,12 @@ static const struct server_command table[] = {
      "Looks at libraries, limits, permissions, the disk and what the kernel offers for the sandbox.\n"
      "Ends with 1 when something keeps the daemon from working.\n",
      "  unbaked doctor --config /etc/unbaked.conf\n", doctor_flags, doctor_command},
+    {"executor", "list|test NAME", "list where jobs run, or try a cluster's scheduler",
+     "`executor test` submits a job of some seconds by the commands of NAME.conf in executors_dir, says each\n"
+     "step and what it took, and cancels a second one. NAME need not be used by the daemon yet. With `shared`\n"
+     "in the file, also whether the nodes have the same version, and their clocks the same time. (`executor\n"
+     "probe` is what that job runs.)\n",
+     "  unbaked executor test slurm\n", executor_flags, executor_command},
     {"usage", "", "print the CPU hours of users' jobs by month, as CSV",
      "A line for each month (UTC) and user: month, user, cpu_hours. The user is empty for jobs that were\n"
      "submitted without a token. Time counts in the month in which it was entered: when an attempt ended, or\n"

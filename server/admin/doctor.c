@@ -24,6 +24,8 @@
 #include "server/admin/admin.h"
 #include "server/admin/commands.h"
 #include "server/data/layout.h"
+#include "server/executor/executor_command.h"
+#include "server/executor/sites.h"
 #include "server/libraries.h"
 #include "server/net/tls.h"
 #include "server/worker/sandbox.h"
@@ -251,6 +253,22 @@ static void check_tls(struct doctor *d) {
         tell(d, WARN, "tls", "everybody here can read the key: chmod o= %s", c->tls_key);
 }
 
+static void tell_executor(void *user, bool is_good, const char *text) {
+    tell(user, is_good ? GOOD : WARN, "executor", "%s", text);
+}
+
+static void check_executors(struct doctor *d) {
+    struct sites sites;
+    struct buf none;
+    buf_init(&none, 1 << 16);
+    sites_read(&sites, d->config->executors, d->config->executors_dir, &none); /* was checked with the rest */
+    for (size_t i = 0; i < sites.count; i++)
+        if (!sites.place[i].is_process)
+            executor_examine(&sites.place[i].site, tell_executor, d);
+    sites_release(&sites);
+    buf_release(&none);
+}
+
 int doctor_command(int argc, char **argv) {
     struct invocation in;
     struct error err;
@@ -273,6 +291,7 @@ int doctor_command(int argc, char **argv) {
         check_tls(d);
         check_tokens(d, runs);
         check_disk(d);
+        check_executors(d);
         code = d->bad_count > 0;
     }
     invocation_release(&in);

@@ -40,7 +40,7 @@ start=$(sed -n 's/^ExecStart=\([^ ]*\).*/\1/p' deploy/unbaked.service)
 "$work/root$start" check-config config/unbaked.conf >/dev/null || fail "what is installed does not run"
 (cd "$work/root" && find . -type f | sed 's|^\./||') | grep -v '^usr/share/unbake/' | sort >"$work/installed"
 while read -r file; do
-    grep -qE "^${file%\*}(/|\$)" "$work/installed" || [ "$file" = etc/unbaked.conf ] || fail "a package takes $file, which is not installed"
+    grep -qE "^${file%\*}(/|\$)" "$work/installed" || [[ $file = etc/* ]] || fail "a package takes $file, which is not installed"
 done < <(cat deploy/debian/*.install)
 while read -r file; do
     cat deploy/debian/*.install | while read -r taken; do

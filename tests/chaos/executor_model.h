@@ -1,4 +1,4 @@
-/* remote_model.h -- a cluster that misbehaves, in virtual time, and the model that says what must hold all the same.
+/* executor_model.h -- a cluster that misbehaves, in virtual time, and the model that says what must hold all the same.
  *
  * The real executor (server/executor) and the real store work for a scheduler whose commands time out, lie, repeat ids,
  * lose replies and answer late; whose nodes die, are cut off, are started twice; under a daemon that dies at any moment.
@@ -9,8 +9,8 @@
  * 3. Lines are heard in their order, none is missing of an attempt whose node has ended it, and one is heard again only
  *    after the daemon died.
  * 4. When the faults stop, every job comes to an end. */
-#ifndef UNBAKE_TESTS_REMOTE_MODEL_H
-#define UNBAKE_TESTS_REMOTE_MODEL_H
+#ifndef UNBAKE_TESTS_EXECUTOR_MODEL_H
+#define UNBAKE_TESTS_EXECUTOR_MODEL_H
 
 #include <math.h>
 #include <string.h>
