@@ -260,6 +260,8 @@ static bool drive(struct request_try *a, CURLcode *result) {
             curl_easy_getinfo(r->easy, CURLINFO_SIZE_UPLOAD_T, &sent);
             a->call->tick(a->call->user, (double)sent);
         }
+        if (a->call->go_on && !a->call->go_on(a->call->user))
+            return false;
         if (running)
             curl_multi_poll(r->multi, &also, r->signal_fd >= 0 ? 1 : 0, TICK_MS, NULL);
     }

@@ -75,6 +75,8 @@ struct request_call {
     bool (*sink)(void *user, const struct reply *reply, const char *bytes, size_t length);
     /* Called a few times a second during the request, with the bytes sent so far. */
     void (*tick)(void *user, double sent);
+    /* Asked as often; false ends the request with STATUS_CANCELLED. */
+    bool (*go_on)(void *user);
     void *user;
 
     double silence_sec; /* the connection is dead after this long without traffic; 0: 300 s */

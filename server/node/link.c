@@ -21,7 +21,7 @@
 #define IDLE_REPORT_SEC 5.0
 #define REPORTS_A_LEASE 10.0
 #define REPORT_BYTES ((size_t)256 << 10) /* of lines; JSON may double them, and a body has at most 1 MiB */
-#define SILENCE_SEC 10.0                 /* a report without an answer for so long is sent again */
+#define SILENCE_SEC 10.0                 /* a report without an answer for so long, or half a lease, is sent again */
 #define PAUSE_FIRST_SEC 0.5
 #define PAUSE_MAX_SEC 5.0
 #define BEAT_SEC 0.2
@@ -119,7 +119,7 @@ static enum status post(struct attempt_link *l, const char *what, const cJSON *b
                                       .path = path,
                                       .header = {l->claimant},
                                       .body = body,
-                                      .silence_sec = SILENCE_SEC,
+                                      .silence_sec = fmax(1.0, fmin(SILENCE_SEC, l->lease_sec / 2.0)),
                                       .once = true};
     *sent = clock_sec();
     enum status status = link_whole(l, request_run(l->control, &call, reply, err), reply, member, err);

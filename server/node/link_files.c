@@ -31,6 +31,8 @@ static void tick(void *user, double sent) {
     t->link->beat(t->link->user);
 }
 
+static bool is_open(void *user) { return link_state(((struct transfer *)user)->link) == LINK_OPEN; }
+
 static char *path_of(const struct attempt_link *l, const char *what, const char *name, const char *query) {
     struct buf path;
     buf_init(&path, 1 << 20);
@@ -51,6 +53,7 @@ static enum status run(struct attempt_link *l, struct request_call *call, struct
     enum status status;
     call->header[0] = l->claimant;
     call->tick = tick;
+    call->go_on = is_open; /* once the lease is over nothing is written any more */
     call->user = t;
     call->once = true;
     for (int tries = 0;; tries++) {
