@@ -14,8 +14,8 @@ struct encoder {
     exr_result_t (*compress)(exr_encode_pipeline_t *); /* the library's */
 };
 
-static exr_result_t write_header(exr_context_t context, const struct image *image, enum image_exr_type type,
-                                 bool tiled) {
+static exr_result_t write_header(exr_context_t context, const struct image *image, enum image_exr_type type, bool tiled,
+                                 const char *note) {
     /* ITU-R BT.709: red, green, blue, white. */
     static const exr_attr_chromaticities_t rec709 = {0.64f, 0.33f, 0.30f, 0.60f, 0.15f, 0.06f, 0.3127f, 0.3290f};
     int part = 0;
@@ -28,6 +28,8 @@ static exr_result_t write_header(exr_context_t context, const struct image *imag
     if (code == EXR_ERR_SUCCESS && image_channel(image, "R") >= 0 && image_channel(image, "G") >= 0 &&
         image_channel(image, "B") >= 0)
         code = exr_attr_set_chromaticities(context, part, "chromaticities", &rec709);
+    if (code == EXR_ERR_SUCCESS && note)
+        code = exr_attr_set_string(context, part, "comments", note);
     for (uint32_t c = 0; code == EXR_ERR_SUCCESS && c < image->channel_count; c++)
         code = exr_add_channel(context, part, image->channel[c], type == IMAGE_HALF ? EXR_PIXEL_HALF : EXR_PIXEL_FLOAT,
                                EXR_PERCEPTUALLY_LOGARITHMIC, 1, 1);
@@ -98,6 +100,11 @@ static exr_result_t write_chunks(exr_context_t context, const struct image *imag
 
 enum status image_write_exr(const char *path, const struct image *image, enum image_exr_type type, bool tiled,
                             struct error *err) {
+    return image_write_exr_noted(path, image, type, tiled, NULL, err);
+}
+
+enum status image_write_exr_noted(const char *path, const struct image *image, enum image_exr_type type, bool tiled,
+                                  const char *note, struct error *err) {
     struct exr_stream stream = {.fd = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666)};
     if (stream.fd < 0)
         return error_set_errno(err, errno, "cannot create %s", path);
@@ -105,7 +112,7 @@ enum status image_write_exr(const char *path, const struct image *image, enum im
     exr_context_t context;
     exr_result_t code = exr_start_write(&context, path, EXR_WRITE_FILE_DIRECTLY, &init);
     if (code == EXR_ERR_SUCCESS) {
-        code = write_header(context, image, type, tiled);
+        code = write_header(context, image, type, tiled, note);
         if (code == EXR_ERR_SUCCESS)
             code = write_chunks(context, image, tiled);
         exr_result_t finish = exr_finish(&context); /* writes the table of chunks */

@@ -37,6 +37,14 @@ void image_take_rgb(const struct image *from, struct image *image) {
         memcpy(image->pixel + 3 * i, from->pixel + from->channel_count * i, 3 * sizeof *image->pixel);
 }
 
+void image_copy(const struct image *from, struct image *image) {
+    const char *names[IMAGE_MAX_CHANNELS];
+    for (uint32_t c = 0; c < from->channel_count; c++)
+        names[c] = from->channel[c];
+    image_init(image, from->width, from->height, from->channel_count, names);
+    memcpy(image->pixel, from->pixel, (size_t)from->width * from->height * from->channel_count * sizeof *image->pixel);
+}
+
 void image_release(struct image *image) {
     mem_free(image->channel);
     mem_free(image->pixel);

@@ -74,6 +74,7 @@ void image_init(struct image *image, uint32_t width, uint32_t height, uint32_t c
 void image_init_rgb(struct image *image, uint32_t width, uint32_t height); /* channels R G B */
 /* The first three channels of `from`, which must be R G B, as a new picture. */
 void image_take_rgb(const struct image *from, struct image *image);
+void image_copy(const struct image *from, struct image *image); /* all but clipped */
 void image_release(struct image *image);
 
 /* Turns a picture as EXIF's orientation (1 to 8; others: not) says. */
@@ -143,6 +144,10 @@ enum image_exr_type { IMAGE_HALF, IMAGE_FLOAT };
  * give the same bytes. Overwrites `path` in place: callers that need atomicity write a temporary name. */
 enum status image_write_exr(const char *path, const struct image *image, enum image_exr_type type, bool tiled,
                             struct error *err);
+
+/* The same with a text in the header's attribute `comments`; NULL: none. */
+enum status image_write_exr_noted(const char *path, const struct image *image, enum image_exr_type type, bool tiled,
+                                  const char *note, struct error *err);
 
 /* Writes an 8-bit sRGB PNG of the first three channels (or the one there is, as grey), values
  * times `scale`, clamped to [0, 1], converted from linear. Non-finite values become magenta. */

@@ -8,9 +8,9 @@
 #include "server/check/check_command.h"
 #include "server/demo/demo_command.h"
 #include "server/evaluate/evaluate_command.h"
-#include "server/evaluate/relight_command.h"
 #include "server/executor/executor_command.h"
 #include "server/node/node_command.h"
+#include "server/relight/relight_command.h"
 #include "server/worker/worker.h"
 
 static const struct server_command table[] = {

@@ -77,6 +77,11 @@ forbid "server/job server/store server/data server/http" 'server/executor/' 'onl
 forbid server/worker 'server/(http|events|transport|net|uploads|job)/|server/data/[^l]|server/store/(store|internal)' \
     "the worker never sees the daemon's memory"
 
+# Renders read outputs, as they read anything else, and share with export how pictures look.
+forbid "$(for folder in $engine_order ingest export check; do echo "server/$folder"; done)" 'server/relight/' \
+    'only the worker and the tools see relight'
+forbid server/relight "server/(capture|gather|state|material|light|refine|reconstruct|check|$daemon|worker)/" \
+    'relight sees scene, render, ingest and export'
 forbid "server/demo server/evaluate" "server/($daemon|worker)/" 'tools know only the engine'
 forbid server/demo 'server/(ingest|capture|gather|state|material|light|refine|reconstruct|export|evaluate)/' 'demo sees only render and scene'
 forbid "$(ls -d server/*/ | grep -vE 'demo|evaluate|worker' | tr '\n' ' ')" 'server/(demo|evaluate)/' \

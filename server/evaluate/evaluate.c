@@ -10,7 +10,7 @@
 #include "common/quantile.h"
 #include "server/capture/orient.h"
 #include "server/evaluate/pair_picture.h"
-#include "server/evaluate/recovered.h"
+#include "server/relight/recovered.h"
 #include "server/evaluate/seen.h"
 #include "server/ingest/bundle.h"
 #include "server/ingest/pixels.h"

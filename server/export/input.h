@@ -34,6 +34,13 @@ struct export_sun {
     rgb irradiance;   /* of a surface that faces it */
 };
 
+/* Where a photograph was taken from. */
+struct export_camera {
+    const char *name; /* the photograph's */
+    const struct camera *camera;
+    bool is_held_out;
+};
+
 /* All borrowed. */
 struct export_input {
     const char *title; /* the job's or the scene's name */
@@ -59,6 +66,8 @@ struct export_input {
     bool has_materials;            /* false: materials are only their neutral start, which no preview shows */
     const uint16_t (*radiance)[3]; /* [height][width] measured light, half precision; NULL while not known */
     struct export_sun sun;
+    size_t camera_count;
+    const struct export_camera *camera; /* of all photographs */
 };
 
 #endif

@@ -207,14 +207,26 @@ static enum status put_formats(struct export *e, struct error *err) {
 
 /* --- held-out views -------------------------------------------------------------------------- */
 
-static enum status put_views(struct export *e, struct error *err) {
-    cJSON *views = views_json(e->input->comparison, e->input->comparison_count, e->input->mesh->offset);
-    char *text = json_page(views);
-    enum status status = output_files_bytes(&e->files, "views.json", MIME_JSON, text, strlen(text),
-                                            "the cameras of the held-out views, as transforms.json has them", err);
+/* Takes the tree. */
+static enum status put_json(struct export *e, const char *name, cJSON *tree, const char *about, struct error *err) {
+    char *text = json_page(tree);
+    enum status status = output_files_bytes(&e->files, name, MIME_JSON, text, strlen(text), about, err);
     mem_free(text);
-    cJSON_Delete(views);
+    cJSON_Delete(tree);
     return status;
+}
+
+static enum status put_views(struct export *e, struct error *err) {
+    return put_json(e, "views.json",
+                    views_json(e->input->comparison, e->input->comparison_count, e->input->mesh->offset),
+                    "the cameras of the held-out views, as transforms.json has them", err);
+}
+
+static enum status put_cameras(struct export *e, struct error *err) {
+    if (e->input->camera_count == 0)
+        return STATUS_OK;
+    return put_json(e, "cameras.json", cameras_json(e->input),
+                    "the cameras of all photographs, corrected, as transforms.json has them", err);
 }
 
 static void comparison_file(char name[64], size_t i) { snprintf(name, 64, "compare/%03zu.png", i); }
@@ -321,6 +333,8 @@ enum status export_outputs(const char *dir, const struct export_input *input, ex
         status = put_formats(&e, err);
     if (status == STATUS_OK)
         status = put_comparisons(&e, err);
+    if (status == STATUS_OK)
+        status = put_cameras(&e, err);
     if (status == STATUS_OK)
         status = put_report(&e, err);
     cJSON_Delete(e.files.left_out);

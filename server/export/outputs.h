@@ -26,6 +26,7 @@
  *   scene.usda scene.usdz   the room as OpenUSD, with lights and cameras (usd.h)
  *   compare/NNN.png  a held-out photograph | its re-render | their difference
  *   views.json       the cameras of these (views_json.h)
+ *   cameras.json     the cameras of all photographs
  *   report.json      every setting, version, stage time and metric
  *   report.html      the same for the eye; needs no other file and no network
  *

@@ -11,11 +11,14 @@ static void add_lens(cJSON *frame, const struct camera *camera) {
         [CAMERA_THIN_PRISM_FISHEYE] = "THIN_PRISM_FISHEYE",
         [CAMERA_FOV] = "FOV",
         [CAMERA_DIVISION] = "DIVISION",
+        [CAMERA_PANORAMA] = "EQUIRECTANGULAR",
     };
     bool has_octic = camera->k8 != 0.0f; /* then there is no denominator: k4 is nerfstudio's */
     json_add_string(frame, "camera_model", has_octic ? "OPENCV" : name[camera->model]);
     json_add_int(frame, "w", camera->width);
     json_add_int(frame, "h", camera->height);
+    if (camera->model == CAMERA_PANORAMA)
+        return;
     json_add_number(frame, "fl_x", (double)camera->fx);
     json_add_number(frame, "fl_y", (double)camera->fy);
     json_add_number(frame, "cx", (double)camera->cx);
@@ -41,15 +44,27 @@ static void add_lens(cJSON *frame, const struct camera *camera) {
     }
 }
 
+cJSON *views_json_frame(const char *name, const char *split, const struct camera *camera, const double offset[3]) {
+    cJSON *frame = cJSON_CreateObject();
+    json_add_string(frame, "file_path", name);
+    if (split)
+        json_add_string(frame, "split", split);
+    add_lens(frame, camera);
+    json_add(frame, "transform_matrix", camera_transform_matrix(camera, offset));
+    return frame;
+}
+
 cJSON *views_json(const struct export_comparison *comparison, size_t count, const double offset[3]) {
     cJSON *root = cJSON_CreateObject(), *frames = cJSON_AddArrayToObject(root, "frames");
-    for (size_t i = 0; i < count; i++) {
-        cJSON *frame = cJSON_CreateObject();
-        json_add_string(frame, "file_path", comparison[i].name);
-        json_add_string(frame, "split", "test");
-        add_lens(frame, comparison[i].camera);
-        json_add(frame, "transform_matrix", camera_transform_matrix(comparison[i].camera, offset));
-        cJSON_AddItemToArray(frames, frame);
-    }
+    for (size_t i = 0; i < count; i++)
+        cJSON_AddItemToArray(frames, views_json_frame(comparison[i].name, "test", comparison[i].camera, offset));
+    return root;
+}
+
+cJSON *cameras_json(const struct export_input *in) {
+    cJSON *root = cJSON_CreateObject(), *frames = cJSON_AddArrayToObject(root, "frames");
+    for (size_t i = 0; i < in->camera_count; i++)
+        cJSON_AddItemToArray(frames, views_json_frame(in->camera[i].name, in->camera[i].is_held_out ? "test" : "train",
+                                                      in->camera[i].camera, in->mesh->offset));
     return root;
 }

@@ -7,33 +7,11 @@
 #ifndef UNBAKE_RELIGHT_RELIGHT_H
 #define UNBAKE_RELIGHT_RELIGHT_H
 
-#include <stdbool.h>
 #include <stdint.h>
 
 #include "common/error.h"
 #include "common/parallel.h"
-#include "common/render_settings.h"
-
-struct denoiser; /* denoise.h */
-
-struct relight_job {
-    const char *outputs;             /* folder of a reconstruction's outputs */
-    const char *files;               /* folder of the files that settings name; NULL: they are paths */
-    const cJSON *settings;           /* that render_settings_check found good */
-    const char *out;                 /* an existing folder */
-    uint64_t first_view, view_count; /* a part: which of the pictures; view_count 0: all from the first */
-    const struct denoiser *denoiser; /* for denoise=true; NULL: there is none, which is STATUS_UNAVAILABLE then */
-};
-
-/* Callbacks; each may be NULL. They are called by the thread that called relight_run. */
-struct relight_watch {
-    void *user;
-    bool (*should_stop)(void *user);                         /* then STATUS_CANCELLED */
-    void (*progress)(void *user, double done, double total); /* pictures */
-    void (*file)(void *user, const char *name);              /* a file is complete, in `out` */
-    void (*preview)(void *user, const char *name);           /* the same of a PNG that will become better */
-    void (*message)(void *user, const char *text);           /* something that the user should know */
-};
+#include "server/relight/relight_job.h"
 
 /* STATUS_INPUT for settings that do not fit this room (a segment that is not there; nothing that shines). */
 enum status relight_run(const struct relight_job *job, const struct relight_watch *watch, struct parallel *pool,

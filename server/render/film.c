@@ -2,9 +2,11 @@
 #include "server/render/film.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "common/mem.h"
 #include "server/render/sampler.h"
+#include "server/scene/surface.h"
 
 #define BATCH 1024
 
@@ -13,6 +15,7 @@ struct film {
     const struct camera *camera;
     const struct path_settings *settings;
     uint32_t spp, iteration; /* spp per group */
+    bool has_direct;
     struct image *image;
     struct film_slot *slot;
 };
@@ -24,7 +27,8 @@ struct film_slot {
     struct path_key *key;
     uint32_t *pixel; /* column of each path of the batch */
     rgb *radiance;
-    rgb *sum; /* [width][FILM_GROUPS] */
+    rgb *sum;    /* [width][FILM_GROUPS] */
+    rgb *direct; /* [width] the same over all groups */
 };
 
 static void trace(struct film *f, struct film_slot *s, size_t count) {
@@ -33,6 +37,9 @@ static void trace(struct film *f, struct film_slot *s, size_t count) {
         rgb *sum = &s->sum[s->pixel[i] * FILM_GROUPS + s->key[i].iteration % FILM_GROUPS];
         *sum = rgb_add(*sum, s->radiance[i]);
     }
+    const rgb *direct = path_batch_direct(s->batch);
+    for (size_t i = 0; i < count && f->has_direct; i++)
+        s->direct[s->pixel[i]] = rgb_add(s->direct[s->pixel[i]], direct[i]);
 }
 
 static void finish_row(const struct film *f, const struct film_slot *s, uint32_t y) {
@@ -49,6 +56,10 @@ static void finish_row(const struct film *f, const struct film_slot *s, uint32_t
             out[c] = (float)mean;
             out[3 + c] = (float)sqrt(fmax(0.0, square - mean * mean) / (FILM_GROUPS - 1));
         }
+        if (f->has_direct) {
+            rgb direct = rgb_scale(s->direct[x], 1.0f / (float)(f->spp * FILM_GROUPS));
+            memcpy(out + 6, &direct, sizeof direct);
+        }
     }
 }
 
@@ -58,6 +69,7 @@ static void render_row(void *user, size_t row, int thread) {
     uint32_t width = f->image->width, y = (uint32_t)row;
     for (uint32_t i = 0; i < width * FILM_GROUPS; i++)
         s->sum[i] = (rgb){0.0f, 0.0f, 0.0f};
+    memset(s->direct, 0, width * sizeof *s->direct);
     vec3 origin = camera_origin(f->camera);
     size_t count = 0;
     for (uint32_t x = 0; x < width; x++) {
@@ -80,11 +92,11 @@ static void render_row(void *user, size_t row, int thread) {
     finish_row(f, s, y);
 }
 
-uint64_t film_render(const struct world *world, const struct camera *camera, uint32_t spp,
-                     const struct path_settings *settings, uint32_t iteration, struct parallel *pool,
-                     struct image *image) {
-    static const char *const names[] = {"R", "G", "B", "err.R", "err.G", "err.B"};
-    image_init(image, camera->width, camera->height, 6, names);
+static uint64_t render(const struct world *world, const struct camera *camera, uint32_t spp,
+                       const struct path_settings *settings, uint32_t iteration, bool has_direct, struct parallel *pool,
+                       struct image *image) {
+    static const char *const names[] = {"R", "G", "B", "err.R", "err.G", "err.B", "direct.R", "direct.G", "direct.B"};
+    image_init(image, camera->width, camera->height, has_direct ? 9 : 6, names);
     int thread_count = parallel_thread_count(pool);
     struct film_slot *slot = mem_calloc((size_t)thread_count, sizeof *slot);
     for (int i = 0; i < thread_count; i++) {
@@ -94,9 +106,10 @@ uint64_t film_render(const struct world *world, const struct camera *camera, uin
         slot[i].pixel = mem_array(BATCH, sizeof *slot[i].pixel);
         slot[i].radiance = mem_array(BATCH, sizeof *slot[i].radiance);
         slot[i].sum = mem_array((size_t)camera->width * FILM_GROUPS, sizeof *slot[i].sum);
+        slot[i].direct = mem_array(camera->width, sizeof *slot[i].direct);
     }
     uint32_t group_spp = (spp + FILM_GROUPS - 1) / FILM_GROUPS;
-    struct film film = {world, camera, settings, group_spp, iteration, image, slot};
+    struct film film = {world, camera, settings, group_spp, iteration, has_direct, image, slot};
     parallel_for(pool, camera->height, render_row, &film);
     uint64_t dropped = 0;
     for (int i = 0; i < thread_count; i++) {
@@ -109,9 +122,22 @@ uint64_t film_render(const struct world *world, const struct camera *camera, uin
         mem_free(slot[i].pixel);
         mem_free(slot[i].radiance);
         mem_free(slot[i].sum);
+        mem_free(slot[i].direct);
     }
     mem_free(slot);
     return dropped;
+}
+
+uint64_t film_render(const struct world *world, const struct camera *camera, uint32_t spp,
+                     const struct path_settings *settings, uint32_t iteration, struct parallel *pool,
+                     struct image *image) {
+    return render(world, camera, spp, settings, iteration, false, pool, image);
+}
+
+uint64_t film_render_direct(const struct world *world, const struct camera *camera, uint32_t spp,
+                            const struct path_settings *settings, uint32_t iteration, struct parallel *pool,
+                            struct image *image) {
+    return render(world, camera, spp, settings, iteration, true, pool, image);
 }
 
 enum {
@@ -123,13 +149,20 @@ enum {
     EMISSION_R,
     EMISSION_G,
     EMISSION_B,
+    NORMAL_X,
+    NORMAL_Y,
+    NORMAL_Z,
+    POSITION_X,
+    POSITION_Y,
+    POSITION_Z,
     SEGMENT,
     DEPTH,
     COVERAGE,
     CHANNELS
 };
 
-static void add_hit(const struct film *f, const struct accel_hit *hit, float depth_m, bool first, float *out) {
+static void add_hit(const struct film *f, const struct accel_hit *hit, vec3 direction, float depth_m, bool first,
+                    float *out) {
     const struct materials *m = f->world->materials;
     const struct world_triangle *t = &f->world->triangle[hit->triangle];
     struct texture_taps taps;
@@ -137,8 +170,23 @@ static void add_hit(const struct film *f, const struct accel_hit *hit, float dep
     texture_taps(&m->base_color, place.x, place.y, &taps);
     rgb base = texture_gather(&m->base_color, &taps);
     rgb emission = materials_emission(m, t->segment, place.x, place.y);
-    const float value[] = {base.r,     base.g,     base.b,    m->roughness[t->segment], m->specular[t->segment],
-                           emission.r, emission.g, emission.b};
+    vec3 point = mesh_point(f->world->mesh, hit->triangle, hit->b1, hit->b2);
+    vec3 normal = surface_shading(f->world->mesh, hit->triangle, hit->b1, hit->b2, t->normal);
+    normal = vec3_dot(normal, direction) > 0.0f ? vec3_neg(normal) : normal;
+    const float value[] = {base.r,
+                           base.g,
+                           base.b,
+                           m->roughness[t->segment],
+                           m->specular[t->segment],
+                           emission.r,
+                           emission.g,
+                           emission.b,
+                           normal.x,
+                           normal.y,
+                           normal.z,
+                           point.x,
+                           point.y,
+                           point.z};
     for (int c = 0; c < SEGMENT; c++)
         out[c] += value[c];
     if (first)
@@ -163,13 +211,14 @@ static void first_hit_row(void *user, size_t row, int thread) {
             if (!camera_direction(f->camera, (float)x + jitter.x, (float)y + jitter.y, &direction) ||
                 !accel_intersect(f->world->accel, origin, direction, 0.0f, INFINITY, &hit))
                 continue;
-            float along = rigid_direction(&f->camera->camera_from_world, direction).z;
-            add_hit(f, &hit, along * hit.distance_m, i == 0, out);
+            bool is_panorama = f->camera->model == CAMERA_PANORAMA;
+            float along = is_panorama ? 1.0f : rigid_direction(&f->camera->camera_from_world, direction).z;
+            add_hit(f, &hit, direction, along * hit.distance_m, i == 0, out);
         }
         float over_all = 1.0f / (float)f->spp;
-        if (out[COVERAGE] > 0.0f)
-            out[DEPTH] /= out[COVERAGE];
-        for (int c = 0; c < SEGMENT; c++)
+        for (int c = NORMAL_X; c <= DEPTH && out[COVERAGE] > 0.0f; c++)
+            out[c] /= c == SEGMENT ? 1.0f : out[COVERAGE];
+        for (int c = 0; c < NORMAL_X; c++)
             out[c] *= over_all;
         out[COVERAGE] *= over_all;
     }
@@ -177,11 +226,12 @@ static void first_hit_row(void *user, size_t row, int thread) {
 
 void film_render_first_hits(const struct world *world, const struct camera *camera, uint32_t spp, uint64_t seed,
                             struct parallel *pool, struct image *image) {
-    static const char *const names[CHANNELS] = {"base_color.R", "base_color.G", "base_color.B", "roughness",
-                                                "specular",     "emission.R",   "emission.G",   "emission.B",
-                                                "segment",      "depth",        "coverage"};
+    static const char *const names[CHANNELS] = {
+        "base_color.R", "base_color.G", "base_color.B", "roughness", "specular", "emission.R",
+        "emission.G",   "emission.B",   "normal.X",     "normal.Y",  "normal.Z", "position.X",
+        "position.Y",   "position.Z",   "segment",      "depth",     "coverage"};
     image_init(image, camera->width, camera->height, CHANNELS, names);
     struct path_settings settings = {.max_depth = 1, .roulette_depth = 1, .seed = seed};
-    struct film film = {world, camera, &settings, spp, 0, image, NULL};
+    struct film film = {world, camera, &settings, spp, 0, false, image, NULL};
     parallel_for(pool, camera->height, first_hit_row, &film);
 }

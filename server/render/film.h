@@ -20,9 +20,15 @@ uint64_t film_render(const struct world *world, const struct camera *camera, uin
                      const struct path_settings *settings, uint32_t iteration, struct parallel *pool,
                      struct image *image);
 
+/* The same with three more channels, direct.R G B: the part of the mean that was reflected once at most. */
+uint64_t film_render_direct(const struct world *world, const struct camera *camera, uint32_t spp,
+                            const struct path_settings *settings, uint32_t iteration, struct parallel *pool,
+                            struct image *image);
+
 /* First-hit attributes, averaged over `spp` jittered rays per pixel: channels base_color.R G B, roughness, specular,
- * emission.R G B, segment (of the pixel's first sample, -1 for a miss), depth (along the optical axis, over hits),
- * coverage (share of samples that hit). */
+ * emission.R G B, segment (of the pixel's first sample, -1 for a miss), coverage (share of samples that hit), and over
+ * hits: depth (along the optical axis; of a panorama the distance), normal.X Y Z (shading normal, on the viewer's side,
+ * not normalised) and position.X Y Z. */
 void film_render_first_hits(const struct world *world, const struct camera *camera, uint32_t spp, uint64_t seed,
                             struct parallel *pool, struct image *image);
 

@@ -114,6 +114,10 @@ static void load_lane(struct path_batch *b, const struct world *world, struct ve
     lanes3_set_rgb(&v->emission, lane, m->emission[segment]);
     if (b->has_pattern)
         apply_pattern(m, s, v, lane);
+    if (m->cone) {
+        float cone = materials_cone(m, segment, -vec3_dot(t->normal, ray->direction));
+        lanes3_set_rgb(&v->emission, lane, rgb_scale(lanes3_rgb(&v->emission, lane), cone));
+    }
     s->area_density[lane] = world->lights->area_density[segment];
     if (s->area_density[lane] > 0.0f && world->guide)
         s->area_density[lane] *=
@@ -225,6 +229,8 @@ static void shade(struct path_batch *b, const struct world *world, const struct 
         shade_light(s);
     else
         memset(s->light_pdf, 0, sizeof s->light_pdf);
+    if (world->materials->cone)
+        path_lights_cones(s, v, world->materials, count);
     if (world->lights->environment_chance > 0.0f)
         path_lights_environment(s, v, world->lights, count);
     gather_texels(v, s, texture, count);
@@ -315,18 +321,24 @@ void path_batch_trace(struct path_batch *b, const struct world *world, const str
         accel_intersect_many(world->accel, b->active_count, b->ray, b->hit);
         b->ray_count += b->active_count;
         shade_hits(b, world, settings, depth, radiance);
+        if (depth == 1) /* what follows has been reflected more than once */
+            memcpy(b->direct, radiance, count * sizeof *radiance);
         trace_shadow_rays(b, world, depth, radiance);
         b->depth_count = depth + 1;
     }
     b->ended = b->depth_count == settings->max_depth;
+    if (b->depth_count < 2)
+        memcpy(b->direct, radiance, count * sizeof *radiance);
     for (size_t i = 0; i < count; i++) {
         b->dropped[i] = !rgb_is_finite(radiance[i]);
         if (b->dropped[i]) {
-            radiance[i] = (rgb){0.0f, 0.0f, 0.0f};
+            radiance[i] = b->direct[i] = (rgb){0.0f, 0.0f, 0.0f};
             b->dropped_count++;
         }
     }
 }
+
+const rgb *path_batch_direct(const struct path_batch *b) { return b->direct; }
 
 void path_batch_counts(const struct path_batch *b, uint64_t *ray_count, uint64_t *dropped_count) {
     *ray_count = b->ray_count;

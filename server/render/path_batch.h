@@ -47,6 +47,7 @@ struct path_batch {
     uint8_t *occluded;                  /* [capacity] */
     uint32_t *key, *sample;             /* [capacity] per path, of the sampler */
     bool *dropped;                      /* [capacity] the path's estimate was not finite */
+    rgb *direct;                        /* [capacity] see path_batch_direct */
     size_t active_count, shadow_count;
     unsigned bucket_shift; /* a light's bucket is its number shifted down by so many bits */
     uint64_t ray_count, dropped_count;

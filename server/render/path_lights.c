@@ -51,6 +51,16 @@ bool path_lights_pick(struct shade_block *s, struct vertex_block *v, const struc
     return true;
 }
 
+void path_lights_cones(struct shade_block *s, const struct vertex_block *v, const struct materials *m, int count) {
+    for (int i = 0; i < count; i++) {
+        if (!(s->light_pdf[i] > 0.0f) || v->light_segment[i] >= m->segment_count)
+            continue;
+        vec3 normal = vec3_normalize(vec3_cross(lanes3_get(&s->light_edge1, i), lanes3_get(&s->light_edge2, i)));
+        float cone = materials_cone(m, v->light_segment[i], -vec3_dot(normal, lanes3_get(&s->light_direction, i)));
+        lanes3_set_rgb(&s->radiance, i, rgb_scale(lanes3_rgb(&s->radiance, i), cone));
+    }
+}
+
 /* Lane by lane, since they are few. */
 void path_lights_environment(struct shade_block *s, struct vertex_block *v, const struct lights *lights, int count) {
     for (int i = 0; i < count; i++) {

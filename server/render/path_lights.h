@@ -11,6 +11,10 @@
  * to path_lights_environment. False when the scene has no light. */
 bool path_lights_pick(struct shade_block *s, struct vertex_block *v, const struct world *world, int count);
 
+/* The samples on triangles of segments with an emission cone. After shade_light. */
+void path_lights_cones(struct shade_block *s, const struct vertex_block *v, const struct materials *materials,
+                       int count);
+
 /* Light samples of the lanes that chose the environment. After shade_light. */
 void path_lights_environment(struct shade_block *s, struct vertex_block *v, const struct lights *lights, int count);
 

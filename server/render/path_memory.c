@@ -26,6 +26,7 @@ static struct path_batch *batch_new(size_t capacity, int max_depth) {
     b->key = mem_array(capacity, sizeof *b->key);
     b->sample = mem_array(capacity, sizeof *b->sample);
     b->dropped = mem_array(capacity, sizeof *b->dropped);
+    b->direct = mem_array(capacity, sizeof *b->direct);
     return b;
 }
 
@@ -63,5 +64,6 @@ void path_batch_free(struct path_batch *b) {
     mem_free(b->key);
     mem_free(b->sample);
     mem_free(b->dropped);
+    mem_free(b->direct);
     mem_free(b);
 }

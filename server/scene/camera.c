@@ -212,13 +212,28 @@ static bool project_lens(const struct camera *c, float x, float y, float *u, flo
     case CAMERA_THIN_PRISM_FISHEYE: return project_thin_prism(c, x, y, u, v);
     case CAMERA_FOV: return project_fov(c, x, y, u, v);
     case CAMERA_DIVISION: return project_division(c, x, y, u, v);
+    case CAMERA_PANORAMA: /* see camera_project */
     case CAMERA_OPENCV: break;
     }
     return project_opencv(c, x, y, u, v);
 }
 
+/* The depth of a panorama is the distance. */
+static bool project_panorama(const struct camera *c, vec3 p, float *x, float *y, float *depth_m) {
+    double distance = sqrt((double)vec3_dot(p, p));
+    if (!(distance > 0.0))
+        return false;
+    double around = 0.5 + atan2((double)p.x, (double)p.z) / (2.0 * PI), down = acos(-(double)p.y / distance) / PI;
+    *x = fminf((float)(around * c->width), (float)c->width * 0x1.fffffep-1f);
+    *y = fminf((float)(down * c->height), (float)c->height * 0x1.fffffep-1f);
+    *depth_m = (float)distance;
+    return true;
+}
+
 bool camera_project(const struct camera *c, vec3 point, float *x, float *y, float *depth_m) {
     vec3 p = rigid_point(&c->camera_from_world, point);
+    if (c->model == CAMERA_PANORAMA)
+        return project_panorama(c, p, x, y, depth_m);
     if (!(p.z > 0.0f))
         return false;
     float u, v;
@@ -337,7 +352,17 @@ static bool invert_lens(const struct camera *c, double *x, double *y, double *z)
     return true;
 }
 
+static vec3 panorama_direction(const struct camera *c, float px, float py) {
+    double around = 2.0 * PI * ((double)px / c->width - 0.5), down = PI * (double)py / c->height;
+    vec3 local = {(float)(sin(down) * sin(around)), (float)-cos(down), (float)(sin(down) * cos(around))};
+    return vec3_normalize(rigid_direction(&c->world_from_camera, local));
+}
+
 bool camera_direction(const struct camera *c, float px, float py, vec3 *direction) {
+    if (c->model == CAMERA_PANORAMA) {
+        *direction = panorama_direction(c, px, py);
+        return vec3_is_finite(*direction);
+    }
     double x = ((double)px - (double)c->cx) / (double)c->fx;
     double y = ((double)py - (double)c->cy) / (double)c->fy, z;
     if (!invert_lens(c, &x, &y, &z))

@@ -7,7 +7,9 @@
  *   OPENCV_FISHEYE      k1 to k4 (Kannala-Brandt), as OpenCV's fisheye page defines it
  *   THIN_PRISM_FISHEYE  k1 to k4, p1 p2, s1 s2, as COLMAP defines it
  *   DIVISION            k[0] is Fitzgibbon's lambda (2001), as RealityCapture's "division" has it
- *   FOV                 k[0] is the angle omega in radians (Devernay & Faugeras 2001), as COLMAP defines it */
+ *   FOV                 k[0] is the angle omega in radians (Devernay & Faugeras 2001), as COLMAP defines it
+ *   PANORAMA            no lens: the whole sphere, equirectangular; its middle is z, columns are azimuth from -pi to pi
+ *                       over +x, rows polar angle from -y; fx, fy, cx, cy are not used. Rendered, never read */
 #ifndef UNBAKE_SCENE_CAMERA_H
 #define UNBAKE_SCENE_CAMERA_H
 
@@ -16,7 +18,14 @@
 
 #include "common/vec.h"
 
-enum camera_model { CAMERA_OPENCV, CAMERA_OPENCV_FISHEYE, CAMERA_THIN_PRISM_FISHEYE, CAMERA_FOV, CAMERA_DIVISION };
+enum camera_model {
+    CAMERA_OPENCV,
+    CAMERA_OPENCV_FISHEYE,
+    CAMERA_THIN_PRISM_FISHEYE,
+    CAMERA_FOV,
+    CAMERA_DIVISION,
+    CAMERA_PANORAMA
+};
 
 struct camera {
     enum camera_model model;

@@ -10,6 +10,7 @@ void materials_init(struct materials *m, const struct inverse_uv *inverse, size_
     texture_init(&m->base_color, inverse, base_color);
     m->segment_count = segment_count;
     m->emission_pattern = NULL;
+    m->cone = NULL;
     m->roughness = mem_array(segment_count, sizeof *m->roughness);
     m->specular = mem_array(segment_count, sizeof *m->specular);
     m->emission = mem_calloc(segment_count, sizeof *m->emission);
@@ -24,6 +25,7 @@ void materials_release(struct materials *m) {
     mem_free(m->roughness);
     mem_free(m->specular);
     mem_free(m->emission);
+    mem_free(m->cone);
     materials_drop_emission_pattern(m);
     *m = (struct materials){0};
 }

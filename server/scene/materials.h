@@ -14,6 +14,12 @@
 /* Base colour of unknown surfaces, and of emitters, whose own light hides it. */
 #define NEUTRAL_BASE_COLOR 0.5f
 
+/* How the emission of a segment depends on the cosine c to its normal: times ((c - outer) / (inner - outer))^2, between 0
+ * and 1, over c: a spot light of KHR_lights_punctual, whose intensity is even within the inner cone. Outer -1: none. */
+struct emission_cone {
+    float outer, inner;
+};
+
 struct materials {
     struct texture base_color; /* linear reflectance in [0, 1] */
     size_t segment_count;
@@ -23,6 +29,8 @@ struct materials {
                                  * emitter; owned */
     uint16_t (*emission_pattern)[3]; /* [height][width] half precision: emission of a texel over the mean of its
                                       * segment, positive; 0 where unknown, which reads as 1. NULL: none. Owned */
+    struct emission_cone *cone; /* [segment_count] of lamps that were added to a room; no derivative knows it. NULL:
+                                      * none. Owned */
 };
 
 void materials_init(struct materials *m, const struct inverse_uv *inverse, size_t segment_count, rgb base_color,
@@ -41,6 +49,13 @@ void materials_set_emission_pattern(struct materials *m, size_t texel, rgb radia
 
 /* Bilinear lookup at (x, y), in texels, over the known ones of the four nearest texels; 1 where none is. */
 rgb materials_emission_pattern(const struct materials *m, float x, float y);
+
+static inline float materials_cone(const struct materials *m, uint32_t segment, float cosine) {
+    struct emission_cone cone = m->cone[segment];
+    float t = (cosine - cone.outer) / (cone.inner - cone.outer);
+    t = t < 0.0f ? 0.0f : t < 1.0f ? t : 1.0f;
+    return cone.outer > -1.0f ? t * t / (cosine > 1e-3f ? cosine : 1e-3f) : 1.0f;
+}
 
 /* Radiance emitted from the front side at a point of a segment, and at a texel of it. */
 static inline rgb materials_emission(const struct materials *m, uint32_t segment, float x, float y) {

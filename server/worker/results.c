@@ -32,7 +32,14 @@ void results_make(struct export_input *input, const struct reconstruction *r, co
         const struct held_out *view = &r->held_out[i];
         comparison[i] = (struct export_comparison){view->name, &view->photograph, &view->render, view->camera};
     }
+    struct export_camera *camera = mem_array(r->scene->photograph_count, sizeof *camera);
+    for (size_t i = 0; i < r->scene->photograph_count; i++) {
+        const struct photograph *p = &r->scene->photograph[i];
+        camera[i] = (struct export_camera){p->name, &p->camera, p->is_test};
+    }
     *input = results_so_far(r, title);
+    input->camera = camera;
+    input->camera_count = r->scene->photograph_count;
     input->comparison = comparison;
     input->comparison_count = r->held_out_count;
 }

@@ -8,7 +8,7 @@
 /* The current state, from the first iteration on; without comparisons. Borrows all of `r`, and the title. */
 struct export_input results_so_far(const struct reconstruction *r, const char *title);
 
-/* Everything, once the reconstruction has ended. input->comparison is the caller's (mem_free). */
+/* Everything, once the reconstruction has ended. input->comparison and input->camera are the caller's (mem_free). */
 void results_make(struct export_input *input, const struct reconstruction *r, const char *title);
 
 #endif

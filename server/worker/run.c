@@ -252,6 +252,7 @@ static enum status write_outputs(struct worker_run *run, const struct reconstruc
     tell_progress(run, "export", 0.0, 1.0, plan_left_sec(&r->plan));
     enum status status = export_outputs(run->out_dir, &input, announce, run, err);
     mem_free((void *)input.comparison);
+    mem_free((void *)input.camera);
     return status;
 }
 

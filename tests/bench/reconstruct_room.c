@@ -90,6 +90,7 @@ static enum status write_outputs(const char *dir, const struct reconstruction *r
     if (status == STATUS_OK)
         status = export_outputs(dir, &input, NULL, NULL, err);
     mem_free((void *)input.comparison);
+    mem_free((void *)input.camera);
     return status;
 }
 

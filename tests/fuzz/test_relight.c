@@ -2,12 +2,13 @@
  * cameras and an environment. The first byte says which of them the rest is:
  *
  *   s  scene.ply      c  the cameras      e  the environment      t  a texture */
-#include "server/evaluate/relight.h"
+#include "server/relight/relight.h"
 
 #include <math.h>
 #include <unistd.h>
 
 #include "common/file.h"
+#include "common/image.h"
 #include "common/mem.h"
 #include "server/ingest/transforms.h"
 #include "tests/fuzz/fuzz.h"
@@ -108,17 +109,22 @@ static bool is_small(char kind, const char *name) {
 }
 
 static void render(const char *environment) {
-    struct relight_settings settings = relight_default_settings();
     struct error err = {.message = ""};
-    struct image image;
-    settings.environment = environment;
-    settings.spp = 1;
-    settings.max_depth = 3;
-    if (relight(outputs, &settings, pool, &image, &err) == STATUS_OK)
-        MUST(image.pixel && image.channel_count == 3);
+    cJSON *settings = cJSON_CreateObject();
+    char *out = file_join(fuzz_folder(), "relit");
+    MUST(file_make_dirs(out, NULL) == STATUS_OK);
+    json_add_int(settings, "spp", 1);
+    json_add_int(settings, "max_depth", 3);
+    json_add_string(settings, "environment", environment ? environment : "found");
+    MUST(render_settings_check(settings, RENDER_FILES_ANYWHERE, NULL, NULL) == STATUS_OK);
+    struct relight_job job = {.outputs = outputs, .settings = settings, .out = out};
+    if (relight_run(&job, NULL, pool, &err) == STATUS_OK)
+        MUST(file_is_in(out, "views.json"));
     else
         MUST(err.message[0] != '\0');
-    image_release(&image);
+    MUST(file_remove_tree(out, NULL) == STATUS_OK);
+    cJSON_Delete(settings);
+    mem_free(out);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {

@@ -1,9 +1,9 @@
-/* environment.h, fill.h, visibility.h, relight.h: the sky behind a window is found in the photographs, whatever their
+/* environment.h, fill.h, visibility.h, relight/environment.h: the sky behind a window is found in the photographs, whatever their
  * exposures and faults; samples go where its light finds a way in. */
 #include "common/rng.h"
 #include "common/sha256.h"
 #include "server/capture/environment_gather.h"
-#include "server/evaluate/relight.h"
+#include "server/relight/environment.h"
 #include "tests/render/open_room.h"
 
 static void digest(const struct environment *e, char hex[SHA256_HEX_SIZE]) {
@@ -291,16 +291,18 @@ static void test_orient(void) {
     image_init_rgb(&picture, 64, 33);
     picture.pixel[3 * (16 * 64)] = 1.0f; /* half a cell from -z, on the horizon */
     const struct {
-        char up;
+        vec3 up;
         float turn;
         vec3 wanted;
-    } cases[] = {{'y', 0, {0, 0, -1}},  {'y', 90, {-1, 0, 0}}, {'z', 0, {0, 1, 0}},
-                 {'z', 90, {-1, 0, 0}}, {'x', 0, {0, 0, -1}},  {'x', 90, {0, 1, 0}}};
+    } cases[] = {{{0, 1, 0}, 0, {0, 0, -1}},  {{0, 1, 0}, 90, {-1, 0, 0}}, {{0, 0, 1}, 0, {0, 1, 0}},
+                 {{0, 0, 1}, 90, {-1, 0, 0}}, {{1, 0, 0}, 0, {0, 0, -1}},  {{1, 0, 0}, 90, {0, 1, 0}},
+                 {{0, -1, 0}, 0, {0, 0, 1}},  {{0, 0, -1}, 0, {0, -1, 0}}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        relight_orient(&picture, cases[i].up, cases[i].turn, 2.0f, &out);
+        struct compass compass = compass_of(cases[i].up);
+        environment_orient(&picture, ENVIRONMENT_OF_FILE, &compass, cases[i].turn, 2.0f, &out);
         float cosine = vec3_dot(brightest(&out), cases[i].wanted);
-        CHECK_THAT(cosine > 0.98f, "up %c, turned by %g: cosine %g", cases[i].up, (double)cases[i].turn,
-                   (double)cosine);
+        CHECK_THAT(cosine > 0.98f, "up %g %g %g, turned by %g: cosine %g", (double)cases[i].up.x, (double)cases[i].up.y,
+                   (double)cases[i].up.z, (double)cases[i].turn, (double)cosine);
         image_release(&out);
     }
     image_release(&picture);

@@ -1,9 +1,9 @@
 /* A whole reconstruction of a room that is lit by a sky alone: it lights the room and can be replaced (relight.h);
  * where no photograph shows it, it is estimated (unseen_light.h). */
 #include "common/file.h"
-#include "server/evaluate/relight.h"
 #include "server/export/outputs.h"
 #include "server/reconstruct/reconstruct.h"
+#include "tests/relit.h"
 #include "tests/render/open_room.h"
 #include "tests/render/shell.h"
 
@@ -49,7 +49,9 @@ static void write_outputs(const char *dir, const struct reconstruction *r) {
                               {0.0f, 1.0f, 0.0f},
                               true,
                               NULL,
-                              {0}};
+                              {0},
+                              0,
+                              NULL};
     CHECK_THAT(export_outputs(dir, &in, NULL, NULL, &err) == STATUS_OK, "%s", err.message);
 }
 
@@ -61,26 +63,24 @@ static double mean_of(const struct image *image) {
     return sum;
 }
 
-/* From the folder alone: the report's view again; darkness; twice the light; another sky. */
+/* From the folder alone: the report's view again; twice the light; darkness, which is told; another sky. */
 static void test_relight(const struct reconstruction *r, struct parallel *pool) {
     char dir[] = "/tmp/unbake-relight-XXXXXX";
-    struct relight_settings s = relight_default_settings();
     struct image image;
     struct error err;
     CHECK(mkdtemp(dir) != NULL);
     write_outputs(dir, r);
-    s.view = "2";
-    CHECK_THAT(relight(dir, &s, pool, &image, &err) == STATUS_OK, "%s", err.message);
+    CHECK_THAT(relit_picture(dir, "{\"view\":\"2\",\"format\":\"exr\"}", pool, &image, &err) == STATUS_OK, "%s",
+               err.message);
     double plain = mean_of(&image);
     CHECK_NEAR(plain / mean_of(&r->held_out[2].render), 1.0, 0.05);
     image_release(&image);
-    s.environment_scale = 2.0f;
-    CHECK(relight(dir, &s, pool, &image, &err) == STATUS_OK);
+    CHECK(relit_picture(dir, "{\"view\":\"2\",\"format\":\"exr\",\"environment_scale\":2}", pool, &image, &err) ==
+          STATUS_OK);
     CHECK_NEAR(mean_of(&image) / plain, 2.0, 0.05); /* nothing but the sky shines here */
     image_release(&image);
-    s.environment = "none";
-    CHECK(relight(dir, &s, pool, &image, &err) == STATUS_OK && mean_of(&image) == 0.0);
-    image_release(&image);
+    CHECK(relit_picture(dir, "{\"environment\":\"none\",\"format\":\"exr\"}", pool, &image, &err) == STATUS_INPUT);
+    CHECK_STRING(err.message, "Nothing shines: the picture will be black.");
     char *red = file_join(dir, "red.exr");
     static float pixel[16 * 8 * 3];
     for (int i = 0; i < 16 * 8; i++)
@@ -88,13 +88,12 @@ static void test_relight(const struct reconstruction *r, struct parallel *pool) 
     struct image sky = {
         .width = 16, .height = 8, .channel_count = 3, .channel = (char[3][64]){"R", "G", "B"}, .pixel = pixel};
     CHECK(image_write_exr(red, &sky, IMAGE_FLOAT, false, &err) == STATUS_OK);
-    s.environment = red;
-    s.lights = false;
-    CHECK(relight(dir, &s, pool, &image, &err) == STATUS_OK);
+    char *settings = mem_printf("{\"lights\":\"off\",\"format\":\"exr\",\"environment\":\"%s\"}", red);
+    CHECK(relit_picture(dir, settings, pool, &image, &err) == STATUS_OK);
     CHECK(image.pixel[0] > 0.0f && image.pixel[1] == 0.0f && image.pixel[2] == 0.0f);
     image_release(&image);
-    s.view = "99";
-    CHECK(relight(dir, &s, pool, &image, &err) == STATUS_NOT_FOUND);
+    CHECK(relit_picture(dir, "{\"view\":\"99\",\"format\":\"exr\"}", pool, &image, &err) == STATUS_NOT_FOUND);
+    mem_free(settings);
     mem_free(red);
     CHECK(file_remove_tree(dir, NULL) == STATUS_OK);
 }

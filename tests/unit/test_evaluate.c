@@ -9,7 +9,7 @@
 #include "server/demo/generate.h"
 #include "server/demo/room.h"
 #include "server/evaluate/evaluate.h"
-#include "server/evaluate/recovered.h"
+#include "server/relight/recovered.h"
 #include "server/evaluate/score.h"
 #include "server/export/outputs.h"
 #include "tests/check.h"
@@ -141,7 +141,8 @@ static void export_room(const char *dir, const struct room *room) {
     cJSON *report = cJSON_CreateObject();
     struct export_input in = {"room", &room->mesh, &room->segments,    &room->atlas, &room->inverse, &room->materials,
                               zero,   zero,        is_emitter,         NULL,         NULL,           0,
-                              NULL,   report,      {0.0f, 1.0f, 0.0f}, true,         NULL,           {0}};
+                              NULL,   report,      {0.0f, 1.0f, 0.0f}, true,         NULL,           {0},
+                              0,      NULL};
     enum status status = export_outputs(dir, &in, NULL, NULL, &err);
     CHECK_THAT(status == STATUS_OK, "%s", err.message);
     cJSON_Delete(report);

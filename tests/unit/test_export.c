@@ -369,7 +369,9 @@ int main(void) {
                               {0.0f, 1.0f, 0.0f},
                               true,
                               NULL,
-                              {0}};
+                              {0},
+                              0,
+                              NULL};
 
     struct announced heard = {.dir = dir};
     CHECK(export_preview(dir, &in, hear, &heard, &err) == STATUS_OK);

@@ -1,6 +1,6 @@
 /* relight_command.h -- `unbaked relight OUTPUTS [OPTION]...`. */
-#ifndef UNBAKE_EVALUATE_RELIGHT_COMMAND_H
-#define UNBAKE_EVALUATE_RELIGHT_COMMAND_H
+#ifndef UNBAKE_RELIGHT_RELIGHT_COMMAND_H
+#define UNBAKE_RELIGHT_RELIGHT_COMMAND_H
 
 #include "server/arguments.h"
 

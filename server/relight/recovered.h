@@ -2,8 +2,8 @@
  *
  * Reads only files that a user gets: scene.ply for atlas coordinates and segments, the EXR textures, and
  * environment.exr if it exists. Geometry comes from the room itself: scene.ply must list the same triangles. */
-#ifndef UNBAKE_EVALUATE_RECOVERED_H
-#define UNBAKE_EVALUATE_RECOVERED_H
+#ifndef UNBAKE_RELIGHT_RECOVERED_H
+#define UNBAKE_RELIGHT_RECOVERED_H
 
 #include "common/error.h"
 #include "common/parallel.h"
@@ -22,8 +22,11 @@ struct recovered {
     struct world world;
 };
 
-/* `mesh` is borrowed until recovered_release. Roughness and specular are constant per segment and read at one of its
+/* All but the world. `mesh` is borrowed until recovered_release. Roughness and specular are constant per segment and read at one of its
  * texels. Emission is the mean over a segment's texels, with a pattern where they differ. */
+enum status recovered_read(const char *dir, const struct mesh *mesh, struct parallel *pool, struct recovered *recovered,
+                           struct error *err);
+/* With the world. */
 enum status recovered_load(const char *dir, const struct mesh *mesh, struct parallel *pool, struct recovered *recovered,
                            struct error *err);
 void recovered_release(struct recovered *recovered);

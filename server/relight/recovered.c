@@ -1,5 +1,5 @@
 /* recovered.c -- see recovered.h. */
-#include "server/evaluate/recovered.h"
+#include "server/relight/recovered.h"
 
 #include <math.h>
 #include <string.h>
@@ -303,7 +303,7 @@ static enum status take_environment(struct recovered *r, const char *dir, struct
     return status == STATUS_NOT_FOUND ? STATUS_OK : status;
 }
 
-enum status recovered_load(const char *dir, const struct mesh *mesh, struct parallel *pool, struct recovered *r,
+enum status recovered_read(const char *dir, const struct mesh *mesh, struct parallel *pool, struct recovered *r,
                            struct error *err) {
     struct charted charted = {0};
     struct image base_color = {0};
@@ -323,12 +323,21 @@ enum status recovered_load(const char *dir, const struct mesh *mesh, struct para
     status = take_segment_values(r, dir, err);
     if (status == STATUS_OK)
         status = read_emission(r, dir, err);
-    if (status == STATUS_OK)
-        status = world_init(&r->world, mesh, &r->segments, &r->atlas, &r->materials, NULL, pool, err);
-    if (status == STATUS_OK)
-        status = take_environment(r, dir, pool, err);
 out:
     image_release(&base_color);
+    if (status != STATUS_OK)
+        recovered_release(r);
+    return status;
+}
+
+enum status recovered_load(const char *dir, const struct mesh *mesh, struct parallel *pool, struct recovered *r,
+                           struct error *err) {
+    enum status status = recovered_read(dir, mesh, pool, r, err);
+    if (status != STATUS_OK)
+        return status;
+    status = world_init(&r->world, mesh, &r->segments, &r->atlas, &r->materials, NULL, pool, err);
+    if (status == STATUS_OK)
+        status = take_environment(r, dir, pool, err);
     if (status != STATUS_OK)
         recovered_release(r);
     return status;

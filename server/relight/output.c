@@ -1,0 +1,241 @@
+/* output.c -- see output.h. */
+#include "server/relight/output.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "common/file.h"
+#include "common/mem.h"
+
+#define RECORD_LIMIT ((size_t)1 << 30) /* bytes of views.jsonl */
+#define NUMBER_DIGITS 5
+
+/* --- the record ------------------------------------------------------------------------------------------------- */
+
+/* Settings in the order of their names, so that the same ones have the same text. */
+static void digest_settings(struct sha256 *hash, const cJSON *settings) {
+    size_t count;
+    const struct render_setting *t = render_settings_table(&count);
+    for (size_t i = 0; i < count; i++) {
+        for (const cJSON *s = settings->child; s; s = s->next) {
+            if (render_settings_find(s->string, NULL) != &t[i])
+                continue;
+            char *text = json_text(s);
+            sha256_update(hash, s->string, strlen(s->string) + 1);
+            sha256_update(hash, text, strlen(text) + 1);
+            mem_free(text);
+        }
+    }
+}
+
+/* What the pictures depend on: the settings, the room (by the report, which lists versions and errors) and the files. */
+static void make_digest(const struct relight_job *job, char digest[SHA256_HEX_SIZE]) {
+    static const char *const names[] = {"report.json", "scene.ply", "views.json"};
+    struct sha256 hash;
+    char hex[SHA256_HEX_SIZE];
+    sha256_init(&hash);
+    digest_settings(&hash, job->settings);
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        char *path = file_join(job->outputs, names[i]);
+        if (sha256_of_file(path, hex, NULL) == STATUS_OK)
+            sha256_update(&hash, hex, sizeof hex);
+        mem_free(path);
+    }
+    cJSON *files = render_settings_files(job->settings);
+    for (const cJSON *f = files->child; f; f = f->next) {
+        char *path = job->files ? file_join(job->files, f->valuestring) : mem_strdup(f->valuestring);
+        if (sha256_of_file(path, hex, NULL) == STATUS_OK)
+            sha256_update(&hash, hex, sizeof hex);
+        mem_free(path);
+    }
+    cJSON_Delete(files);
+    sha256_hex(&hash, digest);
+}
+
+static void key_of(uint64_t picture, char key[24]) { snprintf(key, 24, "%llu", (unsigned long long)picture); }
+
+/* Takes the record; a later one of the same picture replaces it. */
+static void keep(struct output *o, uint64_t picture, cJSON *record) {
+    char key[24];
+    key_of(picture, key);
+    cJSON_DeleteItemFromObjectCaseSensitive(o->done, key);
+    cJSON_AddItemToObject(o->done, key, record);
+}
+
+static void read_lines(struct output *o, const char *text) {
+    for (const char *at = text, *end; (end = strchr(at, '\n')) != NULL; at = end + 1) {
+        cJSON *record = NULL;
+        if (json_parse(at, (size_t)(end - at), OUTPUT_RECORD, &record, NULL) != STATUS_OK)
+            continue;
+        const char *digest = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(record, "digest"));
+        double number = cJSON_GetNumberValue(cJSON_GetObjectItemCaseSensitive(record, "picture"));
+        if (digest && strcmp(digest, o->digest) == 0 && number >= 0.0 && number < 9e15)
+            keep(o, (uint64_t)number, record);
+        else
+            cJSON_Delete(record);
+    }
+}
+
+enum status output_open(struct output *o, const struct relight_job *job, const struct relight_watch *watch,
+                        struct error *err) {
+    struct buf text;
+    *o = (struct output){.job = job, .watch = watch, .done = cJSON_CreateObject()};
+    make_digest(job, o->digest);
+    char *path = file_join(job->out, OUTPUT_RECORD);
+    buf_init(&text, RECORD_LIMIT);
+    enum status status = file_read(path, &text, err);
+    if (status == STATUS_OK) {
+        read_lines(o, buf_text(&text));
+    }
+    buf_release(&text);
+    mem_free(path);
+    return status == STATUS_NOT_FOUND ? STATUS_OK : status;
+}
+
+void output_close(struct output *o) {
+    cJSON_Delete(o->done);
+    *o = (struct output){0};
+}
+
+bool output_is_done(const struct output *o, uint64_t picture) {
+    char key[24];
+    key_of(picture, key);
+    const cJSON *record = cJSON_GetObjectItemCaseSensitive(o->done, key);
+    const cJSON *files = cJSON_GetObjectItemCaseSensitive(record, "files");
+    for (const cJSON *f = files ? files->child : NULL; f; f = f->next) {
+        const char *name = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(f, "name"));
+        const char *wanted = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(f, "sha256"));
+        char found[SHA256_HEX_SIZE] = "", *path = name && wanted ? file_join(o->job->out, name) : NULL;
+        bool is_there = path && sha256_of_file(path, found, NULL) == STATUS_OK && strcmp(found, wanted) == 0;
+        mem_free(path);
+        if (!is_there)
+            return false;
+    }
+    return files && files->child;
+}
+
+enum status output_record(struct output *o, uint64_t picture, cJSON *record, struct error *err) {
+    json_add_string(record, "digest", o->digest);
+    char *text = json_text(record), *line = mem_printf("%s\n", text), *path = file_join(o->job->out, OUTPUT_RECORD);
+    enum status status = STATUS_OK;
+    int fd = open(path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0640);
+    if (fd < 0)
+        status = error_set_errno(err, errno, "cannot open %s", path);
+    if (status == STATUS_OK)
+        status = file_write_all(fd, line, strlen(line), path, err);
+    if (fd >= 0 && close(fd) != 0 && status == STATUS_OK)
+        status = error_set_errno(err, errno, "cannot close %s", path);
+    keep(o, picture, record);
+    mem_free(path);
+    mem_free(line);
+    mem_free(text);
+    return status;
+}
+
+enum status output_views(struct output *o, uint64_t pictures, cJSON *head, struct error *err) {
+    cJSON *frames = cJSON_AddArrayToObject(head, "frames");
+    for (uint64_t i = 0; i < pictures; i++) {
+        char key[24];
+        key_of(i, key);
+        cJSON *record = cJSON_DetachItemFromObjectCaseSensitive(o->done, key);
+        cJSON_DeleteItemFromObjectCaseSensitive(record, "digest");
+        cJSON_AddItemToArray(frames, record ? record : cJSON_CreateNull());
+    }
+    char *text = json_page(head), *path = file_join(o->job->out, OUTPUT_VIEWS);
+    enum status status = file_replace(path, text, strlen(text), err);
+    if (status == STATUS_OK && o->watch->file)
+        o->watch->file(o->watch->user, OUTPUT_VIEWS);
+    mem_free(path);
+    mem_free(text);
+    cJSON_Delete(head);
+    return status;
+}
+
+/* --- files ------------------------------------------------------------------------------------------------------ */
+
+static enum status put(struct output *o, const char *name, bool is_exr, const struct image *image, struct error *err) {
+    char *path = file_join(o->job->out, name), *temporary = mem_printf("%s.part", path);
+    enum status status = is_exr ? image_write_exr_noted(temporary, image, IMAGE_FLOAT, false, o->note, err)
+                                : image_write_png(temporary, image, 1.0f, err);
+    if (status == STATUS_OK)
+        status = file_put_in_place(temporary, path, err);
+    else
+        unlink(temporary);
+    mem_free(temporary);
+    mem_free(path);
+    return status;
+}
+
+static enum status list(struct output *o, const char *name, const char *pass, cJSON *files, struct error *err) {
+    char hex[SHA256_HEX_SIZE], *path = file_join(o->job->out, name);
+    struct stat facts;
+    enum status status = sha256_of_file(path, hex, err);
+    if (status == STATUS_OK && stat(path, &facts) != 0)
+        status = error_set_errno(err, errno, "cannot examine %s", path);
+    if (status == STATUS_OK) {
+        cJSON *file = cJSON_CreateObject();
+        json_add_string(file, "name", name);
+        json_add_string(file, "pass", pass);
+        json_add_int(file, "bytes", facts.st_size);
+        json_add_string(file, "sha256", hex);
+        cJSON_AddItemToArray(files, file);
+        if (o->watch->file)
+            o->watch->file(o->watch->user, name);
+    }
+    mem_free(path);
+    return status;
+}
+
+enum status output_pass(struct output *o, uint64_t picture, const struct render_pass *pass, const char *name,
+                        struct output_formats formats, struct image *image, cJSON *files, struct error *err) {
+    bool is_data = pass->kind == PASS_DATA;
+    enum status status = STATUS_OK;
+    if (formats.is_exr || (is_data && formats.is_png)) {
+        struct image measured;
+        char *file = mem_printf("%0*llu_%s.exr", NUMBER_DIGITS, (unsigned long long)picture, name);
+        image_copy(image, &measured);
+        pass_measure(pass, &o->look, &measured);
+        status = put(o, file, true, &measured, err);
+        if (status == STATUS_OK)
+            status = list(o, file, name, files, err);
+        image_release(&measured);
+        mem_free(file);
+    }
+    if (formats.is_png && !is_data && status == STATUS_OK) {
+        char *file = mem_printf("%0*llu_%s.png", NUMBER_DIGITS, (unsigned long long)picture, name);
+        pass_show(pass, &o->look, image);
+        status = put(o, file, false, image, err);
+        if (status == STATUS_OK)
+            status = list(o, file, name, files, err);
+        mem_free(file);
+    }
+    return status;
+}
+
+enum status output_layers(struct output *o, uint64_t picture, const struct image *image, cJSON *files,
+                          struct error *err) {
+    char *file = mem_printf("%0*llu.exr", NUMBER_DIGITS, (unsigned long long)picture);
+    enum status status = put(o, file, true, image, err);
+    if (status == STATUS_OK)
+        status = list(o, file, "all", files, err);
+    mem_free(file);
+    return status;
+}
+
+enum status output_preview(struct output *o, uint64_t picture, struct image *image, struct error *err) {
+    char *folder = file_join(o->job->out, "preview");
+    char *file = mem_printf("preview/%0*llu.png", NUMBER_DIGITS, (unsigned long long)picture);
+    enum status status = file_make_dirs(folder, err);
+    pass_show(passes_radiance(), &o->look, image);
+    if (status == STATUS_OK)
+        status = put(o, file, false, image, err);
+    if (status == STATUS_OK)
+        o->watch->preview(o->watch->user, file);
+    mem_free(file);
+    mem_free(folder);
+    return status;
+}

@@ -1,0 +1,194 @@
+/* relight_command.c -- see relight_command.h. */
+#include "server/relight/relight_command.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "common/file.h"
+#include "common/mem.h"
+#include "server/relight/denoise.h"
+#include "server/relight/relight.h"
+
+const struct flag relight_flags[] = {
+    {"--out", "FILE|DIR", "one picture (.png, or .exr for linear radiance), or a folder for all files (relit.png)"},
+    {"--set", "NAME=VALUE", "a setting; --settings lists them; may be given many times"},
+    {"--settings", NULL, "print what can be set"},
+    {"--view", "WHICH", "--set view=WHICH: numbers of cameras from 0, names of their pictures, or all (0)"},
+    {"--cameras", "WHICH", "--set cameras=WHICH: held_out, photographs, or a transforms.json with w and h (held_out)"},
+    {"--lights", "on|off", "--set lights=on|off: whether the room's emitters shine (on)"},
+    {"--environment", "WHICH", "--set environment=WHICH: found, none, sky, or a latitude-longitude map (found)"},
+    {"--environment-scale", "F", "--set environment_scale=F: factor on its radiance (1)"},
+    {"--turn", "DEG", "--set environment_turn=DEG: turns the map around the upward axis (0)"},
+    {"--up", "AXIS", "--set up=AXIS: auto, x, y or z, the room's axis that is up (auto)"},
+    {"--exposure", "F", "--set exposure=F: factor on radiance in a PNG; 0: chosen by the picture (0)"},
+    {"--spp", "N", "--set spp=N: paths per pixel (64)"},
+    {"--max-depth", "N", "--set max_depth=N: segments of a path (16)"},
+    {"--threads", "N", "0: one per processor (0)"},
+    {"--quiet", NULL, "no progress"},
+    COMMAND_HELP_FLAG,
+    {0},
+};
+
+/* Flags that stand for settings. */
+static const struct {
+    const char *flag, *setting;
+} shorthands[] = {
+    {"--view", "view"},
+    {"--cameras", "cameras"},
+    {"--lights", "lights"},
+    {"--environment", "environment"},
+    {"--environment-scale", "environment_scale"},
+    {"--turn", "environment_turn"},
+    {"--up", "up"},
+    {"--exposure", "exposure"},
+    {"--spp", "spp"},
+    {"--max-depth", "max_depth"},
+};
+
+static bool has_ending(const char *name, const char *ending) {
+    size_t length = strlen(name), wanted = strlen(ending);
+    return length > wanted && strcmp(name + length - wanted, ending) == 0;
+}
+
+static void print_settings(void) {
+    size_t count;
+    const struct render_setting *t = render_settings_table(&count);
+    for (size_t i = 0; i < count; i++)
+        printf("  %-22s %s [%s%s%s]\n", t[i].name, t[i].help, t[i].default_text, *t[i].unit ? " " : "", t[i].unit);
+}
+
+/* --- settings of the command line ------------------------------------------------------------------------------- */
+
+static enum status add_settings(const struct arguments *a, cJSON *settings, struct error *err) {
+    enum status status = STATUS_OK;
+    for (size_t i = 0; i < sizeof shorthands / sizeof *shorthands && status == STATUS_OK; i++) {
+        const char *value = arguments_value(a, shorthands[i].flag, NULL);
+        char *text = value ? mem_printf("%s=%s", shorthands[i].setting, value) : NULL;
+        if (text)
+            status = render_settings_parse_assignment(text, settings, err);
+        mem_free(text);
+    }
+    for (size_t i = 0; i < a->given_count && status == STATUS_OK; i++)
+        if (strcmp(a->given[i].flag->name, "--set") == 0)
+            status = render_settings_parse_assignment(a->given[i].value, settings, err);
+    return status;
+}
+
+/* All faults, a line each. */
+static bool settings_are_good(const cJSON *settings) {
+    cJSON *problems = cJSON_CreateArray();
+    enum status status = render_settings_check(settings, RENDER_FILES_ANYWHERE, problems, NULL);
+    for (const cJSON *p = problems->child; p; p = p->next) {
+        const char *hint = cJSON_GetStringValue(cJSON_GetObjectItem(p, "hint"));
+        fprintf(stderr, "unbaked: setting %s %s%s%s\n", cJSON_GetStringValue(cJSON_GetObjectItem(p, "name")),
+                cJSON_GetStringValue(cJSON_GetObjectItem(p, "reason")), hint ? "; " : "", hint ? hint : "");
+    }
+    cJSON_Delete(problems);
+    return status == STATUS_OK;
+}
+
+/* A file's ending says the format. */
+static bool add_format(const char *out, cJSON *settings) {
+    bool is_exr = has_ending(out, ".exr");
+    if (render_settings_has(settings, "format") || render_settings_has(settings, "passes")) {
+        fputs("unbaked: with --out FILE there is one picture of radiance; give --out a folder for more\n", stderr);
+        return false;
+    }
+    json_add_string(settings, "format", is_exr ? "exr" : "png");
+    return true;
+}
+
+/* --- rendering -------------------------------------------------------------------------------------------------- */
+
+static void on_progress(void *user, double done, double total) {
+    (void)user;
+    fprintf(stderr, "\r%5.1f %% of %.0f %s ", 100.0 * done / total, total, total > 1.0 ? "pictures" : "picture");
+}
+
+static void on_message(void *user, const char *text) {
+    (void)user;
+    fprintf(stderr, "\nunbaked relight: %s\n", text);
+}
+
+static enum status run_into(struct relight_job *job, uint32_t threads, bool is_quiet, struct error *err) {
+    struct relight_watch watch = {.message = on_message};
+    struct denoiser *denoiser = NULL;
+    enum status status = STATUS_OK;
+    if (!is_quiet && isatty(STDERR_FILENO))
+        watch.progress = on_progress;
+    if (render_settings_bool(job->settings, "denoise"))
+        status = denoiser_open((int)threads, &denoiser, err);
+    struct parallel *pool = parallel_new((int)threads);
+    job->denoiser = denoiser;
+    if (status == STATUS_OK)
+        status = relight_run(job, &watch, pool, err);
+    if (watch.progress)
+        fputc('\n', stderr);
+    parallel_free(pool);
+    denoiser_free(denoiser);
+    return status;
+}
+
+/* One picture, through a folder beside it. */
+static enum status run_one(struct relight_job *job, const char *out, uint32_t threads, bool is_quiet,
+                           struct error *err) {
+    uint64_t pictures, pixels;
+    char *folder = mem_printf("%s.part-%ld", out, (long)getpid());
+    char *file = mem_printf("%s/00000_radiance%s", folder, strrchr(out, '.'));
+    enum status status = relight_count(job, &pictures, &pixels, err);
+    if (status == STATUS_OK && pictures != 1)
+        status = error_set(err, STATUS_INPUT, "the settings mean %llu pictures: give --out a folder for them",
+                           (unsigned long long)pictures);
+    if (status == STATUS_OK)
+        status = file_make_dirs(folder, err);
+    job->out = folder;
+    if (status == STATUS_OK)
+        status = run_into(job, threads, is_quiet, err);
+    if (status == STATUS_OK && rename(file, out) != 0)
+        status = error_set_errno(err, errno, "cannot write %s", out);
+    file_remove_tree(folder, NULL);
+    mem_free(file);
+    mem_free(folder);
+    return status;
+}
+
+static int finish(enum status status, const struct error *err) {
+    if (status == STATUS_OK)
+        return EXIT_SUCCESS;
+    fprintf(stderr, "unbaked relight: %s%s%s\n", err->message, *err->hint ? "; " : "", err->hint);
+    return EXIT_FAILURE;
+}
+
+int relight_command(int argc, char **argv) {
+    uint32_t threads = 0;
+    const struct number_flag numbers[] = {{"--threads", 0, 1024, .count = &threads}};
+    struct arguments a;
+    struct error err = {0};
+    if (argc == 2 && strcmp(argv[1], "--settings") == 0) {
+        print_settings();
+        return EXIT_SUCCESS;
+    }
+    int code = arguments_begin(&a, argc, argv, relight_flags, numbers, sizeof numbers / sizeof *numbers, 1);
+    if (code >= 0)
+        return code;
+    const char *out = arguments_value(&a, "--out", "relit.png");
+    bool is_file = has_ending(out, ".png") || has_ending(out, ".exr"), is_quiet = arguments_have(&a, "--quiet");
+    cJSON *settings = cJSON_CreateObject();
+    enum status status = add_settings(&a, settings, &err);
+    if (status != STATUS_OK)
+        fprintf(stderr, "unbaked: %s\n", err.message);
+    code = EXIT_USAGE;
+    if (status == STATUS_OK && settings_are_good(settings) && (!is_file || add_format(out, settings))) {
+        struct relight_job job = {.outputs = a.words[0], .settings = settings, .out = out};
+        if (!is_file)
+            status = file_make_dirs(out, &err);
+        if (status == STATUS_OK)
+            status = is_file ? run_one(&job, out, threads, is_quiet, &err) : run_into(&job, threads, is_quiet, &err);
+        code = finish(status, &err);
+    }
+    cJSON_Delete(settings);
+    return code;
+}

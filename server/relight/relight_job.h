@@ -1,0 +1,31 @@
+/* relight_job.h -- what a render is given, and whom it tells how far it is. */
+#ifndef UNBAKE_RELIGHT_RELIGHT_JOB_H
+#define UNBAKE_RELIGHT_RELIGHT_JOB_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "common/render_settings.h"
+
+struct denoiser; /* denoise.h */
+
+struct relight_job {
+    const char *outputs;             /* folder of a reconstruction's outputs */
+    const char *files;               /* folder of the files that settings name; NULL: they are paths */
+    const cJSON *settings;           /* that render_settings_check found good */
+    const char *out;                 /* an existing folder */
+    uint64_t first_view, view_count; /* a part: which of the pictures; view_count 0: all from the first */
+    const struct denoiser *denoiser; /* for denoise=true; NULL: there is none, which is STATUS_UNAVAILABLE then */
+};
+
+/* Callbacks; each may be NULL. They are called by the thread that called relight_run. */
+struct relight_watch {
+    void *user;
+    bool (*should_stop)(void *user);                         /* then STATUS_CANCELLED */
+    void (*progress)(void *user, double done, double total); /* pictures */
+    void (*file)(void *user, const char *name);              /* a file is complete, in `out` */
+    void (*preview)(void *user, const char *name);           /* the same of a PNG that will become better */
+    void (*message)(void *user, const char *text);           /* something that the user should know */
+};
+
+#endif

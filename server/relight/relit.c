@@ -1,0 +1,370 @@
+/* relit.c -- see relit.h. The room's triangles come first, those that are taken away left out, then the things'. */
+#include "server/relight/relit.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "common/file.h"
+#include "common/mem.h"
+#include "server/relight/environment.h"
+#include "server/relight/recovered.h"
+#include "server/relight/things.h"
+
+#define REPORT_MAX_BYTES ((size_t)256 << 20)
+
+/* --- settings of segments --------------------------------------------------------------------------------------- */
+
+static enum status check_segment(const char *setting, uint32_t segment, size_t count, struct error *err) {
+    if (segment < count)
+        return STATUS_OK;
+    return error_set(err, STATUS_INPUT, "setting %s: the room has segments 0 to %zu", setting, count - 1);
+}
+
+static void set_base_color(struct recovered *r, uint32_t segment, rgb color) {
+    for (size_t i = 0; i < r->inverse.valid_count; i++) {
+        size_t texel = r->inverse.valid[i];
+        if (r->segments.of_triangle[r->inverse.triangle[texel]] == segment)
+            memcpy(r->materials.base_color.texel[texel], &color, sizeof color);
+    }
+}
+
+/* Even over the segment. */
+static void set_emission(struct recovered *r, uint32_t segment, rgb radiance) {
+    r->materials.emission[segment] = radiance;
+    for (size_t i = 0; i < r->inverse.valid_count && r->materials.emission_pattern; i++) {
+        size_t texel = r->inverse.valid[i];
+        if (r->segments.of_triangle[r->inverse.triangle[texel]] == segment)
+            memset(r->materials.emission_pattern[texel], 0, sizeof r->materials.emission_pattern[texel]);
+    }
+}
+
+static void change_segment(struct recovered *r, const cJSON *settings, const char *name, uint32_t segment) {
+    double v[RENDER_MAX_NUMBERS] = {0.0, 0.0, 0.0};
+    const char *what = strrchr(name, '.') + 1;
+    render_settings_numbers(settings, name, v);
+    rgb color = rgb_make((float)v[0], (float)v[1], (float)v[2]);
+    if (strcmp(what, "base_color") == 0)
+        set_base_color(r, segment, color);
+    else if (strcmp(what, "emission") == 0)
+        set_emission(r, segment, color);
+    else if (strcmp(what, "roughness") == 0)
+        r->materials.roughness[segment] = color.r;
+    else
+        r->materials.specular[segment] = color.r;
+}
+
+/* The emission of segments first, then what is said of lights. */
+static enum status change_segments(struct recovered *r, const cJSON *settings, struct error *err) {
+    bool is_dark = render_settings_is(settings, "lights", "off");
+    float *is_on = mem_calloc(r->segments.count, sizeof *is_on);
+    uint32_t segment;
+    enum status status = STATUS_OK;
+    for (const cJSON *s = settings->child; s && status == STATUS_OK; s = s->next) {
+        bool is_light = strncmp(s->string, "light.", 6) == 0;
+        if (!is_light && strncmp(s->string, "segment.", 8) != 0)
+            continue;
+        render_settings_find(s->string, &segment);
+        status = check_segment(s->string, segment, r->segments.count, err);
+        if (status != STATUS_OK)
+            break;
+        if (is_light)
+            is_on[segment] = 1.0f;
+        else
+            change_segment(r, settings, s->string, segment);
+    }
+    for (size_t i = 0; i < r->segments.count && status == STATUS_OK && is_dark; i++)
+        if (is_on[i] == 0.0f)
+            r->materials.emission[i] = rgb_gray(0.0f);
+    for (const cJSON *s = settings->child; s && status == STATUS_OK; s = s->next) {
+        double factor[3];
+        if (strncmp(s->string, "light.", 6) != 0)
+            continue;
+        render_settings_find(s->string, &segment);
+        render_settings_factor(s, factor);
+        r->materials.emission[segment] =
+            rgb_mul(r->materials.emission[segment], rgb_make((float)factor[0], (float)factor[1], (float)factor[2]));
+    }
+    mem_free(is_on);
+    return status;
+}
+
+/* --- what is taken away ----------------------------------------------------------------------------------------- */
+
+/* Marks the segments of that name in report.json; how many there are. */
+static size_t mark_named(const cJSON *report, const char *name, bool *removed, size_t count) {
+    size_t found = 0;
+    const cJSON *segments = cJSON_GetObjectItemCaseSensitive(report, "segments");
+    for (const cJSON *s = segments ? segments->child : NULL; s; s = s->next) {
+        const char *its = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(s, "name"));
+        double number = cJSON_GetNumberValue(cJSON_GetObjectItemCaseSensitive(s, "segment"));
+        if (!its || strcmp(its, name) != 0 || !(number >= 0.0 && number < (double)count))
+            continue;
+        removed[(size_t)number] = true;
+        found++;
+    }
+    return found;
+}
+
+static enum status mark_one(const char *word, const cJSON *report, bool *removed, size_t count, struct error *err) {
+    char *end;
+    unsigned long number = strtoul(word, &end, 10);
+    if (mark_named(report, word, removed, count) > 0)
+        return STATUS_OK;
+    if (end == word || *end != '\0')
+        return error_set(err, STATUS_INPUT, "setting remove: the room has no segment \"%s\"", word);
+    enum status status = check_segment("remove", number < UINT32_MAX ? (uint32_t)number : UINT32_MAX, count, err);
+    if (status == STATUS_OK)
+        removed[number] = true;
+    return status;
+}
+
+/* removed[count], by the setting `remove`. */
+static enum status mark_removed(const struct relight_job *job, bool *removed, size_t count, struct error *err) {
+    const char *which = render_settings_text(job->settings, "remove");
+    enum status status = STATUS_OK;
+    cJSON *report = NULL;
+    if (*which == '\0')
+        return STATUS_OK;
+    char *path = file_join(job->outputs, "report.json");
+    if (json_read(path, REPORT_MAX_BYTES, &report, NULL) != STATUS_OK)
+        report = cJSON_CreateObject(); /* then there are no names */
+    for (const char *at = which; status == STATUS_OK;) {
+        size_t length = strcspn(at, ",");
+        char *word = mem_strndup(at, length);
+        status = mark_one(word, report, removed, count, err);
+        mem_free(word);
+        if (at[length] == '\0')
+            break;
+        at += length + 1;
+    }
+    cJSON_Delete(report);
+    mem_free(path);
+    return status;
+}
+
+static void leave_out(struct recovered *r, struct mesh *mesh, const bool *removed) {
+    size_t kept = 0;
+    for (size_t t = 0; t < mesh->triangle_count; t++) {
+        uint32_t segment = r->segments.of_triangle[t];
+        if (removed[segment])
+            continue;
+        mesh_move_triangle(mesh, t, kept);
+        memmove(r->atlas.corner[kept], r->atlas.corner[t], sizeof r->atlas.corner[t]);
+        r->segments.of_triangle[kept++] = segment;
+    }
+    mesh->triangle_count = kept;
+    for (size_t s = 0; s < r->segments.count; s++)
+        if (removed[s])
+            r->materials.emission[s] = rgb_gray(0.0f);
+}
+
+/* --- what is added ---------------------------------------------------------------------------------------------- */
+
+/* Makes the textures higher by one texel in a square of four for each thing; the texel of thing i is at *place. */
+static void extend_textures(struct materials *m, size_t things) {
+    struct texture *t = &m->base_color;
+    uint32_t columns = t->width / 2 > 0 ? t->width / 2 : 1;
+    uint32_t rows = 2 * (uint32_t)((things + columns - 1) / columns);
+    size_t old = (size_t)t->width * t->height, all = (size_t)t->width * (t->height + rows);
+    float(*texel)[4] = mem_calloc_large(all, sizeof *texel);
+    memcpy(texel, t->texel, old * sizeof *texel);
+    mem_free(t->texel);
+    t->texel = texel;
+    if (m->emission_pattern) {
+        uint16_t(*pattern)[3] = mem_calloc(all, sizeof *pattern);
+        memcpy(pattern, m->emission_pattern, old * sizeof *pattern);
+        mem_free(m->emission_pattern);
+        m->emission_pattern = pattern;
+    }
+    t->height += rows;
+}
+
+static void set_texel(struct materials *m, uint32_t first_row, size_t thing, rgb color, vec2 *place) {
+    struct texture *t = &m->base_color;
+    uint32_t columns = t->width / 2 > 0 ? t->width / 2 : 1;
+    uint32_t x = 2 * (uint32_t)(thing % columns), y = first_row + 2 * (uint32_t)(thing / columns);
+    float *texel = t->texel[(size_t)y * t->width + x];
+    texel[0] = color.r;
+    texel[1] = color.g;
+    texel[2] = color.b;
+    texel[3] = 1.0f;
+    *place = vec2_make((float)x + 0.5f, (float)y + 0.5f);
+}
+
+static void extend_segments(struct recovered *r, const struct things *things) {
+    struct materials *m = &r->materials;
+    size_t old = r->segments.count, count = old + things->count;
+    m->roughness = mem_realloc_array(m->roughness, count, sizeof *m->roughness);
+    m->specular = mem_realloc_array(m->specular, count, sizeof *m->specular);
+    m->emission = mem_realloc_array(m->emission, count, sizeof *m->emission);
+    m->cone = mem_array(count, sizeof *m->cone);
+    r->segments.id = mem_realloc_array(r->segments.id, count, sizeof *r->segments.id);
+    for (size_t s = 0; s < count; s++) {
+        m->cone[s] = s < old ? (struct emission_cone){-1.0f, -1.0f} : things->thing[s - old].cone;
+        r->segments.id[s] = (int64_t)s;
+        if (s < old)
+            continue;
+        m->roughness[s] = things->thing[s - old].roughness;
+        m->specular[s] = things->thing[s - old].specular;
+        m->emission[s] = things->thing[s - old].emission;
+    }
+    m->segment_count = r->segments.count = count;
+}
+
+/* Where one mesh has normals, the others get zeros, which mean none. */
+static void append_mesh(struct mesh *mesh, const struct mesh *more) {
+    size_t vertices = mesh->vertex_count + more->vertex_count, triangles = mesh->triangle_count + more->triangle_count;
+    mesh->position = mem_realloc_array(mesh->position, vertices, sizeof *mesh->position);
+    memcpy(mesh->position + mesh->vertex_count, more->position, more->vertex_count * sizeof *mesh->position);
+    if (mesh->normal || more->normal) {
+        vec3 *normal = mem_calloc(vertices, sizeof *normal);
+        if (mesh->normal)
+            memcpy(normal, mesh->normal, mesh->vertex_count * sizeof *normal);
+        if (more->normal)
+            memcpy(normal + mesh->vertex_count, more->normal, more->vertex_count * sizeof *normal);
+        mem_free(mesh->normal);
+        mesh->normal = normal;
+    }
+    mesh->index = mem_realloc_array(mesh->index, triangles, sizeof *mesh->index);
+    for (size_t t = 0; t < more->triangle_count; t++)
+        for (int k = 0; k < 3; k++)
+            mesh->index[mesh->triangle_count + t][k] = (uint32_t)mesh->vertex_count + more->index[t][k];
+    mesh->vertex_count = vertices;
+    mesh->triangle_count = triangles;
+}
+
+static void add_things(struct recovered *r, struct mesh *mesh, const struct things *things) {
+    uint32_t first_row = r->materials.base_color.height;
+    size_t first_segment = r->segments.count;
+    if (things->count == 0)
+        return;
+    extend_segments(r, things);
+    extend_textures(&r->materials, things->count);
+    r->atlas.height = r->materials.base_color.height;
+    for (size_t i = 0; i < things->count; i++) {
+        size_t first = mesh->triangle_count;
+        vec2 place;
+        set_texel(&r->materials, first_row, i, things->thing[i].base_color, &place);
+        append_mesh(mesh, &things->thing[i].mesh);
+        r->atlas.corner = mem_realloc_array(r->atlas.corner, mesh->triangle_count, sizeof *r->atlas.corner);
+        r->segments.of_triangle =
+            mem_realloc_array(r->segments.of_triangle, mesh->triangle_count, sizeof *r->segments.of_triangle);
+        for (size_t t = first; t < mesh->triangle_count; t++) {
+            for (int k = 0; k < 3; k++)
+                r->atlas.corner[t][k] = place;
+            r->segments.of_triangle[t] = (uint32_t)(first_segment + i);
+        }
+    }
+}
+
+/* --- all -------------------------------------------------------------------------------------------------------- */
+
+static void add_source(struct relit *r, char *name, uint32_t segment) {
+    r->source = mem_realloc_array(r->source, r->source_count + 1, sizeof *r->source);
+    r->source[r->source_count++] = (struct relit_source){name, segment};
+}
+
+static void list_sources(struct relit *r, size_t room_segments, const struct things *things) {
+    for (uint32_t s = 0; s < r->segments.count; s++) {
+        if (!(rgb_luminance(r->materials.emission[s]) > 0.0f))
+            continue;
+        add_source(r, s < room_segments ? mem_printf("light_%u", s) : mem_strdup(things->thing[s - room_segments].name),
+                   s);
+    }
+    if (r->distant.pixel)
+        add_source(r, mem_strdup("environment"), LIGHT_ENVIRONMENT);
+}
+
+/* Takes what recovered_read made, all but the world, which is not there yet. */
+static void take(struct recovered *from, struct relit *r) {
+    r->segments = from->segments;
+    r->atlas = from->atlas;
+    r->materials = from->materials;
+    from->segments = (struct segments){0};
+    from->atlas = (struct atlas){0};
+    from->materials = (struct materials){0};
+}
+
+static enum status build(const struct relight_job *job, const struct compass *compass, size_t room_segments,
+                         const struct things *things, struct parallel *pool, struct relit *r, struct error *err) {
+    bool has;
+    r->emission = mem_array(r->segments.count, sizeof *r->emission);
+    memcpy(r->emission, r->materials.emission, r->segments.count * sizeof *r->emission);
+    if (r->mesh.triangle_count == 0)
+        return error_set(err, STATUS_INPUT, "setting remove: nothing of the room is left");
+    enum status status = environment_read(job, compass, 0, &has, &r->distant, err);
+    if (status == STATUS_OK)
+        status = world_init(&r->world, &r->mesh, &r->segments, &r->atlas, &r->materials, has ? &r->distant : NULL, pool,
+                            err);
+    if (status == STATUS_OK)
+        list_sources(r, room_segments, things);
+    return status;
+}
+
+enum status relit_make(const struct relight_job *job, struct mesh *mesh, const struct compass *compass,
+                       struct parallel *pool, struct relit *r, struct error *err) {
+    struct recovered room = {0};
+    struct things things = {0};
+    *r = (struct relit){.mesh = *mesh};
+    *mesh = (struct mesh){0};
+    bool *removed = NULL;
+    enum status status = recovered_read(job->outputs, &r->mesh, pool, &room, err);
+    if (status != STATUS_OK)
+        goto out;
+    size_t room_segments = room.segments.count;
+    removed = mem_calloc(room_segments, sizeof *removed);
+    status = change_segments(&room, job->settings, err);
+    if (status == STATUS_OK)
+        status = mark_removed(job, removed, room_segments, err);
+    if (status == STATUS_OK)
+        status = things_read(job, compass, r->mesh.offset, &things, err);
+    if (status != STATUS_OK)
+        goto out;
+    leave_out(&room, &r->mesh, removed);
+    add_things(&room, &r->mesh, &things);
+    take(&room, r);
+    status = build(job, compass, room_segments, &things, pool, r, err);
+out:
+    mem_free(removed);
+    things_release(&things);
+    recovered_release(&room);
+    if (status != STATUS_OK)
+        relit_release(r);
+    return status;
+}
+
+void relit_release(struct relit *r) {
+    for (size_t i = 0; i < r->source_count; i++)
+        mem_free(r->source[i].name);
+    mem_free(r->source);
+    mem_free(r->emission);
+    image_release(&r->distant);
+    world_release(&r->world);
+    materials_release(&r->materials);
+    atlas_release(&r->atlas);
+    segments_release(&r->segments);
+    mesh_release(&r->mesh);
+    *r = (struct relit){0};
+}
+
+enum status relit_set_sun(struct relit *r, const struct relight_job *job, const struct compass *compass, uint32_t sun,
+                          struct parallel *pool, struct error *err) {
+    bool has;
+    image_release(&r->distant);
+    enum status status = environment_read(job, compass, sun, &has, &r->distant, err);
+    if (status == STATUS_OK)
+        world_set_environment(&r->world, has ? &r->distant : NULL, pool);
+    return status;
+}
+
+void relit_shine(struct relit *r, size_t source, struct parallel *pool) {
+    bool is_all = source == RELIT_ALL;
+    uint32_t alone = is_all ? 0 : r->source[source].segment;
+    for (uint32_t s = 0; s < r->segments.count; s++)
+        r->materials.emission[s] = is_all || s == alone ? r->emission[s] : rgb_gray(0.0f);
+    bool is_distant = r->distant.pixel && (is_all || alone == LIGHT_ENVIRONMENT);
+    world_set_environment(&r->world, is_distant ? &r->distant : NULL, pool);
+    world_update_lights(&r->world);
+}

@@ -1,0 +1,46 @@
+/* relit.h -- the room of a reconstruction as a render sees it: with other light, things taken away, changed and added. */
+#ifndef UNBAKE_RELIGHT_RELIT_H
+#define UNBAKE_RELIGHT_RELIT_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "server/relight/cameras.h"
+#include "common/error.h"
+#include "common/parallel.h"
+#include "server/relight/relight_job.h"
+#include "server/render/world.h"
+
+/* What shines: a segment of the room, a thing that was added, or distant light. */
+struct relit_source {
+    char *name;       /* "light_27", "lamp_1", "insert_2", "environment"; owned */
+    uint32_t segment; /* or LIGHT_ENVIRONMENT */
+};
+
+struct relit {
+    struct mesh mesh;
+    struct segments segments; /* those of the outputs, then one for each thing; no names */
+    struct atlas atlas;       /* no charts: corners only */
+    struct materials materials;
+    struct world world;
+    rgb *emission;        /* [segments.count] with all sources; owned */
+    struct image distant; /* distant light, where there is any */
+    size_t source_count;
+    struct relit_source *source; /* [source_count]; the environment is the last; owned */
+};
+
+/* `mesh`, the outputs' own, is taken over. The environment is that of sun 0. */
+enum status relit_make(const struct relight_job *job, struct mesh *mesh, const struct compass *compass,
+                       struct parallel *pool, struct relit *relit, struct error *err);
+void relit_release(struct relit *relit);
+
+/* Changes distant light to that of another sun. */
+enum status relit_set_sun(struct relit *relit, const struct relight_job *job, const struct compass *compass,
+                          uint32_t sun, struct parallel *pool, struct error *err);
+
+/* Leaves one source shining; RELIT_ALL: all of them. */
+#define RELIT_ALL SIZE_MAX
+void relit_shine(struct relit *relit, size_t source, struct parallel *pool);
+
+#endif

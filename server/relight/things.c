@@ -1,0 +1,248 @@
+/* things.c -- see things.h.
+ *
+ * A ball is an icosahedron whose triangles are split into four, three times. It is as large as makes its surface that of
+ * the ball: the mean area that a convex body shows is a quarter of its surface (Cauchy), so it gives as much light. */
+#include "server/relight/things.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "common/mem.h"
+#include "server/ingest/mesh/mesh_file.h"
+#include "server/relight/files.h"
+
+#define BALL_SPLITS 3
+#define DISC_CORNERS 32
+#define INSERT_MAX_TRIANGLES ((size_t)1 << 24)
+#define LAMP_ROUGHNESS 0.5f /* of a black body without a highlight: no matter */
+
+void things_release(struct things *t) {
+    for (size_t i = 0; i < t->count; i++) {
+        mem_free(t->thing[i].name);
+        mesh_release(&t->thing[i].mesh);
+    }
+    mem_free(t->thing);
+    *t = (struct things){0};
+}
+
+/* --- settings of one thing -------------------------------------------------------------------------------------- */
+
+/* "lamp.3.position" of family "lamp", number 3. */
+struct key {
+    char text[64];
+};
+
+static struct key key_of(const char *family, uint32_t number, const char *name) {
+    struct key key;
+    snprintf(key.text, sizeof key.text, "%s.%u.%s", family, number, name);
+    return key;
+}
+
+static double number_of(const cJSON *s, const char *family, uint32_t n, const char *name) {
+    return render_settings_number(s, key_of(family, n, name).text);
+}
+
+static rgb color_of(const cJSON *s, const char *family, uint32_t n, const char *name) {
+    double v[RENDER_MAX_NUMBERS] = {0.0, 0.0, 0.0};
+    render_settings_numbers(s, key_of(family, n, name).text, v);
+    return rgb_make((float)v[0], (float)v[1], (float)v[2]);
+}
+
+static vec3 place_of(const cJSON *s, const char *family, uint32_t n, const double offset[3]) {
+    double v[RENDER_MAX_NUMBERS] = {0.0, 0.0, 0.0};
+    render_settings_numbers(s, key_of(family, n, "position").text, v);
+    return vec3_make((float)(v[0] - offset[0]), (float)(v[1] - offset[1]), (float)(v[2] - offset[2]));
+}
+
+/* --- shapes ----------------------------------------------------------------------------------------------------- */
+
+static void begin(struct mesh *m, size_t vertices, size_t triangles) {
+    *m = (struct mesh){.position = mem_array(vertices, sizeof *m->position),
+                       .index = mem_array(triangles, sizeof *m->index)};
+}
+
+static void add_triangle(struct mesh *m, vec3 a, vec3 b, vec3 c) {
+    uint32_t first = (uint32_t)m->vertex_count;
+    const uint32_t corner[3] = {first, first + 1, first + 2};
+    m->position[m->vertex_count++] = a;
+    m->position[m->vertex_count++] = b;
+    m->position[m->vertex_count++] = c;
+    memcpy(m->index[m->triangle_count++], corner, sizeof corner);
+}
+
+/* Two unit vectors that make a right-handed frame with `front`, the first of them level. */
+static void frame_of(vec3 front, vec3 up, vec3 *across, vec3 *along) {
+    *across = vec3_cross(up, front);
+    if (vec3_length(*across) < 1e-3f)
+        vec3_frame(front, across, along);
+    *across = vec3_normalize(*across);
+    *along = vec3_cross(front, *across);
+}
+
+static void make_area(vec3 centre, vec3 front, vec3 up, double width, double height, struct mesh *m) {
+    vec3 across, along, corner[4];
+    frame_of(front, up, &across, &along);
+    for (int k = 0; k < 4; k++) {
+        float x = k == 1 || k == 2 ? 0.5f : -0.5f, y = k >= 2 ? 0.5f : -0.5f;
+        corner[k] = vec3_mad(vec3_mad(centre, x * (float)width, across), y * (float)height, along);
+    }
+    begin(m, 6, 2);
+    add_triangle(m, corner[0], corner[1], corner[2]);
+    add_triangle(m, corner[0], corner[2], corner[3]);
+}
+
+/* A regular polygon of the disc's area. */
+static void make_disc(vec3 centre, vec3 front, vec3 up, double radius, struct mesh *m) {
+    double step = 2.0 * PI / DISC_CORNERS, reach = radius * sqrt(step / sin(step));
+    vec3 across, along;
+    frame_of(front, up, &across, &along);
+    begin(m, (size_t)3 * DISC_CORNERS, DISC_CORNERS);
+    for (int k = 0; k < DISC_CORNERS; k++) {
+        vec3 corner[2];
+        for (int i = 0; i < 2; i++)
+            corner[i] = vec3_mad(vec3_mad(centre, (float)(reach * cos(step * (k + i))), across),
+                                 (float)(reach * sin(step * (k + i))), along);
+        add_triangle(m, centre, corner[0], corner[1]);
+    }
+}
+
+static void split_ball(struct mesh *m, vec3 a, vec3 b, vec3 c, int splits) {
+    if (splits == 0) {
+        add_triangle(m, a, b, c);
+        return;
+    }
+    vec3 ab = vec3_normalize(vec3_add(a, b)), bc = vec3_normalize(vec3_add(b, c)), ca = vec3_normalize(vec3_add(c, a));
+    split_ball(m, a, ab, ca, splits - 1);
+    split_ball(m, ab, b, bc, splits - 1);
+    split_ball(m, ca, bc, c, splits - 1);
+    split_ball(m, ab, bc, ca, splits - 1);
+}
+
+static void make_ball(vec3 centre, double radius, struct mesh *m) {
+    static const uint8_t face[20][3] = {{0, 11, 5}, {0, 5, 1},  {0, 1, 7},   {0, 7, 10}, {0, 10, 11},
+                                        {1, 5, 9},  {5, 11, 4}, {11, 10, 2}, {10, 7, 6}, {7, 1, 8},
+                                        {3, 9, 4},  {3, 4, 2},  {3, 2, 6},   {3, 6, 8},  {3, 8, 9},
+                                        {4, 9, 5},  {2, 4, 11}, {6, 2, 10},  {8, 6, 7},  {9, 8, 1}};
+    const float g = 1.618034f;
+    const vec3 corner[12] = {{-1, g, 0},  {1, g, 0},  {-1, -g, 0}, {1, -g, 0}, {0, -1, g},  {0, 1, g},
+                             {0, -1, -g}, {0, 1, -g}, {g, 0, -1},  {g, 0, 1},  {-g, 0, -1}, {-g, 0, 1}};
+    size_t triangles = (size_t)20 << (2 * BALL_SPLITS);
+    begin(m, 3 * triangles, triangles);
+    for (int f = 0; f < 20; f++)
+        split_ball(m, vec3_normalize(corner[face[f][0]]), vec3_normalize(corner[face[f][1]]),
+                   vec3_normalize(corner[face[f][2]]), BALL_SPLITS);
+    float scale = (float)(radius * sqrt(4.0 * PI / mesh_area(m)));
+    for (size_t v = 0; v < m->vertex_count; v++)
+        m->position[v] = vec3_mad(centre, scale, m->position[v]);
+}
+
+/* --- lamps ------------------------------------------------------------------------------------------------------ */
+
+/* Of ((c - outer) / (inner - outer))^2 over the cone, and 1 within the inner one, times 2 pi. */
+double things_spot_flux(struct emission_cone cone) {
+    double inner = (double)cone.inner, outer = (double)cone.outer;
+    return 2.0 * PI * (1.0 - inner + (inner - outer) / 3.0);
+}
+
+static struct emission_cone cone_of(const cJSON *s, uint32_t n) {
+    double half = 0.5 * number_of(s, "lamp", n, "angle") * PI / 180.0, blend = number_of(s, "lamp", n, "blend");
+    double outer = cos(half), inner = cos(half * (1.0 - blend));
+    return (struct emission_cone){(float)outer, (float)fmax(inner, outer + 1e-4)};
+}
+
+/* The radiance that gives the flux, of the colour of `radiance`. */
+static rgb radiance_of_flux(const cJSON *s, double lumen, double flux_per_luminance, rgb radiance) {
+    double luminance = lumen / flux_per_luminance / render_settings_number(s, "luminance_per_unit");
+    float now = rgb_luminance(radiance);
+    return now > 0.0f ? rgb_scale(radiance, (float)luminance / now) : radiance;
+}
+
+static enum status make_lamp(const cJSON *s, uint32_t n, const struct compass *compass, const double offset[3],
+                             struct thing *lamp, struct error *err) {
+    struct key kind = key_of("lamp", n, "kind");
+    rgb toward = color_of(s, "lamp", n, "direction");
+    vec3 centre = place_of(s, "lamp", n, offset), front = vec3_normalize(vec3_make(toward.r, toward.g, toward.b));
+    double size[RENDER_MAX_NUMBERS], radius = number_of(s, "lamp", n, "radius"), solid = PI;
+    lamp->cone.outer = -1.0f;
+    if (!render_settings_is(s, kind.text, "sphere") && !(vec3_length(front) > 0.0f))
+        return error_set(err, STATUS_INPUT, "setting lamp.%u.direction: must not be 0, 0, 0", n);
+    if (render_settings_is(s, kind.text, "sphere")) {
+        make_ball(centre, radius, &lamp->mesh);
+    } else if (render_settings_is(s, kind.text, "spot")) {
+        make_disc(centre, front, compass->up, radius, &lamp->mesh);
+        lamp->cone = cone_of(s, n);
+        solid = things_spot_flux(lamp->cone);
+    } else {
+        render_settings_numbers(s, key_of("lamp", n, "size").text, size);
+        make_area(centre, front, compass->up, size[0], size[1], &lamp->mesh);
+    }
+    lamp->name = mem_printf("lamp_%u", n);
+    lamp->roughness = LAMP_ROUGHNESS;
+    lamp->emission = color_of(s, "lamp", n, "radiance");
+    double lumen = number_of(s, "lamp", n, "lumen");
+    if (lumen > 0.0)
+        lamp->emission = radiance_of_flux(s, lumen, solid * mesh_area(&lamp->mesh), lamp->emission);
+    return STATUS_OK;
+}
+
+/* --- meshes of files -------------------------------------------------------------------------------------------- */
+
+/* The file's y is up. */
+static void move_mesh(const cJSON *s, uint32_t n, const struct compass *compass, vec3 to, struct mesh *m) {
+    double turn = number_of(s, "insert", n, "turn") * PI / 180.0;
+    float scale = (float)number_of(s, "insert", n, "scale"), c = (float)cos(turn), i = (float)sin(turn);
+    for (size_t v = 0; v < m->vertex_count; v++) {
+        vec3 file[2] = {
+            vec3_add(m->position[v], vec3_make((float)m->offset[0], (float)m->offset[1], (float)m->offset[2])),
+            m->normal ? m->normal[v] : vec3_make(0.0f, 0.0f, 0.0f)};
+        for (int k = 0; k < 2; k++) {
+            vec3 p = file[k];
+            file[k] = compass_from_map(compass, vec3_make(c * p.x + i * p.z, p.y, c * p.z - i * p.x));
+        }
+        m->position[v] = vec3_mad(to, scale, file[0]);
+        if (m->normal)
+            m->normal[v] = file[1];
+    }
+}
+
+static enum status make_insert(const struct relight_job *job, uint32_t n, const struct compass *compass,
+                               const double offset[3], struct thing *thing, struct error *err) {
+    const cJSON *s = job->settings;
+    struct faces_report report;
+    const char *name = render_settings_text(s, key_of("insert", n, "file").text);
+    char *path = files_path(job, name);
+    enum status status = mesh_file_read(path, name, INSERT_MAX_TRIANGLES, &thing->mesh, &report, err);
+    if (status == STATUS_OK)
+        status = mesh_check(&thing->mesh, name, NULL, err);
+    mem_free(path);
+    if (status != STATUS_OK)
+        return status;
+    move_mesh(s, n, compass, place_of(s, "insert", n, offset), &thing->mesh);
+    thing->name = mem_printf("insert_%u", n);
+    thing->base_color = color_of(s, "insert", n, "base_color");
+    thing->emission = color_of(s, "insert", n, "emission");
+    thing->roughness = (float)number_of(s, "insert", n, "roughness");
+    thing->specular = (float)number_of(s, "insert", n, "specular");
+    thing->cone.outer = -1.0f;
+    return STATUS_OK;
+}
+
+enum status things_read(const struct relight_job *job, const struct compass *compass, const double offset[3],
+                        struct things *t, struct error *err) {
+    size_t lamps, inserts;
+    uint32_t *lamp = render_settings_family(job->settings, "lamp.", &lamps);
+    uint32_t *insert = render_settings_family(job->settings, "insert.", &inserts);
+    enum status status = STATUS_OK;
+    *t = (struct things){.thing = mem_calloc(lamps + inserts, sizeof *t->thing)};
+    for (size_t i = 0; i < lamps + inserts && status == STATUS_OK; i++) {
+        struct thing *thing = &t->thing[t->count++];
+        status = i < lamps ? make_lamp(job->settings, lamp[i], compass, offset, thing, err)
+                           : make_insert(job, insert[i - lamps], compass, offset, thing, err);
+    }
+    mem_free(lamp);
+    mem_free(insert);
+    if (status != STATUS_OK)
+        things_release(t);
+    return status;
+}
