@@ -29,12 +29,12 @@ void things_release(struct things *t) {
 /* --- settings of one thing -------------------------------------------------------------------------------------- */
 
 /* "lamp.3.position" of family "lamp", number 3. */
-struct key {
+struct thing_key {
     char text[64];
 };
 
-static struct key key_of(const char *family, uint32_t number, const char *name) {
-    struct key key;
+static struct thing_key key_of(const char *family, uint32_t number, const char *name) {
+    struct thing_key key;
     snprintf(key.text, sizeof key.text, "%s.%u.%s", family, number, name);
     return key;
 }
@@ -160,7 +160,7 @@ static rgb radiance_of_flux(const cJSON *s, double lumen, double flux_per_lumina
 
 static enum status make_lamp(const cJSON *s, uint32_t n, const struct compass *compass, const double offset[3],
                              struct thing *lamp, struct error *err) {
-    struct key kind = key_of("lamp", n, "kind");
+    struct thing_key kind = key_of("lamp", n, "kind");
     rgb toward = color_of(s, "lamp", n, "direction");
     vec3 centre = place_of(s, "lamp", n, offset), front = vec3_normalize(vec3_make(toward.r, toward.g, toward.b));
     double size[RENDER_MAX_NUMBERS], radius = number_of(s, "lamp", n, "radius"), solid = PI;
