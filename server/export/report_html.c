@@ -6,6 +6,7 @@
 
 #include "server/export/html.h"
 #include "server/export/report_curve.h"
+#include "server/export/report_verdict.h"
 
 #define SEGMENT_ROWS 60 /* the rest is in report.json */
 
@@ -18,7 +19,7 @@ static const char style[] =
     "background:var(--page);color:var(--ink);font:15px/1.5 system-ui,'DejaVu Sans',sans-serif}"
     "h1{font-size:1.8rem;margin:0}h2{font-size:1.15rem;margin:2.5rem 0 .8rem}"
     "p{margin:.3rem 0 .8rem}.soft,figcaption span,th{color:var(--soft)}"
-    ".grid{display:grid;gap:1rem;grid-template-columns:repeat(auto-fill,minmax(20rem,1fr))}"
+    ".grid{display:grid;gap:1rem;grid-template-columns:repeat(auto-fill,minmax(min(20rem,100%),1fr))}"
     ".card,figure{margin:0;background:var(--card);border:1px solid var(--line);"
     "border-radius:8px;padding:.8rem}.card{overflow-x:auto}.card:focus-visible{outline:2px solid var(--accent)}"
     "img{display:block;width:100%;height:auto;border-radius:4px;background:#16181b}"
@@ -35,6 +36,8 @@ static const char style[] =
     "svg{display:block;width:100%;height:auto}svg text{fill:var(--soft);font-size:11px}"
     "svg path{fill:none;stroke:var(--accent);stroke-width:1.6;vector-effect:non-scaling-stroke}"
     "svg line{stroke:var(--line)}"
+    ".verdict{font-size:1.05rem;margin:1rem 0}"
+    "@media(max-width:34rem){body{padding:1rem .7rem 3rem}h1{font-size:1.4rem}}"
     "@media print{.card,figure{break-inside:avoid}}";
 
 /* A card scrolls where its table is too wide: by keyboard too, and so it has a name. */
@@ -65,6 +68,29 @@ static enum status put_textures(struct buf *out, const struct report_page *page,
     return status;
 }
 
+/* A figure of a held-out view, with its name, its unit and what is good. */
+static void put_figure(struct buf *out, const cJSON *figure) {
+    static const struct {
+        const char *key, *name, *good;
+    } known[] = {
+        {"msre", "mean squared relative error", ", 0 is best"},
+        {"msre_render_noise", "of it noise of the re-render", ""},
+        {"msre_photograph_noise", "of it noise of the photograph", ""},
+        {"psnr_db", "PSNR in dB", ", 25 and more is good"},
+        {"ssim", "SSIM", ", 1 is best"},
+        {"samples", "samples a pixel", ""},
+    };
+    const char *name = NULL, *good = "";
+    for (size_t i = 0; i < sizeof known / sizeof *known; i++)
+        if (strcmp(known[i].key, figure->string) == 0)
+            name = known[i].name, good = known[i].good;
+    html_key(out, name ? name : figure->string);
+    buf_puts(out, " ");
+    html_number(out, figure->valuedouble);
+    buf_puts(out, good);
+    buf_puts(out, ";&ensp;");
+}
+
 static enum status put_comparisons(struct buf *out, const struct report_page *page, struct error *err) {
     if (page->comparison_count == 0)
         return STATUS_OK;
@@ -85,10 +111,7 @@ static enum status put_comparisons(struct buf *out, const struct report_page *pa
         for (const cJSON *m = view ? view->child : NULL; m; m = m->next) {
             if (!cJSON_IsNumber(m))
                 continue;
-            html_key(out, m->string);
-            buf_puts(out, " ");
-            html_number(out, m->valuedouble);
-            buf_puts(out, "&ensp;");
+            put_figure(out, m);
         }
         buf_puts(out, "</span></figcaption></figure>");
         view = view ? view->next : NULL;
@@ -209,6 +232,7 @@ static void put_others(struct buf *out, const cJSON *report, bool plain) {
     static const char *const drawn[] = {"title", "series", "stages", "views", "segments", "files"};
     for (const cJSON *member = report->child; member; member = member->next) {
         bool skip = (!cJSON_IsObject(member) && !cJSON_IsArray(member)) != plain;
+        skip = skip || (!plain && !member->child); /* nothing in it */
         for (size_t i = 0; i < sizeof drawn / sizeof *drawn; i++)
             skip = skip || strcmp(member->string, drawn[i]) == 0;
         if (skip)
@@ -261,19 +285,20 @@ enum status report_html(const struct report_page *page, struct buf *out, struct 
     buf_puts(out, "</h1><p class=soft>Materials and lights recovered by unbake. Colours are linear "
                   "Rec. 709; radiance is in units in which a frame of exposure 1 maps radiance 1 "
                   "to pixel value 1.</p>");
-    begin_card(out, "", "summary");
-    buf_puts(out, "<table>");
-    put_others(out, report, true);
-    buf_puts(out, "</table></div>");
-    enum status status = put_textures(out, page, err);
+    report_verdict(out, report);
+    enum status status = put_comparisons(out, page, err);
     if (status == STATUS_OK)
-        status = put_comparisons(out, page, err);
+        status = put_textures(out, page, err);
     if (status != STATUS_OK)
         return status;
     put_curves(out, cJSON_GetObjectItemCaseSensitive(report, "series"));
     put_segments(out, cJSON_GetObjectItemCaseSensitive(report, "segments"));
     put_stages(out, cJSON_GetObjectItemCaseSensitive(report, "stages"));
-    buf_puts(out, "<h2>Figures and settings</h2><div class=grid>");
+    buf_puts(out, "<h2>Figures and settings</h2>");
+    begin_card(out, "", "summary");
+    buf_puts(out, "<table>");
+    put_others(out, report, true);
+    buf_puts(out, "</table></div><div class=grid>");
     put_others(out, report, false);
     buf_puts(out, "</div>");
     put_files(out, cJSON_GetObjectItemCaseSensitive(report, "files"));

@@ -1,0 +1,128 @@
+/* report_verdict.c -- see report_verdict.h. */
+#include "server/export/report_verdict.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "server/export/html.h"
+
+/* PSNR in dB from which two pictures look alike to most, and from which they differ only in detail: rules of thumb of
+ * picture coding, for the words alone. */
+#define PSNR_CLOSE 30.0
+#define PSNR_GOOD 25.0
+#define PSNR_FAIR 20.0
+#define SEEN_WHOLE 0.95     /* of the surface: less is said */
+#define FEW_PHOTOGRAPHS 20  /* of the training; fewer is said */
+#define UNSEEN_LIGHT 0.05   /* of the rays that leave the room where no photograph shows what is there */
+#define UNCERTAIN_LIGHT 0.3 /* relative deviation of a source's radiance */
+#define NOISE_DOMINATES 0.5 /* of the error of held-out views */
+
+/* A number by its path of two names; NAN where it is not there. */
+static double number_at(const cJSON *report, const char *first, const char *second) {
+    const cJSON *at = cJSON_GetObjectItemCaseSensitive(report, first);
+    at = second ? cJSON_GetObjectItemCaseSensitive(at, second) : at;
+    return cJSON_IsNumber(at) ? at->valuedouble : NAN;
+}
+
+static bool is_true(const cJSON *object, const char *name) {
+    return cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(object, name));
+}
+
+static void put_found(struct buf *out, const cJSON *report) {
+    const cJSON *segments = cJSON_GetObjectItemCaseSensitive(report, "segments"), *s;
+    int count = cJSON_GetArraySize(segments), lamps = 0;
+    cJSON_ArrayForEach(s, segments)
+        lamps += is_true(s, "emitter");
+    buf_printf(out, "<p>Found: base colour, roughness and specular of %d segment%s; ", count, count == 1 ? "" : "s");
+    if (lamps == 0)
+        buf_puts(out, "no segment shines");
+    else
+        buf_printf(out, lamps == 1 ? "1 of them shines" : "%d of them shine", lamps);
+    if (is_true(cJSON_GetObjectItemCaseSensitive(report, "sun"), "found"))
+        buf_puts(out, "; the sun shines in");
+    buf_puts(out, ".</p>");
+}
+
+static void put_views(struct buf *out, const cJSON *report) {
+    double views = number_at(report, "metrics", "held_out_views"), psnr = number_at(report, "metrics", "psnr_db");
+    double error = number_at(report, "metrics", "msre"), noise = number_at(report, "metrics", "msre_render_noise");
+    if (!(views > 0.0) || !isfinite(psnr)) {
+        buf_puts(out, "<p>No photograph was held out, so that nothing here says how far the result is off.</p>");
+        return;
+    }
+    const char *word = psnr >= PSNR_CLOSE  ? "is hard to tell from the photograph"
+                       : psnr >= PSNR_GOOD ? "agrees with the photograph but for details"
+                       : psnr >= PSNR_FAIR ? "differs visibly from the photograph"
+                                           : "is far from the photograph";
+    buf_printf(out, "<p>A re-render of the %.0f held-out view%s %s: %.1f dB PSNR in the mean (%.0f and more is good).",
+               views, views == 1.0 ? "" : "s", word, psnr, PSNR_GOOD);
+    if (noise > NOISE_DOMINATES * error)
+        buf_printf(out,
+                   " %.0f %% of the squared relative error is noise of the re-render itself, not of the result: "
+                   "report_samples makes it less.",
+                   100.0 * fmin(noise / error, 1.0));
+    buf_puts(out, "</p>");
+}
+
+static void put_lights(struct buf *out, const cJSON *report, int *reasons) {
+    const cJSON *light;
+    int uncertain = 0, hidden = 0, saturated = 0;
+    double most = 0.0;
+    cJSON_ArrayForEach(light, cJSON_GetObjectItemCaseSensitive(report, "lights")) {
+        double deviation = number_at(light, "deviation", NULL);
+        const char *kind = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(light, "kind"));
+        hidden += kind && strcmp(kind, "hidden") == 0;
+        saturated += kind && strncmp(kind, "saturated", 9) == 0;
+        uncertain += deviation > UNCERTAIN_LIGHT;
+        most = fmax(most, isfinite(deviation) ? deviation : 0.0);
+    }
+    if (hidden > 0)
+        buf_printf(out, "<li>%d source%s of light in no photograph: told from what is lit alone.</li>", hidden,
+                   hidden == 1 ? "" : "s");
+    if (saturated > 0)
+        buf_printf(out, "<li>%d source%s of light too bright for every photograph: told from what is lit alone.</li>",
+                   saturated, saturated == 1 ? "" : "s");
+    if (uncertain > 0)
+        buf_printf(out,
+                   "<li>The brightness of %d source%s of light cannot be told well: the standard deviation is up to "
+                   "%.0f %%.</li>",
+                   uncertain, uncertain == 1 ? "" : "s", 100.0 * most);
+    *reasons += (hidden > 0) + (saturated > 0) + (uncertain > 0);
+}
+
+static void put_weak(struct buf *out, const cJSON *report) {
+    double seen = number_at(report, "seen_surface_share", NULL);
+    double photographs = number_at(report, "prepare", "training_photographs");
+    double unseen = number_at(report, "unseen_light", "share_of_rays");
+    int reasons = 0;
+    buf_puts(out, "<p>Where it is weak:</p><ul>");
+    if (seen < SEEN_WHOLE) {
+        buf_printf(out, "<li>%.0f %% of the surface is in no photograph: its colour is that of its surroundings.</li>",
+                   100.0 * (1.0 - seen));
+        reasons++;
+    }
+    if (photographs < FEW_PHOTOGRAPHS) {
+        buf_printf(out, "<li>Few photographs: %.0f. Gloss and noise are told apart by many views of a place.</li>",
+                   photographs);
+        reasons++;
+    }
+    if (unseen > UNSEEN_LIGHT) {
+        buf_printf(out, "<li>%.0f %% of the light's directions lead to where no photograph looks.</li>",
+                   100.0 * unseen);
+        reasons++;
+    }
+    put_lights(out, report, &reasons);
+    if (reasons == 0 && seen >= SEEN_WHOLE)
+        buf_puts(out, "<li>No weakness is known: photographs show all of the surface.</li>");
+    else if (reasons == 0)
+        buf_puts(out, "<li>Nothing is known of it.</li>");
+    buf_puts(out, "</ul>");
+}
+
+void report_verdict(struct buf *out, const cJSON *report) {
+    buf_puts(out, "<section class=\"card verdict\" aria-label=\"verdict\">");
+    put_found(out, report);
+    put_views(out, report);
+    put_weak(out, report);
+    buf_puts(out, "</section>");
+}

@@ -1,0 +1,47 @@
+/* The report's verdict says what its figures mean, and speaks of nothing that is not known. */
+#include "server/export/report_verdict.h"
+
+#include <string.h>
+
+#include "tests/check.h"
+
+static bool says(const char *json, const char *words) {
+    struct buf out;
+    buf_init(&out, 1 << 16);
+    cJSON *report = cJSON_Parse(json);
+    CHECK(report != NULL);
+    report_verdict(&out, report);
+    bool is = strstr(buf_text(&out), words) != NULL;
+    cJSON_Delete(report);
+    buf_release(&out);
+    return is;
+}
+
+int main(void) {
+    const char *good =
+        "{\"metrics\": {\"held_out_views\": 6, \"psnr_db\": 31.4, \"msre\": 0.01, \"msre_render_noise\": 0.001},"
+        "\"seen_surface_share\": 0.99, \"prepare\": {\"training_photographs\": 54},"
+        "\"segments\": [{\"emitter\": true}, {\"emitter\": false}], \"sun\": {\"found\": false},"
+        "\"lights\": [{\"kind\": \"segment\", \"deviation\": 0.05}]}";
+    CHECK(says(good, "of 2 segments; 1 of them shines."));
+    CHECK(says(good, "6 held-out views is hard to tell from the photograph: 31.4 dB"));
+    CHECK(says(good, "No weakness is known"));
+    CHECK(!says(good, "noise of the re-render"));
+    const char *bad =
+        "{\"metrics\": {\"held_out_views\": 1, \"psnr_db\": 18, \"msre\": 0.86, \"msre_render_noise\": 0.80},"
+        "\"seen_surface_share\": 0.59, \"prepare\": {\"training_photographs\": 5},"
+        "\"unseen_light\": {\"share_of_rays\": 0.2}, \"sun\": {\"found\": true},"
+        "\"lights\": [{\"kind\": \"hidden\", \"deviation\": 0.5}, {\"kind\": \"hidden\", \"deviation\": 0.1}]}";
+    CHECK(says(bad, "no segment shines; the sun shines in"));
+    CHECK(says(bad, "1 held-out view is far from the photograph: 18.0 dB"));
+    CHECK(says(bad, "93 % of the squared relative error is noise"));
+    CHECK(says(bad, "41 % of the surface is in no photograph"));
+    CHECK(says(bad, "Few photographs: 5."));
+    CHECK(says(bad, "20 % of the light's directions"));
+    CHECK(says(bad, "2 sources of light in no photograph"));
+    CHECK(says(bad, "brightness of 1 source of light cannot be told well: the standard deviation is up to 50 %"));
+    CHECK(!says(bad, "No weakness is known"));
+    CHECK(says("{}", "No photograph was held out"));
+    CHECK(!says("{}", "of the surface"));
+    return check_result();
+}
