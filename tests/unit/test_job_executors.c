@@ -1,0 +1,119 @@
+/* test_job_executors.c -- where jobs run: whose turn it is when some places are full, and which place a job gets. */
+#include <string.h>
+
+#include "server/job/executors.h"
+#include "server/store/remote.h"
+#include "tests/unit/store_rig.h"
+
+static int64_t add_on(struct store *store, const char *settings) {
+    struct job_new new = {.scene_id = SCENE_A, .name = "n", .labels = "{}", .settings = settings, .max_attempts = 2};
+    int64_t id = 0;
+    bool replayed;
+    OK(store_job_add(store, &new, 1000, &id, &replayed, &err));
+    return id;
+}
+
+/* The next job when these have a place. */
+static int64_t next_on(struct store *store, const char *names, bool anywhere) {
+    const struct job_lane lane = {.executors = names, .anywhere = anywhere};
+    int64_t id = 0;
+    return store_job_next(store, 0, &lane, &id, &err) == STATUS_OK ? id : 0;
+}
+
+static void check_wish(struct store *store, int64_t id, const char *wanted) {
+    char *found;
+    OK(store_job_executor(store, id, &found, &err));
+    CHECK_STRING(found, wanted);
+    mem_free(found);
+}
+
+static void test_turns(struct store *store) {
+    int64_t slurm = add_on(store, "{\"executor\":\"slurm\"}"), any = add_on(store, "{}"),
+            here = add_on(store, "{\"executor\":\"process\"}"), broken = add_on(store, "{\"executor\":");
+    check_wish(store, slurm, "slurm");
+    check_wish(store, any, "");
+    check_wish(store, broken, "");
+    CHECK(next_on(store, NULL, true) == slurm);
+    CHECK(next_on(store, " process slurm ", true) == slurm);
+    CHECK(next_on(store, " process ", true) == any); /* a full cluster holds up none that may run here */
+    CHECK(next_on(store, " process ", false) == here);
+    CHECK(next_on(store, " pbs ", true) == any);
+    CHECK(next_on(store, " slur ", false) == 0);
+    CHECK(next_on(store, " slurm-2 ", false) == 0);
+    /* Extended, it may be somewhere else. */
+    OK(store_job_cancel(store, slurm, &err));
+    OK(store_job_extend(store, slurm, 2, "{\"executor\":\"pbs\"}", NULL, &err));
+    check_wish(store, slurm, "pbs");
+    OK(store_job_cancel(store, slurm, &err));
+    OK(store_job_cancel(store, any, &err));
+    OK(store_job_cancel(store, here, &err));
+    OK(store_job_cancel(store, broken, &err));
+}
+
+static void test_places(void) {
+    const struct executor here = {.name = "process"}, slurm = {.name = "slurm", .max_running = 2};
+    const struct executor *both[] = {&slurm, &here}, *only[] = {&slurm};
+    struct scheduler_config config = {.executor = &here, .max_running = 1, .places = both, .place_count = 2};
+    struct attempt slots[3] = {{.phase = ATTEMPT_ALIVE, .executor = &slurm},
+                               {.phase = ATTEMPT_ENDED, .executor = &slurm}};
+    struct executors e;
+    executors_init(&e, &config);
+    CHECK(e.slots == 3);
+    executors_count(&e, slots, 1);
+    CHECK(executors_for(&e, "")->executor == &slurm && executors_for(&e, "process")->executor == &here);
+    CHECK(!executors_for(&e, "pbs") && executors_find(&e, "slurm") && !executors_find(&e, "pbs"));
+    executors_count(&e, slots, 3); /* one that is still to be settled has its place */
+    CHECK(executors_for(&e, "")->executor == &here && !executors_for(&e, "slurm"));
+    char *names = executors_free(&e);
+    CHECK_STRING(names, " process ");
+    mem_free(names);
+    executors_add(&e, &here);
+    CHECK(!executors_for(&e, "") && !executors_free(&e));
+    executors_release(&e);
+
+    /* This machine is not in the list: it takes what must run here, and nothing else. */
+    config.places = only;
+    config.place_count = 1;
+    executors_init(&e, &config);
+    executors_count(&e, slots, 3);
+    CHECK(e.slots == 3 && !executors_for(&e, "") && executors_for(&e, "process")->executor == &here);
+    executors_release(&e);
+}
+
+/* A submission that did not come through is repeated under another name and token: the first has no say any more. */
+static void test_rename(struct store *store) {
+    static const char first[] = "1111111111111111111111111111111111111111111111111111111111111111",
+                      second[] = "2222222222222222222222222222222222222222222222222222222222222222";
+    struct remote_row row = {.executor = "slurm", .name = "unbake-a", .lease_sec = 60};
+    struct remote_key key = {.token_sha256 = first, .claimant = "aa"};
+    key.job_id = row.job_id = add_on(store, "{}");
+    OK(store_job_start(store, row.job_id, "slurm", &row.number, &err));
+    key.number = row.number;
+    OK(store_remote_begin(store, &row, first, &err));
+    OK(store_remote_rename(store, row.job_id, row.number, "unbake-b", second, &err));
+    IS(store_remote_claim(store, &key, "late", &row, &err), STATUS_NOT_FOUND);
+    key.token_sha256 = second;
+    OK(store_remote_claim(store, &key, "node", &row, &err));
+    CHECK_STRING(row.name, "unbake-b");
+    IS(store_remote_rename(store, key.job_id, key.number, "unbake-c", first, &err), STATUS_CONFLICT);
+    /* It outlives a start of the daemon that keeps it; one that does not, queues it. */
+    size_t requeued;
+    OK(store_reconcile(store, &key.job_id, 1, &requeued, &err));
+    CHECK(requeued == 0);
+    OK(store_reconcile(store, NULL, 0, &requeued, &err));
+    CHECK(requeued == 1);
+    IS(store_remote_may_read(store, &key, &err), STATUS_CONFLICT);
+}
+
+int main(void) {
+    struct store *store;
+    char *dir = fresh_dir();
+    OK(store_open(&store, dir, &err));
+    add_ready_scene(store, SCENE_A);
+    test_turns(store);
+    test_places();
+    test_rename(store);
+    store_close(store);
+    drop_dir(dir);
+    return check_result();
+}
