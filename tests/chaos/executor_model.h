@@ -22,9 +22,12 @@
 #include "server/store/remote.h"
 #include "tests/unit/store_rig.h"
 
+#ifndef JOBS_MAX
 #define JOBS_MAX 4
 #define CLUSTER_MAX 400 /* jobs that the site ever has in one script */
-#define WORK_REPORTS 5  /* of an attempt before it is done */
+#endif
+#define ERRANDS_MAX 256
+#define WORK_REPORTS 5 /* of an attempt before it is done */
 #define FAULTS_SEC 900.0
 #define LAST_SEC 20000.0 /* by then everything must have ended */
 
@@ -61,14 +64,14 @@ static struct model {
     struct site site;
     struct remote *remote;
     struct courier courier;
-    struct errand *errand[64];
-    double errand_at[64];
+    struct errand *errand[ERRANDS_MAX];
+    double errand_at[ERRANDS_MAX];
     size_t errand_count;
     struct cluster_job cluster[CLUSTER_MAX];
     size_t cluster_count;
-    char last_status[65536];
+    char last_status[1 << 18];
     struct model_job job[JOBS_MAX];
-    size_t job_count;
+    size_t job_count, running, running_max; /* running_max 0: no limit */
     char *dir;
     long claims, ends, restarts, resubmissions, losses, preemptions; /* over all scripts */
 } model;
@@ -170,7 +173,7 @@ static inline void do_cancel(struct errand *e) {
 
 static inline void courier_send(struct courier *courier, struct errand *e) {
     (void)courier;
-    CHECK(model.errand_count < 64);
+    CHECK(model.errand_count < ERRANDS_MAX);
     model.busy_until = fmax(model.busy_until, model.now) + between(0.05, happens(0.1) ? 60.0 : 2.0);
     model.errand[model.errand_count] = e;
     model.errand_at[model.errand_count++] = model.busy_until;
@@ -379,6 +382,7 @@ static inline void start_one(struct model_job *job) {
     job->has_node_end = job->was_killed_daemon = false;
     job->wish = -1;
     OK(executor->start(executor, &work, &job->run, &err));
+    model.running++;
     cJSON_Delete(order);
     mem_free(path);
     mem_free(folder);
@@ -412,11 +416,14 @@ static inline void settle(struct model_job *job, const struct run_end *end) {
     }
     run_free(job->run);
     job->run = NULL;
+    model.running--;
 }
 
 static inline void job_turn(struct model_job *job) {
     struct run_end end;
     struct job row;
+    if (job->is_over)
+        return;
     if (job->run) {
         run_read(job->run, hear_line, job);
         if (run_ended(job->run, &end, hear_line, job)) {
@@ -438,7 +445,7 @@ static inline void job_turn(struct model_job *job) {
     job->is_over = job_is_terminal(row.state);
     CHECK(row.state == JOB_QUEUED || job->is_over);
     job_release(&row);
-    if (!job->is_over)
+    if (!job->is_over && (model.running_max == 0 || model.running < model.running_max))
         start_one(job);
 }
 
@@ -519,7 +526,7 @@ static inline void run_script(uint64_t seed) {
     model.random = rng_mix64(seed) >> 1;
     model.now = model.busy_until = 0.0;
     model.is_calm = false;
-    model.cluster_count = model.errand_count = 0;
+    model.cluster_count = model.errand_count = model.running = 0;
     model.last_status[0] = '\0';
     model.job_count = 1 + (size_t)(chance() * JOBS_MAX) % JOBS_MAX;
     for (size_t i = 0; i < model.job_count; i++)
