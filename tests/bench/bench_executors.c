@@ -1,4 +1,4 @@
-/* executor_load.c -- what 2,000 jobs on 64 nodes cost the daemon: the real executor and store with a fake cluster in virtual
+/* bench_executors.c -- what 2,000 jobs on 64 nodes cost the daemon: the real executor and store with a fake cluster in virtual
  * time (tests/chaos/executor_model.h), nothing going wrong. A node reports every 6 s on average, two lines each time.
  * Prints processor time in all and by report, the number of status commands, and memory. HTTP is not in it. */
 #define JOBS_MAX 2000
@@ -6,6 +6,7 @@
 #include <sys/resource.h>
 
 #include "tests/chaos/executor_model.h"
+#include "tests/figures.h"
 
 #define NODES 64
 
@@ -52,6 +53,8 @@ int main(void) {
            NODES, model.now, model.ends, reports);
     printf("CPU %.2f s, %.0f us a report; %llu submit commands, %llu status commands; %ld MiB resident\n", spent,
            1e6 * spent / (double)reports, atomic_load(&f->submissions), atomic_load(&f->queries), used.ru_maxrss >> 10);
+    figure("daemon, us of CPU for a report of a node", 1e6 * spent / (double)reports, 500, "lower");
+    figure("status commands an hour, 64 nodes", 3600.0 * (double)atomic_load(&f->queries) / model.now, 240, "lower");
     CHECK(all_over() && model.ends == JOBS_MAX);
     remote_free(model.remote);
     model_close();
