@@ -2,6 +2,9 @@
 # Installs the Debian packages that building, running and testing need, if any is missing.
 # Does nothing, and asks for no rights, when all are there.
 #
+# install-deps.sh oidn: also Intel Open Image Denoise, which takes the noise out of renders (denoise=true), from PyPI's
+# pyoidn into /usr/local/lib/unbake.
+#
 # install-deps.sh bench: also what the benches against Mitsuba 3 need (Mitsuba itself comes from
 # PyPI, see tests/bench/run.sh). They can do without: where these packages are not to be had, that
 # is said and the exit status is still 0.
@@ -85,6 +88,23 @@ format) install $format_packages ;;
 rooms) install $room_packages ;;
 slurm) install $slurm_packages ;;
 esac
+# The library and what it loads for processors; root or sudo.
+install_oidn() {
+    to=/usr/local/lib/unbake
+    [ -e "$to/libOpenImageDenoise.so.2" ] && return 0
+    run=""
+    [ "$(id -u)" = 0 ] || run=sudo
+    install python3-venv || return 1
+    work=$(mktemp -d) || return 1
+    python3 -m venv "$work/venv" && "$work/venv/bin/pip" -q install --no-deps pyoidn || { rm -rf "$work"; return 1; }
+    lib=$(echo "$work"/venv/lib/python3*/site-packages/pyoidn/oidn/lib)
+    $run mkdir -p "$to" && $run cp "$lib"/libOpenImageDenoise.so.2 "$lib"/libOpenImageDenoise_core.so.* \
+        "$lib"/libOpenImageDenoise_device_cpu.so.* "$lib"/libtbb.so.12 "$to"
+    status=$?
+    rm -rf "$work"
+    return $status
+}
+if [ "${1:-}" = oidn ]; then install_oidn; fi
 if [ "${1:-}" = bench ]; then
     # shellcheck disable=SC2086
     install $bench_packages ||

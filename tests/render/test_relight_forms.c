@@ -11,49 +11,45 @@
 #include "tests/relit_room.h"
 
 /* Looks from the middle along -z; y is up. */
-#define CENTRE_VIEW                                                            \
-  "{\"w\":16,\"h\":16,\"fl_x\":10,\"fl_y\":10,\"cx\":8,\"cy\":8,\"frames\":[{" \
-  "\"file_path\":\"a\","                                                       \
-  "\"transform_matrix\":[[1,0,0,0.2],[0,1,0,0.1],[0,0,1,0.3],[0,0,0,1]]}]}"
+#define CENTRE_VIEW                                                                                                    \
+    "{\"w\":16,\"h\":16,\"fl_x\":10,\"fl_y\":10,\"cx\":8,\"cy\":8,\"frames\":[{"                                       \
+    "\"file_path\":\"a\","                                                                                             \
+    "\"transform_matrix\":[[1,0,0,0.2],[0,1,0,0.1],[0,0,1,0.3],[0,0,0,1]]}]}"
 
 static struct parallel *pool;
 
-static void picture(const char *dir, const char *settings,
-                    struct image *image) {
-  struct error err = {.message = ""};
-  CHECK_THAT(relit_picture(dir, settings, pool, image, &err) == STATUS_OK,
-             "%s: %s", settings, err.message);
-  if (!image->pixel)
-    image_init_rgb(image, 1, 1);
+static void picture(const char *dir, const char *settings, struct image *image) {
+    struct error err = {.message = ""};
+    CHECK_THAT(relit_picture(dir, settings, pool, image, &err) == STATUS_OK, "%s: %s", settings, err.message);
+    if (!image->pixel)
+        image_init_rgb(image, 1, 1);
 }
 
 /* Black walls of radiance 1, and the same light where one of them is taken
  * away: radiance 1 in every pixel. */
 static void test_furnace(void) {
-  struct relit_quad walls[6];
-  struct image image, map;
-  relit_cube(walls, rgb_gray(0.0f), rgb_gray(1.0f));
-  char *dir = relit_outputs(walls, 6, CENTRE_VIEW),
-       *sky = file_join(dir, "sky.exr");
-  image_init_rgb(&map, 16, 9);
-  for (int i = 0; i < 16 * 9 * 3; i++)
-    map.pixel[i] = 1.0f;
-  CHECK(image_write_exr(sky, &map, IMAGE_FLOAT, false, NULL) == STATUS_OK);
-  char *settings = mem_printf("{\"remove\":\"4\",\"environment\":\"%s\","
-                              "\"format\":\"exr\",\"spp\":4,\"view\":\"a\"}",
-                              sky);
-  picture(dir, settings, &image);
-  for (size_t i = 0; i < (size_t)image.width * image.height * 3; i++)
-    CHECK_NEAR(image.pixel[i], 1.0, 1e-5);
-  image_release(&image);
-  picture(dir, "{\"remove\":\"4\",\"format\":\"exr\",\"spp\":4}",
-          &image); /* nothing outside */
-  CHECK(relit_mean(&image) < 0.9 && image.pixel[3 * (8 * 16 + 8)] == 0.0f);
-  image_release(&image);
-  image_release(&map);
-  mem_free(settings);
-  mem_free(sky);
-  relit_remove(dir);
+    struct relit_quad walls[6];
+    struct image image, map;
+    relit_cube(walls, rgb_gray(0.0f), rgb_gray(1.0f));
+    char *dir = relit_outputs(walls, 6, CENTRE_VIEW), *sky = file_join(dir, "sky.exr");
+    image_init_rgb(&map, 16, 9);
+    for (int i = 0; i < 16 * 9 * 3; i++)
+        map.pixel[i] = 1.0f;
+    CHECK(image_write_exr(sky, &map, IMAGE_FLOAT, false, NULL) == STATUS_OK);
+    char *settings = mem_printf("{\"remove\":\"4\",\"environment\":\"%s\","
+                                "\"format\":\"exr\",\"spp\":4,\"view\":\"a\"}",
+                                sky);
+    picture(dir, settings, &image);
+    for (size_t i = 0; i < (size_t)image.width * image.height * 3; i++)
+        CHECK_NEAR(image.pixel[i], 1.0, 1e-5);
+    image_release(&image);
+    picture(dir, "{\"remove\":\"4\",\"format\":\"exr\",\"spp\":4}", &image); /* nothing outside */
+    CHECK(relit_mean(&image) < 0.9 && image.pixel[3 * (8 * 16 + 8)] == 0.0f);
+    image_release(&image);
+    image_release(&map);
+    mem_free(settings);
+    mem_free(sky);
+    relit_remove(dir);
 }
 
 /* --- lamps over a plane
@@ -65,100 +61,89 @@ static const vec3 eye = {0.0f, 1.0f, 1.0f};
 /* Radiance that leaves the origin of the plane y = 0 towards the eye for light
  * of radiance 1 from a small solid angle. */
 static double reflected(vec3 toward, double solid_angle) {
-  vec3 normal = {0.0f, 1.0f, 0.0f}, s, t, out = vec3_normalize(eye);
-  vec3_frame(normal, &s, &t);
-  vec3 wo = {vec3_dot(out, s), vec3_dot(out, t), out.y},
-       wi = {vec3_dot(toward, s), vec3_dot(toward, t), toward.y};
-  struct bsdf bsdf = bsdf_make(rgb_gray(0.5f), 0.5f, 0.0f, wo.z);
-  struct bsdf_value f = bsdf_eval(&bsdf, wo, wi);
-  return (0.5 * (double)f.diffuse + (double)f.specular) * solid_angle;
+    vec3 normal = {0.0f, 1.0f, 0.0f}, s, t, out = vec3_normalize(eye);
+    vec3_frame(normal, &s, &t);
+    vec3 wo = {vec3_dot(out, s), vec3_dot(out, t), out.y}, wi = {vec3_dot(toward, s), vec3_dot(toward, t), toward.y};
+    struct bsdf bsdf = bsdf_make(rgb_gray(0.5f), 0.5f, 0.0f, wo.z);
+    struct bsdf_value f = bsdf_eval(&bsdf, wo, wi);
+    return (0.5 * (double)f.diffuse + (double)f.specular) * solid_angle;
 }
 
 #define GRID 64
 
 /* A rectangle at height 1 over the origin, shining down. */
 static double from_area(double width, double height) {
-  double sum = 0.0, part = width * height / (GRID * GRID);
-  for (int i = 0; i < GRID * GRID; i++) {
-    vec3 to = {(float)(width * ((i % GRID + 0.5) / GRID - 0.5)), 1.0f,
-               (float)(height * ((i / GRID + 0.5) / GRID - 0.5))};
-    double distance = (double)vec3_length(to);
-    sum += reflected(
-        vec3_normalize(to),
-        part / pow(distance, 3.0)); /* cosine over square of distance */
-  }
-  return sum;
+    double sum = 0.0, part = width * height / (GRID * GRID);
+    for (int i = 0; i < GRID * GRID; i++) {
+        vec3 to = {(float)(width * ((i % GRID + 0.5) / GRID - 0.5)), 1.0f,
+                   (float)(height * ((i / GRID + 0.5) / GRID - 0.5))};
+        double distance = (double)vec3_length(to);
+        sum += reflected(vec3_normalize(to), part / pow(distance, 3.0)); /* cosine over square of distance */
+    }
+    return sum;
 }
 
 /* A ball seen from outside: a disc of even radiance. */
 static double from_ball(double height, double radius) {
-  double least = sqrt(1.0 - radius * radius / (height * height)), sum = 0.0;
-  for (int i = 0; i < GRID * GRID; i++) {
-    double cosine = 1.0 - (1.0 - least) * (i / GRID + 0.5) / GRID,
-           around = 2.0 * PI * (i % GRID + 0.5) / GRID;
-    double sine = sqrt(1.0 - cosine * cosine);
-    vec3 toward = {(float)(sine * cos(around)), (float)cosine,
-                   (float)(sine * sin(around))};
-    sum += reflected(toward, 2.0 * PI * (1.0 - least) / (GRID * GRID));
-  }
-  return sum;
+    double least = sqrt(1.0 - radius * radius / (height * height)), sum = 0.0;
+    for (int i = 0; i < GRID * GRID; i++) {
+        double cosine = 1.0 - (1.0 - least) * (i / GRID + 0.5) / GRID, around = 2.0 * PI * (i % GRID + 0.5) / GRID;
+        double sine = sqrt(1.0 - cosine * cosine);
+        vec3 toward = {(float)(sine * cos(around)), (float)cosine, (float)(sine * sin(around))};
+        sum += reflected(toward, 2.0 * PI * (1.0 - least) / (GRID * GRID));
+    }
+    return sum;
 }
 
 /* Mean of the few pixels that look at the origin. */
 static double rendered(const char *dir, const char *lamp) {
-  struct image image;
-  char *settings = mem_printf("{\"format\":\"exr\",\"spp\":1024,\"max_depth\":"
-                              "2,\"environment\":\"none\",%s}",
-                              lamp);
-  picture(dir, settings, &image);
-  double mean = relit_mean(&image);
-  image_release(&image);
-  mem_free(settings);
-  return mean;
+    struct image image;
+    char *settings = mem_printf("{\"format\":\"exr\",\"spp\":1024,\"max_depth\":"
+                                "2,\"environment\":\"none\",%s}",
+                                lamp);
+    picture(dir, settings, &image);
+    double mean = relit_mean(&image);
+    image_release(&image);
+    mem_free(settings);
+    return mean;
 }
 
 static void test_lamps(void) {
-  const struct relit_quad plane = {
-      {-5, 0, -5}, {0, 0, 10}, {10, 0, 0}, {0.5f, 0.5f, 0.5f},
-      {0, 0, 0},   0.5f,       0.0f};
-  char *dir = relit_outputs(&plane, 1,
-                            "{\"w\":4,\"h\":4,\"fl_x\":4000,\"fl_y\":4000,"
-                            "\"cx\":2,\"cy\":2,\"frames\":[{\"file_path\":"
-                            "\"a\",\"transform_matrix\":[[1,0,0,0],[0,0."
-                            "70710678,0.70710678,1],[0,-0.70710678,"
-                            "0.70710678,1],[0,0,0,1]]}]}");
-  double area = from_area(0.5, 0.25), ball = from_ball(1.5, 0.2);
-  double found = rendered(
-      dir, "\"lamp.1.kind\":\"area\",\"lamp.1.position\":\"0,1,0\",\"lamp.1."
-           "direction\":\"0,-1,0\","
-           "\"lamp.1.size\":\"0.5,0.25\",\"lamp.1.radiance\":\"1,1,1\"");
-  CHECK_THAT(fabs(found / area - 1.0) < 0.01, "area: %g, not %g", found, area);
-  found = rendered(dir, "\"lamp.1.kind\":\"sphere\",\"lamp.1.position\":\"0,1."
-                        "5,0\",\"lamp.1.radius\":0.2,"
-                        "\"lamp.1.radiance\":\"1,1,1\"");
-  CHECK_THAT(fabs(found / ball - 1.0) < 0.01, "ball: %g, not %g", found, ball);
-  /* A spot: as a small area along the axis, nothing outside of the cone. */
-  double spot =
-      reflected((vec3){0.0f, 1.0f, 0.0f}, PI * 0.01 * 0.01 / (2.0 * 2.0));
-  found = rendered(dir, "\"lamp.1.kind\":\"spot\",\"lamp.1.position\":\"0,2,"
-                        "0\",\"lamp.1.direction\":\"0,-1,0\","
-                        "\"lamp.1.radius\":0.01,\"lamp.1.radiance\":\"1,1,1\"");
-  CHECK_THAT(fabs(found / spot - 1.0) < 0.01, "spot: %g, not %g", found, spot);
-  found = rendered(
-      dir,
-      "\"lamp.1.kind\":\"spot\",\"lamp.1.position\":\"0,2,0\",\"lamp.1."
-      "direction\":\"1,-1,0\","
-      "\"lamp.1.radius\":0.01,\"lamp.1.angle\":60,\"lamp.2.kind\":\"sphere\","
-      "\"lamp.2.position\":\"0,-3,0\"");
-  CHECK_THAT(found == 0.0, "outside of the cone: %g", found);
-  /* Lumen: an area of luminance L and size A gives pi L A. */
-  found = rendered(dir, "\"lamp.1.kind\":\"area\",\"lamp.1.position\":\"0,1,"
-                        "0\",\"lamp.1.direction\":\"0,-1,0\","
-                        "\"lamp.1.size\":\"0.5,0.25\",\"luminance_per_unit\":"
-                        "100,\"lamp.1.lumen\":39.26991");
-  CHECK_THAT(fabs(found / area - 1.0) < 0.01, "lumen: %g, not %g", found, area);
-  CHECK_NEAR(things_spot_flux((struct emission_cone){0.5f, 0.5f}), PI, 1e-6);
-  relit_remove(dir);
+    const struct relit_quad plane = {{-5, 0, -5}, {0, 0, 10}, {10, 0, 0}, {0.5f, 0.5f, 0.5f}, {0, 0, 0}, 0.5f, 0.0f};
+    char *dir = relit_outputs(&plane, 1,
+                              "{\"w\":4,\"h\":4,\"fl_x\":4000,\"fl_y\":4000,"
+                              "\"cx\":2,\"cy\":2,\"frames\":[{\"file_path\":"
+                              "\"a\",\"transform_matrix\":[[1,0,0,0],[0,0."
+                              "70710678,0.70710678,1],[0,-0.70710678,"
+                              "0.70710678,1],[0,0,0,1]]}]}");
+    double area = from_area(0.5, 0.25), ball = from_ball(1.5, 0.2);
+    double found = rendered(dir, "\"lamp.1.kind\":\"area\",\"lamp.1.position\":\"0,1,0\",\"lamp.1."
+                                 "direction\":\"0,-1,0\","
+                                 "\"lamp.1.size\":\"0.5,0.25\",\"lamp.1.radiance\":\"1,1,1\"");
+    CHECK_THAT(fabs(found / area - 1.0) < 0.01, "area: %g, not %g", found, area);
+    found = rendered(dir, "\"lamp.1.kind\":\"sphere\",\"lamp.1.position\":\"0,1."
+                          "5,0\",\"lamp.1.radius\":0.2,"
+                          "\"lamp.1.radiance\":\"1,1,1\"");
+    CHECK_THAT(fabs(found / ball - 1.0) < 0.01, "ball: %g, not %g", found, ball);
+    /* A spot: as a small area along the axis, nothing outside of the cone. */
+    double spot = reflected((vec3){0.0f, 1.0f, 0.0f}, PI * 0.01 * 0.01 / (2.0 * 2.0));
+    found = rendered(dir, "\"lamp.1.kind\":\"spot\",\"lamp.1.position\":\"0,2,"
+                          "0\",\"lamp.1.direction\":\"0,-1,0\","
+                          "\"lamp.1.radius\":0.01,\"lamp.1.radiance\":\"1,1,1\"");
+    CHECK_THAT(fabs(found / spot - 1.0) < 0.01, "spot: %g, not %g", found, spot);
+    found = rendered(dir, "\"lamp.1.kind\":\"spot\",\"lamp.1.position\":\"0,2,0\",\"lamp.1."
+                          "direction\":\"1,-1,0\","
+                          "\"lamp.1.radius\":0.01,\"lamp.1.angle\":60,\"lamp.2.kind\":\"sphere\","
+                          "\"lamp.2.position\":\"0,-3,0\"");
+    CHECK_THAT(found == 0.0, "outside of the cone: %g", found);
+    /* Lumen: an area of luminance L and size A gives pi L A. */
+    found = rendered(dir, "\"lamp.1.kind\":\"area\",\"lamp.1.position\":\"0,1,"
+                          "0\",\"lamp.1.direction\":\"0,-1,0\","
+                          "\"lamp.1.size\":\"0.5,0.25\",\"luminance_per_unit\":"
+                          "100,\"lamp.1.lumen\":39.26991");
+    CHECK_THAT(fabs(found / area - 1.0) < 0.01, "lumen: %g, not %g", found, area);
+    CHECK_NEAR(things_spot_flux((struct emission_cone){0.5f, 0.5f}), PI, 1e-6);
+    relit_remove(dir);
 }
 
 /* --- cameras, sources, parts of light
@@ -167,180 +152,156 @@ static void test_lamps(void) {
 
 /* A room of coloured walls with two lamps: its ceiling, and a wall. */
 static char *lit_room(const char *views) {
-  struct relit_quad walls[6];
-  relit_cube(walls, rgb_make(0.6f, 0.5f, 0.4f), rgb_gray(0.0f));
-  walls[1].emission = rgb_make(1.0f, 1.0f, 0.5f);
-  walls[2].emission = rgb_make(0.0f, 0.2f, 0.5f);
-  return relit_outputs(walls, 6, views);
+    struct relit_quad walls[6];
+    relit_cube(walls, rgb_make(0.6f, 0.5f, 0.4f), rgb_gray(0.0f));
+    walls[1].emission = rgb_make(1.0f, 1.0f, 0.5f);
+    walls[2].emission = rgb_make(0.0f, 0.2f, 0.5f);
+    return relit_outputs(walls, 6, views);
 }
 
 /* Light from all directions is the same by either. */
 static void test_panorama(void) {
-  static const char views[] = "{\"w\":24,\"h\":24,\"fl_x\":12,\"fl_y\":12,"
-                              "\"cx\":12,\"cy\":12,\"frames\":["
-                              "{\"file_path\":\"f\",\"transform_matrix\":[[1,0,"
-                              "0,0.2],[0,1,0,0.1],[0,0,1,0.3],[0,0,0,1]]},"
-                              "{\"file_path\":\"b\",\"transform_matrix\":[[-1,"
-                              "0,0,0.2],[0,1,0,0.1],[0,0,-1,0.3],[0,0,0,1]]},"
-                              "{\"file_path\":\"l\",\"transform_matrix\":[[0,0,"
-                              "1,0.2],[0,1,0,0.1],[-1,0,0,0.3],[0,0,0,1]]},"
-                              "{\"file_path\":\"r\",\"transform_matrix\":[[0,0,"
-                              "-1,0.2],[0,1,0,0.1],[1,0,0,0.3],[0,0,0,1]]},"
-                              "{\"file_path\":\"u\",\"transform_matrix\":[[1,0,"
-                              "0,0.2],[0,0,-1,0.1],[0,1,0,0.3],[0,0,0,1]]},"
-                              "{\"file_path\":\"d\",\"transform_matrix\":[[1,0,"
-                              "0,0.2],[0,0,1,0.1],[0,-1,0,0.3],[0,0,0,1]]}]}";
-  char *dir = lit_room(views), *out;
-  struct error err;
-  struct image image;
-  double six[3] = {0, 0, 0}, whole[3] = {0, 0, 0};
-  CHECK(
-      relit_run(dir,
-                "{\"view\":\"all\",\"format\":\"exr\",\"spp\":64,\"up\":\"y\"}",
-                pool, &out, &err) == STATUS_OK);
-  for (int v = 0; v < 6; v++) {
-    char name[32];
-    snprintf(name, sizeof name, "%05d_radiance.exr", v);
-    CHECK(relit_read(out, name, &image, &err) == STATUS_OK);
-    for (int i = 0; i < 24 * 24; i++) {
-      double x = (i % 24 + 0.5) / 12.0 - 1.0, y = (i / 24 + 0.5) / 12.0 - 1.0;
-      for (int c = 0; c < 3; c++)
-        six[c] += (double)image.pixel[3 * i + c] *
-                  pow(1.0 + x * x + y * y, -1.5) / 144.0;
+    static const char views[] = "{\"w\":24,\"h\":24,\"fl_x\":12,\"fl_y\":12,"
+                                "\"cx\":12,\"cy\":12,\"frames\":["
+                                "{\"file_path\":\"f\",\"transform_matrix\":[[1,0,"
+                                "0,0.2],[0,1,0,0.1],[0,0,1,0.3],[0,0,0,1]]},"
+                                "{\"file_path\":\"b\",\"transform_matrix\":[[-1,"
+                                "0,0,0.2],[0,1,0,0.1],[0,0,-1,0.3],[0,0,0,1]]},"
+                                "{\"file_path\":\"l\",\"transform_matrix\":[[0,0,"
+                                "1,0.2],[0,1,0,0.1],[-1,0,0,0.3],[0,0,0,1]]},"
+                                "{\"file_path\":\"r\",\"transform_matrix\":[[0,0,"
+                                "-1,0.2],[0,1,0,0.1],[1,0,0,0.3],[0,0,0,1]]},"
+                                "{\"file_path\":\"u\",\"transform_matrix\":[[1,0,"
+                                "0,0.2],[0,0,-1,0.1],[0,1,0,0.3],[0,0,0,1]]},"
+                                "{\"file_path\":\"d\",\"transform_matrix\":[[1,0,"
+                                "0,0.2],[0,0,1,0.1],[0,-1,0,0.3],[0,0,0,1]]}]}";
+    char *dir = lit_room(views), *out;
+    struct error err;
+    struct image image;
+    double six[3] = {0, 0, 0}, whole[3] = {0, 0, 0};
+    CHECK(relit_run(dir, "{\"view\":\"all\",\"format\":\"exr\",\"spp\":64,\"up\":\"y\"}", pool, &out, &err) ==
+          STATUS_OK);
+    for (int v = 0; v < 6; v++) {
+        char name[32];
+        snprintf(name, sizeof name, "%05d_radiance.exr", v);
+        CHECK(relit_read(out, name, &image, &err) == STATUS_OK);
+        for (int i = 0; i < 24 * 24; i++) {
+            double x = (i % 24 + 0.5) / 12.0 - 1.0, y = (i / 24 + 0.5) / 12.0 - 1.0;
+            for (int c = 0; c < 3; c++)
+                six[c] += (double)image.pixel[3 * i + c] * pow(1.0 + x * x + y * y, -1.5) / 144.0;
+        }
+        image_release(&image);
     }
-    image_release(&image);
-  }
-  relit_remove(out);
-  picture(dir,
-          "{\"panorama\":true,\"size\":\"64x32\",\"format\":\"exr\",\"spp\":64,"
-          "\"up\":\"y\"}",
-          &image);
-  for (uint32_t i = 0; i < image.width * image.height; i++) {
-    double top = PI * (i / image.width) / image.height,
-           bottom = PI * (i / image.width + 1) / image.height;
+    relit_remove(out);
+    picture(dir,
+            "{\"panorama\":true,\"size\":\"64x32\",\"format\":\"exr\",\"spp\":64,"
+            "\"up\":\"y\"}",
+            &image);
+    for (uint32_t i = 0; i < image.width * image.height; i++) {
+        double top = PI * (i / image.width) / image.height, bottom = PI * (i / image.width + 1) / image.height;
+        for (int c = 0; c < 3; c++)
+            whole[c] += (double)image.pixel[3 * i + (uint32_t)c] * (cos(top) - cos(bottom)) * 2.0 * PI / image.width;
+    }
     for (int c = 0; c < 3; c++)
-      whole[c] += (double)image.pixel[3 * i + (uint32_t)c] *
-                  (cos(top) - cos(bottom)) * 2.0 * PI / image.width;
-  }
-  for (int c = 0; c < 3; c++)
-    CHECK_THAT(fabs(whole[c] / six[c] - 1.0) < 0.01, "channel %d: %g, not %g",
-               c, whole[c], six[c]);
-  /* The middle of the picture is where the camera looks, its right half what is
+        CHECK_THAT(fabs(whole[c] / six[c] - 1.0) < 0.01, "channel %d: %g, not %g", c, whole[c], six[c]);
+    /* The middle of the picture is where the camera looks, its right half what is
    * to the right of it: +x, not lit. */
-  const float *left = image.pixel + 3 * (16 * 64 + 16),
-              *right = image.pixel + 3 * (16 * 64 + 48);
-  CHECK(left[2] > right[2]);
-  image_release(&image);
-  relit_remove(dir);
+    const float *left = image.pixel + 3 * (16 * 64 + 16), *right = image.pixel + 3 * (16 * 64 + 48);
+    CHECK(left[2] > right[2]);
+    image_release(&image);
+    relit_remove(dir);
 }
 
 static void test_sums(void) {
-  char *dir = lit_room(CENTRE_VIEW), *out;
-  struct error err;
-  struct image image;
-  CHECK_THAT(relit_run(dir,
-                       "{\"format\":\"exr\",\"spp\":256,\"per_light\":true,"
-                       "\"passes\":\"radiance,direct,indirect\","
-                       "\"lamp.1.kind\":\"sphere\",\"lamp.1.position\":\"0.5,0,"
-                       "-0.5\",\"lamp.1.radius\":0.1}",
-                       pool, &out, &err) == STATUS_OK,
-             "%s", err.message);
-  static const char *const name[] = {"radiance", "direct",  "indirect",
-                                     "light_1",  "light_2", "lamp_1"};
-  double mean[6];
-  for (int i = 0; i < 6; i++) {
-    char *file = mem_printf("00000_%s.exr", name[i]);
-    CHECK_THAT(relit_read(out, file, &image, &err) == STATUS_OK, "%s",
-               err.message);
-    mean[i] = image.pixel ? relit_mean(&image) : 0.0;
+    char *dir = lit_room(CENTRE_VIEW), *out;
+    struct error err;
+    struct image image;
+    CHECK_THAT(relit_run(dir,
+                         "{\"format\":\"exr\",\"spp\":256,\"per_light\":true,"
+                         "\"passes\":\"radiance,direct,indirect\","
+                         "\"lamp.1.kind\":\"sphere\",\"lamp.1.position\":\"0.5,0,"
+                         "-0.5\",\"lamp.1.radius\":0.1}",
+                         pool, &out, &err) == STATUS_OK,
+               "%s", err.message);
+    static const char *const name[] = {"radiance", "direct", "indirect", "light_1", "light_2", "lamp_1"};
+    double mean[6];
+    for (int i = 0; i < 6; i++) {
+        char *file = mem_printf("00000_%s.exr", name[i]);
+        CHECK_THAT(relit_read(out, file, &image, &err) == STATUS_OK, "%s", err.message);
+        mean[i] = image.pixel ? relit_mean(&image) : 0.0;
+        image_release(&image);
+        mem_free(file);
+    }
+    CHECK_NEAR((mean[3] + mean[4] + mean[5]) / mean[0], 1.0, 0.01);
+    CHECK_NEAR((mean[1] + mean[2]) / mean[0], 1.0, 1e-4);
+    relit_remove(out);
+    /* Direct light alone is what paths of two segments find. */
+    picture(dir,
+            "{\"format\":\"exr\",\"spp\":256,\"max_depth\":2,\"lamp.1.kind\":"
+            "\"sphere\","
+            "\"lamp.1.position\":\"0.5,0,-0.5\",\"lamp.1.radius\":0.1}",
+            &image);
+    CHECK_NEAR(relit_mean(&image) / mean[1], 1.0, 0.01);
     image_release(&image);
-    mem_free(file);
-  }
-  CHECK_NEAR((mean[3] + mean[4] + mean[5]) / mean[0], 1.0, 0.01);
-  CHECK_NEAR((mean[1] + mean[2]) / mean[0], 1.0, 1e-4);
-  relit_remove(out);
-  /* Direct light alone is what paths of two segments find. */
-  picture(dir,
-          "{\"format\":\"exr\",\"spp\":256,\"max_depth\":2,\"lamp.1.kind\":"
-          "\"sphere\","
-          "\"lamp.1.position\":\"0.5,0,-0.5\",\"lamp.1.radius\":0.1}",
-          &image);
-  CHECK_NEAR(relit_mean(&image) / mean[1], 1.0, 0.01);
-  image_release(&image);
-  relit_remove(dir);
+    relit_remove(dir);
 }
 
 /* Light adds up and scales; nothing that shines is told; what is not there is
  * told. */
 static void test_lights(void) {
-  char *dir = lit_room(CENTRE_VIEW);
-  struct error err;
-  struct image both, one;
-  picture(dir, "{\"format\":\"exr\",\"spp\":16}", &both);
-  picture(
-      dir,
-      "{\"format\":\"exr\",\"spp\":16,\"light.1\":\"2\",\"light.2\":\"2,2,2\"}",
-      &one);
-  CHECK_NEAR(relit_mean(&one) / relit_mean(&both), 2.0, 1e-3);
-  image_release(&one);
-  picture(
-      dir,
-      "{\"format\":\"exr\",\"spp\":16,\"lights\":\"off\",\"light.2\":\"on\"}",
-      &one);
-  CHECK(relit_mean(&one) > 0.0 &&
-        one.pixel[0] == 0.0f); /* no red in that lamp */
-  image_release(&one);
-  image_release(&both);
-  CHECK(relit_picture(dir, "{\"lights\":\"off\",\"format\":\"exr\"}", pool,
-                      &one, &err) == STATUS_INPUT);
-  CHECK_STRING(err.message, "Nothing shines: the picture will be black.");
-  CHECK(relit_picture(dir, "{\"light.9\":\"off\",\"format\":\"exr\"}", pool,
-                      &one, &err) == STATUS_INPUT);
-  CHECK_STRING(err.message, "setting light.9: the room has segments 0 to 5");
-  CHECK(relit_picture(dir, "{\"remove\":\"door\",\"format\":\"exr\"}", pool,
-                      &one, &err) == STATUS_INPUT);
-  CHECK(relit_picture(dir, "{\"denoise\":true,\"format\":\"exr\"}", pool, &one,
-                      &err) == STATUS_UNAVAILABLE);
-  relit_remove(dir);
+    char *dir = lit_room(CENTRE_VIEW);
+    struct error err;
+    struct image both, one;
+    picture(dir, "{\"format\":\"exr\",\"spp\":16}", &both);
+    picture(dir, "{\"format\":\"exr\",\"spp\":16,\"light.1\":\"2\",\"light.2\":\"2,2,2\"}", &one);
+    CHECK_NEAR(relit_mean(&one) / relit_mean(&both), 2.0, 1e-3);
+    image_release(&one);
+    picture(dir, "{\"format\":\"exr\",\"spp\":16,\"lights\":\"off\",\"light.2\":\"on\"}", &one);
+    CHECK(relit_mean(&one) > 0.0 && one.pixel[0] == 0.0f); /* no red in that lamp */
+    image_release(&one);
+    image_release(&both);
+    CHECK(relit_picture(dir, "{\"lights\":\"off\",\"format\":\"exr\"}", pool, &one, &err) == STATUS_INPUT);
+    CHECK_STRING(err.message, "Nothing shines: the picture will be black.");
+    CHECK(relit_picture(dir, "{\"light.9\":\"off\",\"format\":\"exr\"}", pool, &one, &err) == STATUS_INPUT);
+    CHECK_STRING(err.message, "setting light.9: the room has segments 0 to 5");
+    CHECK(relit_picture(dir, "{\"remove\":\"door\",\"format\":\"exr\"}", pool, &one, &err) == STATUS_INPUT);
+    CHECK(relit_picture(dir, "{\"denoise\":true,\"format\":\"exr\"}", pool, &one, &err) == STATUS_UNAVAILABLE);
+    relit_remove(dir);
 }
 
 /* A render that was stopped goes on where it was: what is there whole is not
  * rendered again. */
 static void test_resume(void) {
-  char *dir = lit_room(CENTRE_VIEW), *out, *path;
-  struct error err;
-  static const char text[] =
-      "{\"path\":\"0,0\",\"path_count\":3,\"spp\":4,\"format\":\"exr\"}";
-  CHECK(relit_run(dir, text, pool, &out, &err) == STATUS_OK);
-  char before[SHA256_HEX_SIZE], after[SHA256_HEX_SIZE];
-  path = file_join(out, "00001_radiance.exr");
-  char *other = file_join(out, "00002_radiance.exr");
-  struct stat kept, now;
-  CHECK(sha256_of_file(path, before, &err) == STATUS_OK && unlink(path) == 0 &&
-        stat(other, &kept) == 0);
-  cJSON *settings = NULL;
-  CHECK(json_parse(text, strlen(text), "settings", &settings, &err) ==
-        STATUS_OK);
-  struct relight_job job = {.outputs = dir, .settings = settings, .out = out};
-  CHECK(relight_run(&job, NULL, pool, &err) == STATUS_OK);
-  CHECK(sha256_of_file(path, after, &err) == STATUS_OK &&
-        strcmp(before, after) == 0);
-  CHECK(stat(other, &now) == 0 && now.st_ino == kept.st_ino);
-  cJSON_Delete(settings);
-  mem_free(path);
-  mem_free(other);
-  relit_remove(out);
-  relit_remove(dir);
+    char *dir = lit_room(CENTRE_VIEW), *out, *path;
+    struct error err;
+    static const char text[] = "{\"path\":\"0,0\",\"path_count\":3,\"spp\":4,\"format\":\"exr\"}";
+    CHECK(relit_run(dir, text, pool, &out, &err) == STATUS_OK);
+    char before[SHA256_HEX_SIZE], after[SHA256_HEX_SIZE];
+    path = file_join(out, "00001_radiance.exr");
+    char *other = file_join(out, "00002_radiance.exr");
+    struct stat kept, now;
+    CHECK(sha256_of_file(path, before, &err) == STATUS_OK && unlink(path) == 0 && stat(other, &kept) == 0);
+    cJSON *settings = NULL;
+    CHECK(json_parse(text, strlen(text), "settings", &settings, &err) == STATUS_OK);
+    struct relight_job job = {.outputs = dir, .settings = settings, .out = out};
+    CHECK(relight_run(&job, NULL, pool, &err) == STATUS_OK);
+    CHECK(sha256_of_file(path, after, &err) == STATUS_OK && strcmp(before, after) == 0);
+    CHECK(stat(other, &now) == 0 && now.st_ino == kept.st_ino);
+    cJSON_Delete(settings);
+    mem_free(path);
+    mem_free(other);
+    relit_remove(out);
+    relit_remove(dir);
 }
 
 int main(void) {
-  pool = parallel_new(2);
-  test_furnace();
-  test_lamps();
-  test_panorama();
-  test_sums();
-  test_lights();
-  test_resume();
-  parallel_free(pool);
-  return check_result();
+    pool = parallel_new(2);
+    test_furnace();
+    test_lamps();
+    test_panorama();
+    test_sums();
+    test_lights();
+    test_resume();
+    parallel_free(pool);
+    return check_result();
 }
