@@ -7,14 +7,12 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "common/buf.h"
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
 #include "server/data/layout.h"
 
 #define APPENDED ".jsonl"
-#define APPENDED_LIMIT ((size_t)1 << 30) /* bytes */
 
 /* The numbers of the attempts that have folders, ascending; *numbers is the caller's. */
 static enum status list_attempts(const char *data_dir, int64_t job_id, int **numbers, size_t *count,
@@ -184,23 +182,11 @@ enum status attempt_folder_list_checkpoint(const char *data_dir, int64_t job_id,
 
 /* --- outputs of earlier attempts --------------------------------------------------------------- */
 
-/* A file to which lines are appended in place: a link would change it for its earlier attempt, too. */
+/* Whether it is the record of what is done, to which lines are appended in place (relight/output.h): like a checkpoint
+ * one attempt of the job has it, and it is kept though no row names it. */
 static bool is_appended_to(const char *name) {
     size_t length = strlen(name), ending = strlen(APPENDED);
     return length > ending && strcmp(name + length - ending, APPENDED) == 0;
-}
-
-static enum status copy_small(const char *from, const char *to, struct error *err) {
-    struct buf text;
-    struct stat info;
-    if (lstat(to, &info) == 0)
-        return STATUS_OK;
-    buf_init(&text, APPENDED_LIMIT);
-    enum status status = file_read(from, &text, err);
-    if (status == STATUS_OK)
-        status = file_replace(to, buf_text(&text), text.length, err);
-    buf_release(&text);
-    return status;
 }
 
 static enum status link_files(const char *from, const char *to, struct error *err) {
@@ -218,7 +204,7 @@ static enum status link_files(const char *from, const char *to, struct error *er
             if (status == STATUS_OK)
                 status = link_files(old, new, err);
         } else if (is_there && S_ISREG(info.st_mode) && is_appended_to(names[i])) {
-            status = copy_small(old, new, err);
+            status = move(old, new, err);
         } else if (is_there && S_ISREG(info.st_mode) && link(old, new) != 0 && errno != EEXIST) {
             log_warning("%s is made again: it cannot be linked: %s", new, strerror(errno));
         }
@@ -285,7 +271,7 @@ static enum status tidy_folder(struct tidying *t, const char *path, const char *
             status = tidy_folder(t, inner, output, err);
             if (status == STATUS_OK && rmdir(inner) != 0 && errno != ENOTEMPTY && errno != EEXIST)
                 status = error_set_errno(err, errno, "cannot remove %s", inner);
-        } else if (is_named(t, output))
+        } else if (is_named(t, output) || is_appended_to(output))
             t->has_files = true;
         else
             status = file_remove_tree(inner, err);

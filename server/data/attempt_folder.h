@@ -7,7 +7,7 @@
  * 1. At most one attempt of a job has a checkpoint. The next one takes it over when it begins, by one rename: the
  *    database and its journal are never apart, and whoever had it before has lost it.
  * 2. An output belongs to the attempt that wrote it, and a row of state.db says which. A file that no row names is seen
- *    by nobody, and goes when its attempt has ended.
+ *    by nobody, and goes when its attempt has ended; but the record of what is done, *.jsonl, stays for the next.
  * 3. Nobody but an attempt changes its folder while it runs. */
 #ifndef UNBAKE_DATA_ATTEMPT_FOLDER_H
 #define UNBAKE_DATA_ATTEMPT_FOLDER_H
@@ -23,7 +23,7 @@
 enum status attempt_folder_begin(const char *data_dir, int64_t job_id, int number, struct error *err);
 
 /* Gives the attempt, which has just begun, what earlier ones have left in out/, the newest of each name: as hard links, so
- * that it costs no space and what others read stays. Its worker judges what is whole. What cannot be linked is left out
+ * that it costs no space and what others read stays; the record of what is done (*.jsonl) moves. Its worker judges what is whole. What cannot be linked is left out
  * and made again. */
 enum status attempt_folder_carry_outputs(const char *data_dir, int64_t job_id, int number, struct error *err);
 

@@ -23,6 +23,8 @@
 #include "common/error.h"
 #include "common/json.h"
 
+struct denoiser; /* relight/denoise.h */
+
 struct order {
     cJSON *json; /* the file; owns the strings */
     const char *dir;
@@ -36,8 +38,9 @@ struct order {
     bool sandbox;
     const cJSON *reading; /* how to read the scene (common/reading.h); NULL: as its files say */
     /* kinds "render" and "evaluate" */
-    const char *outputs; /* folder with the outputs of a reconstruction */
-    const char *files;   /* folder of files that settings name */
+    const char *outputs;       /* folder with the outputs of a reconstruction */
+    const char *files;         /* folder of files that settings name */
+    struct denoiser *denoiser; /* opened before the sandbox; NULL: none; the worker's */
     /* kinds "reconstruct" and "evaluate" */
     const char *scene; /* folder of the unpacked bundle */
     /* all kinds of jobs */

@@ -13,7 +13,9 @@
 
 #include "common/log.h"
 #include "common/mem.h"
+#include "common/render_settings.h"
 #include "common/url.h"
+#include "server/relight/denoise.h"
 #include "server/worker/order.h"
 #include "server/worker/progress.h"
 #include "server/worker/sandbox.h"
@@ -39,6 +41,14 @@ static enum status take_folder(const char *dir, struct error *err) {
         usleep(100000);
     }
     return STATUS_OK;
+}
+
+/* Its library loads others, which the sandbox forbids later. One that is missing is the render's to complain of. */
+static void open_denoiser(struct order *order, struct progress *progress) {
+    struct error err;
+    bool is_wanted = strcmp(order->kind, "render") == 0 && render_settings_bool(order->settings, "denoise");
+    if (is_wanted && denoiser_open(order->thread_count, &order->denoiser, &err) != STATUS_OK)
+        progress_log(progress, "warning", err.message);
 }
 
 static void confine(const struct order *order, struct progress *progress) {
@@ -67,9 +77,7 @@ static enum status work(const struct order *order, struct progress *progress, st
         const char *kind;
         enum status (*run)(const struct order *, struct progress *, struct error *);
     } tasks[] = {
-        {"reconstruct", task_reconstruct},
-        {"evaluate", task_evaluate},
-        {"check", task_check},
+        {"reconstruct", task_reconstruct}, {"render", task_render}, {"evaluate", task_evaluate}, {"check", task_check},
         {"deliver", task_deliver},
     };
     for (size_t i = 0; i < sizeof tasks / sizeof tasks[0]; i++)
@@ -111,12 +119,14 @@ int worker_main(int argc, char **argv) {
     if (status == STATUS_OK)
         status = take_folder(argv[1], &err);
     if (status == STATUS_OK) {
+        open_denoiser(&order, &progress);
         confine(&order, &progress);
         status = work(&order, &progress, &err);
     }
     if (status != STATUS_OK)
         log_error("%s", err.message);
     progress_end(&progress, status, err.message, err.hint);
+    denoiser_free(order.denoiser);
     order_release(&order);
     *is_over = true;
     return exit_status(status);

@@ -1,0 +1,113 @@
+#!/bin/bash
+# Renders and evaluations of a reconstruction: what is refused, files that come with a job, what is kept as long as it is
+# read, a crash in the middle of several pictures, and the lane of small renders.
+set -u
+. tests/api/client.sh "$@"
+lamp="--set lamp.1.kind=sphere --set lamp.1.position=0,1,0 --set lamp.1.radius=0.3"
+make_room "$work/room" 8
+daemon_start --set threads=2 --set small_render_paths=100000 --set max_attempts=9
+# shellcheck disable=SC2086
+run 0 submit "$work/room" $tiny --watch
+scene=$("$build/unbake" show 1 --json | jq -r .scene)
+
+post() { # post STATUS JSON
+    call POST "/v1/jobs${3:-}" -H 'Content-Type: application/json' --data-binary "$(json "$2")"
+    expect "$1" "POST of $2"
+}
+names() { field '[.invalid_params[].name] | sort | join(" ")'; }
+
+# --- what is refused, all of it at once ---
+post 422 '{"kind":"draw","settings":{}}'; equal "$(names)" "kind scene"
+post 422 '{"kind":"render","scene":"0123456789","settings":{"spp":0,"nothing":1,"environment":"../sky.hdr"},"priority":1000}'
+equal "$(names)" "priority scene settings.environment settings.nothing settings.spp source"
+post 422 '{"kind":"render","source":4711}'; equal "$(names)" "source"
+post 422 '{"kind":"reconstruct","scene":"'"$scene"'","source":1}'; equal "$(names)" "source"
+post 422 '{"kind":"evaluate","source":1,"settings":{"spp":1}}'; equal "$(names)" "settings"
+post 409 '{"kind":"evaluate","source":1}'; has "$(field .detail)" "no truth"
+call GET '/v1/jobs?kind=nothing'; expect 400
+call GET '/v1/settings?kind=render'; expect 200; equal "$(field '[.items[].name] | index("light.#") != null')" true
+call GET '/v1/settings?kind=evaluate'; expect 400
+run 4 render 1 --set nothing=1 --spp 0
+has "$err" "settings.nothing"; has "$err" "settings.spp"
+run 7 render 1 --environment "$work/none.hdr"
+
+# --- a picture, and what it is beforehand ---
+# shellcheck disable=SC2086
+run 0 render 1 $lamp --spp 16 --dry-run --json
+equal "$(jq -c '[.kind, .source, .paths, .small, .files]' <<<"$out")" '["render",1,12288,true,[]]' "dry run"
+run 0 render 1 $lamp --spp 16 -q -o "$work/a"
+[ -s "$work/a/00000_radiance.png" ] && [ -s "$work/a/views.json" ] || fail "no picture: $(ls "$work/a")"
+run 0 list --kind render --json
+equal "$(jq -c 'map([.id, .kind, .source])' <<<"$out")" '[[2,"render",1]]' "list of renders"
+post 409 '{"kind":"render","source":2}'; has "$(field .detail)" "its kind is render"
+call POST /v1/jobs/2/extend -H 'Content-Type: application/json' -d '{"looks":1}'; expect 409
+call POST '/v1/jobs/2/retry?from=solve'; expect 400
+run 0 retry 2 --from render -q
+wait_for 60 job_is 2 succeeded
+run 0 get 2 -q -o "$work/b"
+cmp "$work/a/00000_radiance.png" "$work/b/00000_radiance.png" || fail "done again it differs"
+
+# --- files, and what stays as long as it is read ---
+cp "$work/room/images/1.png" "$work/sky.png"
+post 201 '{"kind":"render","source":1,"settings":{"environment":"sky.png","spp":4}}'
+equal "$(field .state)" paused; has "$(field .reason)" "waits for its files"
+equal "$(field '.files[0].name + " \(.files[0].bytes)"')" "sky.png null" "the files"
+call DELETE /v1/jobs/1; expect 409 "removing what is read"; has "$(field .detail)" "job 3 reads the outputs of job 1"
+call DELETE '/v1/jobs/1?dry_run=1'; expect 409
+call POST '/v1/jobs/1/retry?from=report'; expect 409 "a retry of what is read"
+call POST /v1/jobs/3/resume; expect 409; has "$(field .detail)" "sky.png"
+call PUT /v1/jobs/3/files/other.png -T "$work/sky.png"; expect 404; has "$(field .hint)" "sky.png"
+call PUT /v1/jobs/3/files/sky.png -T "$work/sky.png" -H "X-Content-SHA256: $(sha256sum </dev/null | cut -c 1-64)"; expect 422
+call PUT /v1/jobs/3/files/sky.png -T "$work/sky.png"; expect 200; [ "$(field .state)" != paused ] || fail "it still waits"
+equal "$(field '.files[0].sha256')" "$(sha256sum <"$work/sky.png" | cut -c 1-64)" "its digest"
+wait_for 60 job_is 3 succeeded
+call PUT /v1/jobs/3/files/sky.png -T "$work/sky.png"; expect 409
+mkdir "$work/maps"; cp "$work/sky.png" "$work/maps/day.png"
+run 0 render 1 --environment day.png --file "$work/maps/day.png" --spp 4 -q -o "$work/c"
+run 0 render 1 --environment "$work/maps/day.png" --spp 4 -q -o "$work/d"
+cmp "$work/c/00000_radiance.png" "$work/d/00000_radiance.png" || fail "--file and a path differ"
+run 2 render 1 --spp 4 --file "$work/sky.png"
+
+# --- a worker dies in the middle of several pictures: those that are done stay, and all bytes are the same ---
+many="--set cameras=photographs --view all --size 64x48 --spp 600 --set format=both"
+# shellcheck disable=SC2086
+run 0 render 1 $lamp $many -q; id=$out
+rendered() { [ "$("$build/unbake" show "$id" --json | jq '[.outputs[] | select(.name | test("radiance.exr"))] | length')" -ge "$1" ]; }
+attempt() { "$build/unbake" show "$id" --json | jq .attempt; }
+worker() { grep "job $id: attempt $(attempt) runs as process" "$work/log" | sed 's/.*process \([0-9]*\) .*/\1/'; }
+wait_for 60 rendered 2
+kill -KILL "$(worker)"
+died() { [ "$(attempt)" = 2 ]; }
+wait_for 60 died
+run 0 pause "$id" -q # at the next picture
+wait_for 60 job_is "$id" paused
+daemon_end KILL
+daemon_start --set threads=1 --set small_render_paths=100000 --set max_attempts=9
+run 0 resume "$id" -q
+wait_for 120 job_is "$id" succeeded
+run 0 get "$id" -q -o "$work/broken"
+# shellcheck disable=SC2086
+run 0 render 1 $lamp $many -q -o "$work/whole"
+diff -r -x preview "$work/broken" "$work/whole" || fail "broken off and gone on with, it differs"
+equal "$(find "$work/whole" -name '*.exr' | wc -l)" 8 "pictures"
+
+# --- a small render does not wait behind a reconstruction, a large one does ---
+run 0 submit "$work/room" --set texture_size=64 --set texels_per_metre=2 --set iterations=1000000000 --set texels_per_iteration=64 -q
+room=$out
+wait_for 60 job_is "$room" running
+# shellcheck disable=SC2086
+run 0 render 1 $lamp --spp 2000 -q; large=$out
+# shellcheck disable=SC2086
+run 0 render 1 $lamp --spp 16 -q -o "$work/e"
+job_is "$room" running || fail "the reconstruction does not run beside the render"
+job_is "$large" queued || fail "a large render runs beside the reconstruction"
+cmp "$work/a/00000_radiance.png" "$work/e/00000_radiance.png" || fail "beside a reconstruction it differs"
+run 0 cancel "$large" "$room" -q
+
+# --- the reconstruction goes when nothing reads it any more; the pictures stay ---
+run 0 rm 1 -q
+call GET /v1/jobs/2; expect 200; equal "$(field .source)" 1
+call POST '/v1/jobs/2/retry?from=render'; expect 409; has "$(field .detail)" "there is no job 1"
+run 4 render 1; has "$err" "there is no job 1"
+daemon_end TERM
+finish
