@@ -51,6 +51,22 @@ static void say(const struct relight_state *r, const char *text) {
         r->watch->message(r->watch->user, text);
 }
 
+static bool shines(const struct relight_state *r) { return lights_any(r->room.world.lights); }
+
+static bool is_black(const struct image *image) {
+    size_t values = (size_t)image->width * image->height * image->channel_count;
+    for (size_t i = 0; i < values; i++)
+        if (image->pixel[i] != 0.0f)
+            return false;
+    return true;
+}
+
+static void say_black(const struct relight_state *r, const char *why) {
+    char text[128];
+    snprintf(text, sizeof text, "picture %llu is black: %s", (unsigned long long)r->picture, why);
+    say(r, text);
+}
+
 /* --- one picture ------------------------------------------------------------------------------------------------ */
 
 /* A look at the picture between two rounds. */
@@ -179,6 +195,8 @@ static enum status render_picture(struct relight_state *r, struct error *err) {
     if (r->needs_light)
         status = picture_render(&r->room.world, camera, &path, &r->goal, r->has_direct, look, r, r->pool, &light,
                                 &quality, err);
+    if (status == STATUS_OK && r->needs_light && is_black(&light) && shines(r))
+        say_black(r, "no light reaches what it shows");
     if (status == STATUS_OK && is_denoised)
         status = denoise(r, &light, &first, err);
     if (status == STATUS_OK)
@@ -221,8 +239,6 @@ static void read_settings(struct relight_state *r) {
     for (size_t i = 0; i < count; i++)
         r->has_first = r->has_first || (!pass[i].is_light && wants(r, pass[i].name));
 }
-
-static bool shines(const struct relight_state *r) { return lights_any(r->room.world.lights); }
 
 static enum status use_sun(struct relight_state *r, uint32_t sun, struct error *err) {
     if (sun == r->sun)
@@ -304,12 +320,8 @@ static enum status render_one(struct relight_state *r, struct error *err) {
     if (output_is_done(&r->output, r->picture))
         return STATUS_OK;
     enum status status = use_sun(r, (uint32_t)(r->picture % r->suns), err);
-    if (status == STATUS_OK && r->needs_light && !shines(r)) {
-        char text[96];
-        snprintf(text, sizeof text, "picture %llu is black: the sun is below the horizon and nothing else shines",
-                 (unsigned long long)r->picture);
-        say(r, text);
-    }
+    if (status == STATUS_OK && r->needs_light && !shines(r))
+        say_black(r, "the sun is below the horizon and nothing else shines");
     return status == STATUS_OK ? render_picture(r, err) : status;
 }
 

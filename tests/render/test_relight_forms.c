@@ -269,6 +269,31 @@ static void test_lights(void) {
     relit_remove(dir);
 }
 
+static void hear(void *user, const char *text) { snprintf(user, 128, "%s", text); }
+
+/* A sky outside of a closed room: the picture is black, and that is said. */
+static void test_closed(void) {
+    struct relit_quad walls[6];
+    char heard[128] = "", out[] = "/tmp/unbake-closed-XXXXXX";
+    struct error err;
+    cJSON *settings = cJSON_CreateObject();
+    relit_cube(walls, rgb_gray(0.5f), rgb_gray(0.0f));
+    char *dir = relit_outputs(walls, 6, CENTRE_VIEW);
+    json_add_string(settings, "environment", "sky");
+    json_add_string(settings, "date", "2024-06-21");
+    json_add_number(settings, "latitude", 47.0);
+    json_add_number(settings, "longitude", 8.5);
+    json_add_int(settings, "spp", 4);
+    CHECK(mkdtemp(out) != NULL);
+    struct relight_job job = {.outputs = dir, .settings = settings, .out = out};
+    struct relight_watch watch = {.user = heard, .message = hear};
+    CHECK_THAT(relight_run(&job, &watch, pool, &err) == STATUS_OK, "%s", err.message);
+    CHECK_STRING(heard, "picture 0 is black: no light reaches what it shows");
+    cJSON_Delete(settings);
+    CHECK(file_remove_tree(out, NULL) == STATUS_OK);
+    relit_remove(dir);
+}
+
 /* A render that was stopped goes on where it was: what is there whole is not
  * rendered again. */
 static void test_resume(void) {
@@ -301,6 +326,7 @@ int main(void) {
     test_panorama();
     test_sums();
     test_lights();
+    test_closed();
     test_resume();
     parallel_free(pool);
     return check_result();
