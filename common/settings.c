@@ -66,6 +66,9 @@ static const struct setting table[] = {
      "solve: base colour is measured of one texel in so many squared"},
     {"method", SETTING_CHOICE, "", 0, 0, "solve|listing1", "solve", NULL,
      "how materials are found: solved from the measured light, then refined; or the published algorithm from a neutral start"},
+    {"padding", SETTING_INT, "texels", 0, 40, NULL, "2", NULL,
+     "free texels between two charts of the textures: 2 keep mip level 1 clean, 7 level 2, 16 level 3; 0: 7, or 2 where 7 would cost more "
+     "than a tenth of texels_per_metre"},
     {"preview_interval_sec", SETTING_REAL, "s", 1, 86400, NULL, "15", NULL,
      "time between preview pictures while the job runs"},
     {"quality", SETTING_CHOICE, "", 0, 0, "draft|standard|fine", "standard", NULL,

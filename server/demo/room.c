@@ -239,7 +239,7 @@ enum status room_init(struct room *room, uint32_t texture_size, float wall_radia
     assert(report.degenerate_count == 0 && report.duplicate_count == 0);
     segments_from_object_id(&room->segments, &room->mesh);
     assert(room->segments.count == ROOM_OBJECT_COUNT);
-    status = atlas_make(&room->atlas, &room->mesh, &room->segments, texture_size, 0.0f, err);
+    status = atlas_make(&room->atlas, &room->mesh, &room->segments, texture_size, 0.0f, ATLAS_PADDING, err);
     if (status != STATUS_OK)
         goto out;
     inverse_uv_make(&room->inverse, &room->atlas, room->mesh.triangle_count, pool);

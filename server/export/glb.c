@@ -121,6 +121,9 @@ static void add_pictures(struct glb *g) {
     add_picture(images, textures, "base_color", g->view[VIEW_BASE_COLOR].number);
     if (g->scales)
         add_picture(images, textures, "emission", g->view[VIEW_EMISSION].number);
+    cJSON *extras = add_object(sampler, "extras");
+    json_add_int(extras, "clean_mip_level", atlas_clean_level(g->in->atlas->padding));
+    json_add_number(extras, "atlas_utilisation", g->in->atlas->utilisation);
 }
 
 /* Returns its index. */

@@ -265,17 +265,21 @@ static void put_head(struct sink *out, const struct export_input *in) {
     for (int i = 0; i < 3; i++)
         upright_turn(in->up, (const double[3]){i == 0, i == 1, i == 2}, axis[i]);
     upright_turn(in->up, in->mesh->offset, at);
-    sink_printf(out, "#usda 1.0\n(\n"
-                     "    customLayerData = {\n"
-                     "        string creator = \"unbake " UNBAKE_VERSION "\"\n"
-                     "        string radianceUnit = \"relative, not nits: a photograph of exposure 1 shows radiance 1 "
-                     "as pixel value 1\"\n"
-                     "    }\n"
-                     "    defaultPrim = \"Room\"\n"
-                     "    metersPerUnit = 1\n"
-                     "    upAxis = \"Y\"\n"
-                     ")\n\n"
-                     "def Xform \"Room\" (\n    kind = \"component\"\n    displayName = ");
+    sink_printf(out,
+                "#usda 1.0\n(\n"
+                "    customLayerData = {\n"
+                "        string creator = \"unbake " UNBAKE_VERSION "\"\n"
+                "        string radianceUnit = \"relative, not nits: a photograph of exposure 1 shows radiance 1 "
+                "as pixel value 1\"\n"
+                "        int cleanMipLevel = %d\n"
+                "        double atlasUtilisation = %.6g\n"
+                "    }\n"
+                "    defaultPrim = \"Room\"\n"
+                "    metersPerUnit = 1\n"
+                "    upAxis = \"Y\"\n"
+                ")\n\n"
+                "def Xform \"Room\" (\n    kind = \"component\"\n    displayName = ",
+                atlas_clean_level(in->atlas->padding), in->atlas->utilisation);
     put_string(out, in->title);
     sink_printf(out, "\n)\n{\n");
     put_matrix(out, "    ", axis, at);

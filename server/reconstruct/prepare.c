@@ -87,6 +87,8 @@ static void add_prepare_figures(const struct prepare *p) {
     json_add_int(figures, "valid_texels", (int64_t)r->inverse.valid_count);
     json_add_number(figures, "atlas_utilisation",
                     (double)r->inverse.valid_count / ((double)r->atlas.width * (double)r->atlas.height));
+    json_add_int(figures, "atlas_padding", r->atlas.padding);
+    json_add_int(figures, "atlas_clean_mip_level", atlas_clean_level(r->atlas.padding));
     json_add_int(figures, "training_photographs", (int64_t)p->views->train_count);
     json_add_number(figures, "median_radiance", (double)p->views->median_radiance);
 }
@@ -97,8 +99,9 @@ static enum status map_surface(struct reconstruction *r, const float *density, s
     const struct mesh *mesh = &r->scene->mesh;
     uint32_t size = (uint32_t)settings_number(r->settings, "texture_size");
     float texels_per_metre = (float)settings_number(r->settings, "texels_per_metre");
-    enum status status = density ? atlas_make_uneven(&r->atlas, mesh, &r->segments, size, density, err)
-                                 : atlas_make(&r->atlas, mesh, &r->segments, size, texels_per_metre, err);
+    uint32_t padding = (uint32_t)settings_number(r->settings, "padding");
+    enum status status = density ? atlas_make_uneven(&r->atlas, mesh, &r->segments, size, density, padding, err)
+                                 : atlas_make(&r->atlas, mesh, &r->segments, size, texels_per_metre, padding, err);
     if (status != STATUS_OK)
         return status;
     inverse_uv_make(&r->inverse, &r->atlas, mesh->triangle_count, r->pool);

@@ -107,12 +107,12 @@ struct pack_grid {
     uint32_t padding; /* cells */
 };
 
-static struct pack_grid grid_of(uint32_t size) {
+static struct pack_grid grid_of(uint32_t size, uint32_t padding) {
     struct pack_grid grid = {.size = size, .cell = 1};
     while (size / grid.cell > MAX_GRID)
         grid.cell *= 2;
     grid.cells = size / grid.cell;
-    grid.padding = (ATLAS_PADDING + grid.cell - 1) / grid.cell;
+    grid.padding = (padding + grid.cell - 1) / grid.cell;
     return grid;
 }
 
@@ -167,6 +167,18 @@ static double guess_density(struct raster *raster, const struct charts *charts, 
         density = fmin(density * (isfinite(fill) ? sqrt(FIRST_FILL / fill) : SHRINK), full);
     }
     return density;
+}
+
+#define MAX_PADDING_COST 1.2 /* of the area that the dilated shapes fill: a tenth of the density */
+
+/* What automatic padding is for these charts. */
+static uint32_t choose_padding(const struct charts *charts, uint32_t size) {
+    struct raster trial = {.item = mem_calloc(charts->count, sizeof *trial.item)};
+    struct pack_grid narrow = grid_of(size, ATLAS_PADDING), wide = grid_of(size, ATLAS_WIDE_PADDING);
+    double density = guess_density(&trial, charts, &narrow, density_bound(charts, &narrow));
+    double least = fill_at(&trial, charts, density, &narrow), most = fill_at(&trial, charts, density, &wide);
+    raster_release(&trial);
+    return isfinite(most) && most <= MAX_PADDING_COST * least ? ATLAS_WIDE_PADDING : ATLAS_PADDING;
 }
 
 /* Searches the greatest density that fits and leaves its packing in `best`; 0 when none does. */
@@ -229,8 +241,11 @@ static size_t covered_texels(struct raster *raster, const struct charts *charts,
 
 static void finish(struct atlas *atlas, struct charts *charts, struct raster *raster, const struct pack_grid *grid,
                    double density, size_t triangle_count) {
-    *atlas = (struct atlas){
-        .width = grid->size, .height = grid->size, .texels_per_metre = (float)density, .chart_count = charts->count};
+    *atlas = (struct atlas){.width = grid->size,
+                            .height = grid->size,
+                            .texels_per_metre = (float)density,
+                            .chart_count = charts->count,
+                            .padding = grid->padding * grid->cell};
     atlas->corner = mem_array(triangle_count, sizeof *atlas->corner);
     set_corners(atlas, charts, raster, grid, density);
     atlas->utilisation = (double)covered_texels(raster, charts, density) / ((double)grid->size * grid->size);
@@ -239,8 +254,8 @@ static void finish(struct atlas *atlas, struct charts *charts, struct raster *ra
 }
 
 /* The smallest power of two that holds `count` charts of one texel each, with padding. */
-static double size_for(size_t count) {
-    double cells = (double)count * (1 + ATLAS_PADDING) * (1 + ATLAS_PADDING) / SINGLE_TEXEL_FILL;
+static double size_for(size_t count, uint32_t padding) {
+    double cells = (double)count * (1.0 + padding) * (1.0 + padding) / SINGLE_TEXEL_FILL;
     return exp2(ceil(log2(sqrt(cells))));
 }
 
@@ -264,20 +279,22 @@ static void shrink_charts(struct charts *charts, const float *density) {
 
 /* `density` may be NULL. */
 static enum status make_at_size(struct atlas *atlas, const struct mesh *mesh, const struct segments *segments,
-                                uint32_t size, const float *density_of, struct error *err) {
+                                uint32_t size, const float *density_of, uint32_t padding, struct error *err) {
     struct charts charts;
-    struct pack_grid grid = grid_of(size);
     float texel_m = (float)sqrt(mesh_area(mesh) / TEXEL_FILL) / (float)size;
     charts_make(&charts, mesh, segments, texel_m);
     if (density_of)
         shrink_charts(&charts, density_of);
+    if (padding == ATLAS_AUTOMATIC_PADDING)
+        padding = choose_padding(&charts, size);
+    struct pack_grid grid = grid_of(size, padding);
     struct raster raster = {.item = mem_calloc(charts.count, sizeof *raster.item)};
     double density = search_density(&raster, &charts, &grid);
     enum status status = STATUS_OK;
     if (density > 0.0) {
         finish(atlas, &charts, &raster, &grid, density, mesh->triangle_count);
     } else {
-        double needed = fmax(size_for(charts.count), 2.0 * size);
+        double needed = fmax(size_for(charts.count, padding), 2.0 * size);
         status = error_set(err, STATUS_INPUT,
                            "the mesh is in %zu pieces: a texture of %u x %u texels "
                            "cannot hold them",
@@ -293,7 +310,7 @@ static enum status make_at_size(struct atlas *atlas, const struct mesh *mesh, co
 }
 
 static enum status make_at_density(struct atlas *atlas, const struct mesh *mesh, const struct segments *segments,
-                                   float texels_per_metre, struct error *err) {
+                                   float texels_per_metre, uint32_t padding, struct error *err) {
     struct charts charts;
     charts_make(&charts, mesh, segments, 1.0f / texels_per_metre);
     struct raster raster = {.item = mem_calloc(charts.count, sizeof *raster.item)};
@@ -308,7 +325,7 @@ static enum status make_at_density(struct atlas *atlas, const struct mesh *mesh,
                                (double)texels_per_metre, ceil(least), ceil(least), ATLAS_MAX_SIZE);
             break;
         }
-        struct pack_grid grid = grid_of(size);
+        struct pack_grid grid = grid_of(size, padding ? padding : choose_padding(&charts, size));
         fits = fill_at(&raster, &charts, density, &grid) <= 1.0 &&
                pack(raster.item, charts.count, grid.cells, grid.padding);
         if (fits)
@@ -320,21 +337,21 @@ static enum status make_at_density(struct atlas *atlas, const struct mesh *mesh,
 }
 
 enum status atlas_make(struct atlas *atlas, const struct mesh *mesh, const struct segments *segments, uint32_t size,
-                       float texels_per_metre, struct error *err) {
+                       float texels_per_metre, uint32_t padding, struct error *err) {
     if (texels_per_metre != 0.0f) {
         if (!(texels_per_metre > 0.0f) || !isfinite(texels_per_metre))
             return error_set(err, STATUS_INPUT, "texels per metre: %g is not a positive number",
                              (double)texels_per_metre);
-        return make_at_density(atlas, mesh, segments, texels_per_metre, err);
+        return make_at_density(atlas, mesh, segments, texels_per_metre, padding, err);
     }
-    return atlas_make_uneven(atlas, mesh, segments, size, NULL, err);
+    return atlas_make_uneven(atlas, mesh, segments, size, NULL, padding, err);
 }
 
 enum status atlas_make_uneven(struct atlas *atlas, const struct mesh *mesh, const struct segments *segments,
-                              uint32_t size, const float *density, struct error *err) {
+                              uint32_t size, const float *density, uint32_t padding, struct error *err) {
     if (size == 0 || size > ATLAS_MAX_SIZE)
         return error_set(err, STATUS_INPUT, "texture size: %u is not within 1 to %d", size, ATLAS_MAX_SIZE);
-    return make_at_size(atlas, mesh, segments, size, density, err);
+    return make_at_size(atlas, mesh, segments, size, density, padding, err);
 }
 
 void atlas_release(struct atlas *atlas) {

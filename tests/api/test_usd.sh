@@ -27,6 +27,7 @@ for path in sys.argv[1:]:
         check(False, f"{error.GetName()}: {error.GetMessage()}")
     check(UsdGeom.GetStageUpAxis(stage) == "Y" and UsdGeom.GetStageMetersPerUnit(stage) == 1, "axis, unit")
     check("not nits" in stage.GetRootLayer().customLayerData["radianceUnit"], "unit of radiance")
+    check(stage.GetRootLayer().customLayerData["cleanMipLevel"] == 1, "clean level")
     cache = UsdGeom.XformCache()
     room = cache.GetLocalToWorldTransform(stage.GetDefaultPrim())
     # z is up, and y is 1000 m off: z to y, y to -z.

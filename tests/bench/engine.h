@@ -138,7 +138,7 @@ static inline void load(struct room *room, const char *name) {
     struct mesh_report report;
     room_must(mesh_check(&room->mesh, path, &report, &err), &err);
     segments_from_object_id(&room->segments, &room->mesh);
-    room_must(atlas_make(&room->atlas, &room->mesh, &room->segments, ATLAS, 0.0f, &err), &err);
+    room_must(atlas_make(&room->atlas, &room->mesh, &room->segments, ATLAS, 0.0f, ATLAS_PADDING, &err), &err);
     room->pool = parallel_new(0);
     struct inverse_uv inverse;
     inverse_uv_make(&inverse, &room->atlas, room->mesh.triangle_count, room->pool);

@@ -129,7 +129,7 @@ static inline void model_init(struct model *m, const struct mesh *mesh, uint32_t
                               struct parallel *pool) {
     struct error err = {0};
     segments_from_object_id(&m->segments, mesh);
-    CHECK(atlas_make(&m->atlas, mesh, &m->segments, texture_size, 0.0f, &err) == STATUS_OK);
+    CHECK(atlas_make(&m->atlas, mesh, &m->segments, texture_size, 0.0f, ATLAS_PADDING, &err) == STATUS_OK);
     inverse_uv_make(&m->inverse, &m->atlas, mesh->triangle_count, pool);
     materials_init(&m->materials, &m->inverse, OBJECTS, rgb_gray(gray), 1.0f, 0.0f);
 }

@@ -31,7 +31,7 @@ static void fixture_init(struct fixture *f) {
     struct error err = {0};
     f->pool = parallel_new(0);
     segments_from_object_id(&f->segments, &f->mesh);
-    CHECK(atlas_make(&f->atlas, &f->mesh, &f->segments, 128, 0.0f, &err) == STATUS_OK);
+    CHECK(atlas_make(&f->atlas, &f->mesh, &f->segments, 128, 0.0f, ATLAS_PADDING, &err) == STATUS_OK);
     inverse_uv_make(&f->inverse, &f->atlas, f->mesh.triangle_count, f->pool);
     materials_init(&f->materials, &f->inverse, OBJECTS, rgb_gray(0.0f), 1.0f, 0.0f);
     f->materials.emission[LAMP] = lamp_radiance;

@@ -160,7 +160,7 @@ static void test_room(const char *name, uint32_t size, double utilisation, doubl
     if (!room_load(name, &mesh))
         return;
     segments_from_object_id(&segments, &mesh);
-    CHECK(atlas_make(&atlas, &mesh, &segments, size, 0.0f, &err) == STATUS_OK);
+    CHECK(atlas_make(&atlas, &mesh, &segments, size, 0.0f, ATLAS_PADDING, &err) == STATUS_OK);
     CHECK(atlas.width == size && atlas.height == size);
     double ratio = check_atlas(&atlas, &mesh, &segments);
     printf("%s at %u: %zu charts, %.1f texels a metre, utilisation %.4f, area kept %.4f\n", name, size,
@@ -168,7 +168,7 @@ static void test_room(const char *name, uint32_t size, double utilisation, doubl
     CHECK_THAT(atlas.utilisation >= utilisation, "%.4f", atlas.utilisation);
     CHECK_THAT(ratio >= area_ratio, "%.4f", ratio);
     if (size <= 1024) {
-        CHECK(atlas_make(&again, &mesh, &segments, size, 0.0f, &err) == STATUS_OK);
+        CHECK(atlas_make(&again, &mesh, &segments, size, 0.0f, ATLAS_PADDING, &err) == STATUS_OK);
         check_same(&atlas, &again, mesh.triangle_count);
         atlas_release(&again);
     }
@@ -206,7 +206,7 @@ static void test_shape(vec3 (*place)(float, float, void *), uint32_t columns, ui
     CHECK(mesh_check(&mesh, "shape", NULL, &err) == STATUS_OK);
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
         struct atlas atlas;
-        CHECK_THAT(atlas_make(&atlas, &mesh, &segments, sizes[i], 0.0f, &err) == STATUS_OK, "%s", err.message);
+        CHECK_THAT(atlas_make(&atlas, &mesh, &segments, sizes[i], 0.0f, ATLAS_PADDING, &err) == STATUS_OK, "%s", err.message);
         check_atlas(&atlas, &mesh, &segments);
         CHECK_THAT(atlas.chart_count <= most_charts, "%zu charts of %u x %u quads at %u", atlas.chart_count, columns,
                    rows, sizes[i]);
@@ -239,20 +239,20 @@ static void test_density(void) {
     struct atlas atlas;
     struct error err = {0};
     room_one_segment(&segments, &mesh);
-    CHECK(atlas_make(&atlas, &mesh, &segments, 0, 100.0f, &err) == STATUS_OK);
+    CHECK(atlas_make(&atlas, &mesh, &segments, 0, 100.0f, ATLAS_PADDING, &err) == STATUS_OK);
     CHECK(atlas.width == 512 && atlas.height == 512); /* 300 x 200 texels */
     CHECK(atlas.texels_per_metre == 100.0f && atlas.chart_count == 1);
     CHECK_NEAR(check_atlas(&atlas, &mesh, &segments), 1.0, 1e-3);
     atlas_release(&atlas);
     /* 3 m at 6,000 texels a metre pass the largest size. */
-    CHECK(atlas_make(&atlas, &mesh, &segments, 0, 6000.0f, &err) == STATUS_INPUT);
+    CHECK(atlas_make(&atlas, &mesh, &segments, 0, 6000.0f, ATLAS_PADDING, &err) == STATUS_INPUT);
     CHECK_THAT(strstr(err.message, "6000 texels per metre"), "%s", err.message);
-    CHECK(atlas_make(&atlas, &mesh, &segments, 0, -1.0f, &err) == STATUS_INPUT);
-    CHECK(atlas_make(&atlas, &mesh, &segments, 0, NAN, &err) == STATUS_INPUT);
-    CHECK(atlas_make(&atlas, &mesh, &segments, 0, 0.0f, &err) == STATUS_INPUT);
-    CHECK(atlas_make(&atlas, &mesh, &segments, 16385, 0.0f, &err) == STATUS_INPUT);
+    CHECK(atlas_make(&atlas, &mesh, &segments, 0, -1.0f, ATLAS_PADDING, &err) == STATUS_INPUT);
+    CHECK(atlas_make(&atlas, &mesh, &segments, 0, NAN, ATLAS_PADDING, &err) == STATUS_INPUT);
+    CHECK(atlas_make(&atlas, &mesh, &segments, 0, 0.0f, ATLAS_PADDING, &err) == STATUS_INPUT);
+    CHECK(atlas_make(&atlas, &mesh, &segments, 16385, 0.0f, ATLAS_PADDING, &err) == STATUS_INPUT);
     /* One chart alone fills what its shape lets it. */
-    CHECK(atlas_make(&atlas, &mesh, &segments, 3000, 0.0f, &err) == STATUS_OK);
+    CHECK(atlas_make(&atlas, &mesh, &segments, 3000, 0.0f, ATLAS_PADDING, &err) == STATUS_OK);
     CHECK_THAT(atlas.utilisation > 0.65 && atlas.width == 3000, "%g", atlas.utilisation);
     atlas_release(&atlas);
     segments_release(&segments);
@@ -272,11 +272,11 @@ static void test_fragments(void) {
             mesh.index[t][c] = 3 * t + c;
         }
     room_one_segment(&segments, &mesh);
-    CHECK(atlas_make(&atlas, &mesh, &segments, 64, 0.0f, &err) == STATUS_INPUT);
+    CHECK(atlas_make(&atlas, &mesh, &segments, 64, 0.0f, ATLAS_PADDING, &err) == STATUS_INPUT);
     CHECK_THAT(strstr(err.message, "3000 pieces") && strstr(err.message, "64 x 64"), "%s", err.message);
     unsigned size = 0;
     CHECK_THAT(sscanf(err.hint, "a texture_size of %u", &size) == 1, "%s", err.hint);
-    CHECK(atlas_make(&atlas, &mesh, &segments, size, 0.0f, &err) == STATUS_OK);
+    CHECK(atlas_make(&atlas, &mesh, &segments, size, 0.0f, ATLAS_PADDING, &err) == STATUS_OK);
     CHECK(atlas.chart_count == COUNT);
     check_atlas(&atlas, &mesh, &segments);
     atlas_release(&atlas);
@@ -305,8 +305,8 @@ static void test_uneven(void) {
             two.index[t][c] = mesh.index[t % 4][c] + (t < 4 ? 0 : 6);
     const float density[8] = {1.0f, 0.25f, 0.25f, 0.25f, 0.25f, 0.25f, 0.25f, 0.25f};
     room_one_segment(&segments, &two);
-    CHECK(atlas_make(&even, &two, &segments, 512, 0.0f, &err) == STATUS_OK);
-    CHECK(atlas_make_uneven(&uneven, &two, &segments, 512, density, &err) == STATUS_OK);
+    CHECK(atlas_make(&even, &two, &segments, 512, 0.0f, ATLAS_PADDING, &err) == STATUS_OK);
+    CHECK(atlas_make_uneven(&uneven, &two, &segments, 512, density, ATLAS_PADDING, &err) == STATUS_OK);
     CHECK(even.chart_count == 2 && uneven.chart_count == 2);
     size_t covered;
     uint32_t *map = chart_map(&uneven, 8, &covered);

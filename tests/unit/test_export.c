@@ -99,6 +99,59 @@ static void test_margin(void) {
     mem_free(source);
 }
 
+/* Texels of a mip level that cover a chart and have a value of another one. */
+static size_t mixed_texels(const struct atlas *atlas, const struct inverse_uv *inverse, const uint32_t *source,
+                           int level) {
+    uint32_t side = atlas->width >> level;
+    size_t mixed = 0;
+    for (uint32_t i = 0; i < side * side; i++) {
+        uint32_t first = UINT32_MAX;
+        bool covers = false, mixes = false;
+        for (uint32_t k = 0; k < 1u << (2 * level); k++) {
+            size_t texel = (size_t)((i / side << level) + (k >> level)) * atlas->width + (i % side << level) +
+                           (k & ((1u << level) - 1));
+            if (source[texel] == INVERSE_UV_NONE)
+                continue;
+            uint32_t chart = atlas->chart_of_triangle[inverse->triangle[source[texel]]];
+            covers |= source[texel] == texel;
+            mixes |= first != UINT32_MAX && chart != first;
+            first = chart;
+        }
+        mixed += covers && mixes;
+    }
+    return mixed;
+}
+
+/* The gutter between charts keeps the mip levels clean that the files name. */
+static void test_clean_levels(struct parallel *pool) {
+    static const struct {
+        uint32_t padding;
+        int level;
+    } table[] = {{1, 0}, {ATLAS_PADDING, 1}, {ATLAS_AUTOMATIC_PADDING, 2}, {16, 3}};
+    struct room room;
+    struct error err;
+    CHECK(room_init(&room, 64, 0.0f, 0.0f, pool, &err) == STATUS_OK);
+    for (size_t i = 0; i < sizeof table / sizeof *table; i++) {
+        struct atlas atlas;
+        struct inverse_uv inverse;
+        CHECK(atlas_make(&atlas, &room.mesh, &room.segments, 1024, 0.0f, table[i].padding, &err) == STATUS_OK);
+        CHECK_THAT(atlas_clean_level(atlas.padding) == table[i].level, "%u", atlas.padding);
+        inverse_uv_make(&inverse, &atlas, room.mesh.triangle_count, pool);
+        uint32_t *source = picture_margin(&inverse);
+        printf("padding %u: utilisation %.3f, mixed at levels 1 to 3:", atlas.padding, atlas.utilisation);
+        for (int level = 1; level <= 3; level++) {
+            size_t mixed = mixed_texels(&atlas, &inverse, source, level);
+            printf(" %zu", mixed);
+            CHECK_THAT(mixed == 0 || level > table[i].level, "%zu texels of level %d mix charts", mixed, level);
+        }
+        printf("\n");
+        mem_free(source);
+        inverse_uv_release(&inverse);
+        atlas_release(&atlas);
+    }
+    room_release(&room);
+}
+
 /* One exposure for both; equal pictures differ nowhere; signs by colour. */
 static void test_comparison(void) {
     struct image photograph, render, picture;
@@ -275,7 +328,7 @@ static void test_left_out(const char *dir, struct parallel *pool) {
         mesh.object_id[t] = t;
     }
     segments_from_object_id(&segments, &mesh);
-    CHECK(atlas_make(&atlas, &mesh, &segments, 512, 0.0f, &err) == STATUS_OK);
+    CHECK(atlas_make(&atlas, &mesh, &segments, 512, 0.0f, ATLAS_PADDING, &err) == STATUS_OK);
     inverse_uv_make(&inverse, &atlas, mesh.triangle_count, pool);
     materials_init(&materials, &inverse, segments.count, rgb_gray(0.5f), 0.5f, 0.5f);
     float *zero = mem_calloc((size_t)atlas.width * atlas.height, sizeof *zero);
@@ -323,6 +376,7 @@ int main(void) {
     struct error err;
     CHECK(mkdtemp(dir) != NULL);
     test_margin();
+    test_clean_levels(pool);
     test_comparison();
     CHECK(room_init(&room, 256, 15.0f, 15.0f, pool, &err) == STATUS_OK);
     memcpy(room.mesh.offset, (double[3]){500000.0, -4100000.0, 0.0}, sizeof room.mesh.offset);

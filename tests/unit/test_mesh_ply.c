@@ -69,7 +69,7 @@ int main(void) {
     mesh.object_id = mem_calloc(4, sizeof *mesh.object_id);
     mesh.object_id[2] = mesh.object_id[3] = 9;
     segments_from_object_id(&segments, &mesh);
-    CHECK(atlas_make(&atlas, &mesh, &segments, 64, 0.0f, &err) == STATUS_OK);
+    CHECK(atlas_make(&atlas, &mesh, &segments, 64, 0.0f, ATLAS_PADDING, &err) == STATUS_OK);
 
     char path[] = "/tmp/unbake-test-ply-XXXXXX";
     int fd = mkstemp(path);
