@@ -1,4 +1,4 @@
-/* exr_write.c -- writing OpenEXR pictures by OpenEXRCore. Written bytes depend on the pixels alone: no
+/* exr_write.c -- writing OpenEXR pictures by OpenEXRCore. Written bytes depend on pixels and notes alone: no
  * time, no host, no thread order. */
 #include <errno.h>
 #include <fcntl.h>
@@ -15,7 +15,7 @@ struct encoder {
 };
 
 static exr_result_t write_header(exr_context_t context, const struct image *image, enum image_exr_type type, bool tiled,
-                                 const char *note) {
+                                 const struct image_note *note, size_t note_count) {
     /* ITU-R BT.709: red, green, blue, white. */
     static const exr_attr_chromaticities_t rec709 = {0.64f, 0.33f, 0.30f, 0.60f, 0.15f, 0.06f, 0.3127f, 0.3290f};
     int part = 0;
@@ -28,8 +28,8 @@ static exr_result_t write_header(exr_context_t context, const struct image *imag
     if (code == EXR_ERR_SUCCESS && image_channel(image, "R") >= 0 && image_channel(image, "G") >= 0 &&
         image_channel(image, "B") >= 0)
         code = exr_attr_set_chromaticities(context, part, "chromaticities", &rec709);
-    if (code == EXR_ERR_SUCCESS && note)
-        code = exr_attr_set_string(context, part, "comments", note);
+    for (size_t i = 0; code == EXR_ERR_SUCCESS && i < note_count; i++)
+        code = exr_attr_set_string(context, part, note[i].name, note[i].text);
     for (uint32_t c = 0; code == EXR_ERR_SUCCESS && c < image->channel_count; c++)
         code = exr_add_channel(context, part, image->channel[c], type == IMAGE_HALF ? EXR_PIXEL_HALF : EXR_PIXEL_FLOAT,
                                EXR_PERCEPTUALLY_LOGARITHMIC, 1, 1);
@@ -100,11 +100,11 @@ static exr_result_t write_chunks(exr_context_t context, const struct image *imag
 
 enum status image_write_exr(const char *path, const struct image *image, enum image_exr_type type, bool tiled,
                             struct error *err) {
-    return image_write_exr_noted(path, image, type, tiled, NULL, err);
+    return image_write_exr_noted(path, image, type, tiled, NULL, 0, err);
 }
 
 enum status image_write_exr_noted(const char *path, const struct image *image, enum image_exr_type type, bool tiled,
-                                  const char *note, struct error *err) {
+                                  const struct image_note *note, size_t note_count, struct error *err) {
     struct exr_stream stream = {.fd = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666)};
     if (stream.fd < 0)
         return error_set_errno(err, errno, "cannot create %s", path);
@@ -112,7 +112,7 @@ enum status image_write_exr_noted(const char *path, const struct image *image, e
     exr_context_t context;
     exr_result_t code = exr_start_write(&context, path, EXR_WRITE_FILE_DIRECTLY, &init);
     if (code == EXR_ERR_SUCCESS) {
-        code = write_header(context, image, type, tiled, note);
+        code = write_header(context, image, type, tiled, note, note_count);
         if (code == EXR_ERR_SUCCESS)
             code = write_chunks(context, image, tiled);
         exr_result_t finish = exr_finish(&context); /* writes the table of chunks */

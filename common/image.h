@@ -145,9 +145,13 @@ enum image_exr_type { IMAGE_HALF, IMAGE_FLOAT };
 enum status image_write_exr(const char *path, const struct image *image, enum image_exr_type type, bool tiled,
                             struct error *err);
 
-/* The same with a text in the header's attribute `comments`; NULL: none. */
+/* A line of text in an EXR's header. */
+struct image_note {
+    const char *name, *text; /* UTF-8 */
+};
+/* The same with attributes note[count] of type string. */
 enum status image_write_exr_noted(const char *path, const struct image *image, enum image_exr_type type, bool tiled,
-                                  const char *note, struct error *err);
+                                  const struct image_note *note, size_t note_count, struct error *err);
 
 /* Writes an 8-bit sRGB PNG of the first three channels (or the one there is, as grey), values
  * times `scale`, clamped to [0, 1], converted from linear. Non-finite values become magenta. */

@@ -9,6 +9,7 @@ static void put_header(struct sink *out, const struct mesh *mesh, size_t vertex_
     sink_offset(out, "comment", mesh->offset, "\n");
     sink_printf(out,
                 "comment s t: atlas coordinates, origin lower left\n"
+                "comment TextureFile base_color.png\n" /* as MeshLab and Blender read it */
                 "element vertex %zu\n"
                 "property float x\nproperty float y\nproperty float z\n%s"
                 "property float s\nproperty float t\n"

@@ -31,13 +31,17 @@ enum status output_files_list(struct output_files *f, const char *type, const ch
 }
 
 enum status output_files_image(struct output_files *f, const char *type, const char *name, const struct image *image,
-                               enum output_format format, const char *about, struct error *err) {
+                               enum output_format format, const char *unit, const char *about, struct error *err) {
+    struct image_note note[OUTPUT_NOTES_MAX + 1];
     char *path = file_join(f->dir, name), *temporary = mem_printf("%s.part", path);
     enum status status;
+    memcpy(note, f->note, f->note_count * sizeof *note);
+    note[f->note_count] = (struct image_note){"units", unit};
     if (format == OUTPUT_PNG)
         status = image_write_png(temporary, image, 1.0f, err);
     else
-        status = image_write_exr(temporary, image, format == OUTPUT_EXR_HALF ? IMAGE_HALF : IMAGE_FLOAT, true, err);
+        status = image_write_exr_noted(temporary, image, format == OUTPUT_EXR_HALF ? IMAGE_HALF : IMAGE_FLOAT, true,
+                                       note, f->note_count + 1, err);
     if (status == STATUS_OK)
         status = file_put_in_place(temporary, path, err);
     else

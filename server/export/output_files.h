@@ -16,19 +16,23 @@
 typedef enum status export_announce(void *user, const char *type, const char *name, const char *content_type,
                                     struct error *err);
 
+#define OUTPUT_NOTES_MAX 3
 struct output_files {
     const char *dir; /* borrowed */
     export_announce *announce;
     void *user;
     cJSON *written;  /* array of {"name", "content_type", "about"}; NULL: not listed. The caller's, as the next */
     cJSON *left_out; /* array of {"name", "reason"} of files that were not written */
+    struct image_note note[OUTPUT_NOTES_MAX]; /* of all EXR files; borrowed */
+    size_t note_count;
 };
 
 enum output_format { OUTPUT_PNG, OUTPUT_EXR_HALF, OUTPUT_EXR_FLOAT };
 
-/* Writes a picture, lists and announces it as `type` (export_announce). */
+/* Writes a picture, lists and announces it as `type` (export_announce). `unit` of the values goes into an EXR's header;
+ * NULL in a PNG's. */
 enum status output_files_image(struct output_files *f, const char *type, const char *name, const struct image *image,
-                               enum output_format format, const char *about, struct error *err);
+                               enum output_format format, const char *unit, const char *about, struct error *err);
 
 /* Writes data[length], reads it back and announces it; lists it unless `about` is NULL. */
 enum status output_files_bytes(struct output_files *f, const char *name, const char *content_type, const void *data,

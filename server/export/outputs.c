@@ -24,21 +24,27 @@
 #define PAGE_LIMIT ((size_t)1 << 29) /* bytes */
 #define PAGE_COMPARISONS 24          /* side-by-sides embedded in the page; files of all are written */
 
+#define RADIANCE_UNIT "radiance of which a photograph of exposure 1 shows 1 as pixel value 1"
+
 struct output_kind {
     enum picture_kind kind;
     const char *stem;
     enum image_exr_type type;
-    const char *title, *about; /* `about` is for report.json and the page */
+    const char *title, *unit, *about; /* `about` is for report.json and the page */
 };
 
 static const struct output_kind kinds[] = {
-    {PICTURE_BASE_COLOR, "base_color", IMAGE_HALF, "Base colour", "linear Rec. 709 reflectance by texel"},
-    {PICTURE_EMISSION, "emission", IMAGE_HALF, "Emission",
+    {PICTURE_BASE_COLOR, "base_color", IMAGE_HALF, "Base colour", "reflectance",
+     "linear Rec. 709 reflectance by texel"},
+    {PICTURE_EMISSION, "emission", IMAGE_HALF, "Emission", RADIANCE_UNIT,
      "radiance of each emitter's front side, exactly 0 elsewhere; compressed by 1 / (1 + maximum) "
      "in the preview"},
-    {PICTURE_ROUGHNESS, "roughness", IMAGE_HALF, "Roughness", "by segment, 0 to 1; the microfacet width is its square"},
-    {PICTURE_SPECULAR, "specular", IMAGE_HALF, "Specular", "by segment, 0 to 1; 0.5 is an index of refraction of 1.5"},
+    {PICTURE_ROUGHNESS, "roughness", IMAGE_HALF, "Roughness", "1",
+     "by segment, 0 to 1; the microfacet width is its square"},
+    {PICTURE_SPECULAR, "specular", IMAGE_HALF, "Specular", "1",
+     "by segment, 0 to 1; 0.5 is an index of refraction of 1.5"},
     {PICTURE_CONFIDENCE, "confidence", IMAGE_FLOAT, "Confidence",
+     "count: observations; spread: standard deviation of log radiance",
      "observations by texel and the spread of their radiance; in the preview from blue (few) to "
      "yellow (many), red where no photograph sees the surface"},
 };
@@ -62,7 +68,7 @@ static enum status put_environment_preview(struct export *e, struct error *err) 
         return STATUS_OK;
     picture_environment(e->input, &image);
     enum status status = output_files_image(&e->files, EVENT_PREVIEW, "preview/environment.png", &image, OUTPUT_PNG,
-                                            ENVIRONMENT_ABOUT, err);
+                                            NULL, ENVIRONMENT_ABOUT, err);
     image_release(&image);
     return status;
 }
@@ -70,7 +76,7 @@ static enum status put_environment_preview(struct export *e, struct error *err) 
 static enum status put_sky(struct export *e, struct error *err) {
     struct image sky;
     sky_without_sun(e->input, &sky);
-    enum status status = output_files_image(&e->files, EVENT_OUTPUT, FORMATS_SKY, &sky, OUTPUT_EXR_FLOAT,
+    enum status status = output_files_image(&e->files, EVENT_OUTPUT, FORMATS_SKY, &sky, OUTPUT_EXR_FLOAT, RADIANCE_UNIT,
                                             "distant light without the sun, for formats that have a sun", err);
     image_release(&sky);
     return status;
@@ -81,10 +87,10 @@ static enum status put_environment(struct export *e, struct error *err) {
     if (!in->environment)
         return STATUS_OK;
     enum status status = output_files_image(&e->files, EVENT_OUTPUT, FORMATS_ENVIRONMENT, in->environment,
-                                            OUTPUT_EXR_FLOAT, ENVIRONMENT_ABOUT, err);
+                                            OUTPUT_EXR_FLOAT, RADIANCE_UNIT, ENVIRONMENT_ABOUT, err);
     if (status == STATUS_OK)
         status = output_files_image(&e->files, EVENT_OUTPUT, "environment_confidence.exr", in->environment_confidence,
-                                    OUTPUT_EXR_FLOAT,
+                                    OUTPUT_EXR_FLOAT, "count: photographs; spread: standard deviation of log radiance",
                                     "photographs by direction, 0 where it was filled in, and the spread of what "
                                     "they show",
                                     err);
@@ -97,7 +103,7 @@ static enum status put_radiance_preview(struct export *e, struct error *err) {
         return STATUS_OK;
     picture_radiance(e->input, &image);
     enum status status =
-        output_files_image(&e->files, EVENT_PREVIEW, "preview/radiance.png", &image, OUTPUT_PNG,
+        output_files_image(&e->files, EVENT_PREVIEW, "preview/radiance.png", &image, OUTPUT_PNG, NULL,
                            "measured light: what the photographs show of each texel, its median at mid grey", err);
     image_release(&image);
     return status;
@@ -116,7 +122,7 @@ static enum status put_previews(struct export *e, struct error *err) {
             continue;
         snprintf(name, sizeof name, "preview/%s.png", kinds[k].stem);
         picture_preview(e->input, kinds[k].kind, &image);
-        status = output_files_image(&e->files, EVENT_PREVIEW, name, &image, OUTPUT_PNG, kinds[k].about, err);
+        status = output_files_image(&e->files, EVENT_PREVIEW, name, &image, OUTPUT_PNG, NULL, kinds[k].about, err);
         image_release(&image);
     }
     return status == STATUS_OK ? put_environment_preview(e, err) : status;
@@ -130,7 +136,7 @@ static enum status put_emission_png(struct export *e, const uint32_t *source, st
         return STATUS_OK;
     emission_texture(e->input, source, scales, &image);
     enum status status =
-        output_files_image(&e->files, EVENT_OUTPUT, FORMATS_EMISSION, &image, OUTPUT_PNG,
+        output_files_image(&e->files, EVENT_OUTPUT, FORMATS_EMISSION, &image, OUTPUT_PNG, NULL,
                            "what emitters show that are not equally bright all over, each over the brightest of "
                            "it, in 8 bits, sRGB",
                            err);
@@ -147,11 +153,11 @@ static enum status put_textures(struct export *e, struct error *err) {
         char name[64];
         snprintf(name, sizeof name, "%s.exr", kinds[k].stem);
         picture_texture(e->input, kinds[k].kind, source, &image);
-        status =
-            output_files_image(&e->files, EVENT_OUTPUT, name, &image,
-                               kinds[k].type == IMAGE_HALF ? OUTPUT_EXR_HALF : OUTPUT_EXR_FLOAT, kinds[k].about, err);
+        status = output_files_image(&e->files, EVENT_OUTPUT, name, &image,
+                                    kinds[k].type == IMAGE_HALF ? OUTPUT_EXR_HALF : OUTPUT_EXR_FLOAT, kinds[k].unit,
+                                    kinds[k].about, err);
         if (kinds[k].kind == PICTURE_BASE_COLOR && status == STATUS_OK)
-            status = output_files_image(&e->files, EVENT_OUTPUT, FORMATS_BASE_COLOR, &image, OUTPUT_PNG,
+            status = output_files_image(&e->files, EVENT_OUTPUT, FORMATS_BASE_COLOR, &image, OUTPUT_PNG, NULL,
                                         "the same in 8 bits, sRGB", err);
         image_release(&image);
     }
@@ -239,7 +245,7 @@ static enum status put_comparisons(struct export *e, struct error *err) {
         char name[64];
         comparison_file(name, i);
         picture_comparison(&e->input->comparison[i], &image);
-        status = output_files_image(&e->files, EVENT_OUTPUT, name, &image, OUTPUT_PNG,
+        status = output_files_image(&e->files, EVENT_OUTPUT, name, &image, OUTPUT_PNG, NULL,
                                     "held-out photograph, its re-render, their difference", err);
         image_release(&image);
     }
@@ -319,9 +325,21 @@ enum status export_preview(const char *dir, const struct export_input *input, ex
     return status == STATUS_OK ? put_previews(&e, err) : status;
 }
 
+static void add_note(struct export *e, const char *name, const char *text) {
+    e->files.note[e->files.note_count++] = (struct image_note){name, text};
+}
+
 enum status export_outputs(const char *dir, const struct export_input *input, export_announce *announce, void *user,
                            struct error *err) {
-    struct export e = {input, {dir, announce, user, cJSON_CreateArray(), cJSON_CreateArray()}};
+    struct export e = {input,
+                       {.dir = dir, .announce = announce, .user = user, cJSON_CreateArray(), cJSON_CreateArray()}};
+    const cJSON *seed = cJSON_GetObjectItem(cJSON_GetObjectItem(input->report, "settings"), "seed");
+    char number[32];
+    snprintf(number, sizeof number, "%.17g", cJSON_IsNumber(seed) ? seed->valuedouble : 0.0);
+    add_note(&e, "software", "unbake " UNBAKE_VERSION);
+    add_note(&e, "job", input->title);
+    if (cJSON_IsNumber(seed))
+        add_note(&e, "seed", number);
     enum status status = put_previews(&e, err);
     if (status == STATUS_OK)
         status = put_textures(&e, err);

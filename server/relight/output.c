@@ -159,8 +159,10 @@ enum status output_views(struct output *o, uint64_t pictures, cJSON *head, struc
 
 static enum status put(struct output *o, const char *name, bool is_exr, const struct image *image, struct error *err) {
     char *path = file_join(o->job->out, name), *temporary = mem_printf("%s.part", path);
-    enum status status = is_exr ? image_write_exr_noted(temporary, image, IMAGE_FLOAT, false, o->note, err)
-                                : image_write_png(temporary, image, 1.0f, err);
+    const struct image_note note = {"comments", o->note};
+    enum status status = is_exr
+                             ? image_write_exr_noted(temporary, image, IMAGE_FLOAT, false, &note, o->note ? 1 : 0, err)
+                             : image_write_png(temporary, image, 1.0f, err);
     if (status == STATUS_OK)
         status = file_put_in_place(temporary, path, err);
     else

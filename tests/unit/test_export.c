@@ -44,6 +44,34 @@ static void read_back(const char *dir, const char *name, struct image *image) {
     mem_free(path);
 }
 
+/* EXR files say in their headers what made them, of what, and the unit of their values. */
+static void test_headers(const char *dir) {
+    static const struct {
+        const char *file, *attribute, *text;
+    } table[] = {
+        {"base_color.exr", "software", "unbake " UNBAKE_VERSION},
+        {"base_color.exr", "job", "room <1> & \"2\""},
+        {"base_color.exr", "seed", "7"},
+        {"base_color.exr", "units", "reflectance"},
+        {"emission.exr", "units", "radiance of which"},
+        {"confidence.exr", "units", "count: observations"},
+    };
+    for (size_t i = 0; i < sizeof table / sizeof *table; i++) {
+        struct error err;
+        struct buf file;
+        char *path = file_join(dir, table[i].file), wanted[64];
+        int length = snprintf(wanted, sizeof wanted, "%s", table[i].attribute);
+        memcpy(wanted + length + 1, "string", 7); /* the layout of an attribute: name, type, size, value */
+        buf_init(&file, 1 << 26);
+        CHECK(file_read(path, &file, &err) == STATUS_OK);
+        const char *at = memmem(file.data, file.length, wanted, (size_t)length + 8);
+        CHECK_THAT(at && strncmp(at + length + 8 + 4, table[i].text, strlen(table[i].text)) == 0, "%s: %s",
+                   table[i].file, table[i].attribute);
+        buf_release(&file);
+        mem_free(path);
+    }
+}
+
 /* Valid texels hold the values, the margin holds a valid neighbour's, the rest is 0. */
 static void test_textures(const char *dir, const struct export_input *in) {
     struct image color, roughness, emission, confidence;
@@ -404,7 +432,7 @@ int main(void) {
     cJSON *report = NULL;
     static const char text[] = "{\"seed\":1,\"stages\":[{\"name\":\"refine\",\"seconds\":2.5}],"
                                "\"series\":{\"loss\":[[0,1],[1,0.5],[2,0.02]],\"one\":[[0,1]]},"
-                               "\"views\":[{\"name\":\"a\",\"msre\":0.01}],\"settings\":{\"a\":1}}";
+                               "\"views\":[{\"name\":\"a\",\"msre\":0.01}],\"settings\":{\"a\":1,\"seed\":7}}";
     CHECK(json_parse(text, strlen(text), "report", &report, &err) == STATUS_OK);
     struct export_input in = {"room <1> & \"2\"",
                               &room.mesh,
@@ -438,6 +466,7 @@ int main(void) {
     CHECK_THAT(status == STATUS_OK, "%s", err.message);
     CHECK_THAT(heard.previews == 5 && heard.outputs == 18, "%d, %d", heard.previews, heard.outputs);
     CHECK_STRING(heard.last, "report.html");
+    test_headers(dir);
     test_textures(dir, &in);
     test_mesh(dir, &room.mesh);
     test_views(dir, room.mesh.offset, &camera);

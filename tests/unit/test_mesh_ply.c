@@ -79,6 +79,7 @@ int main(void) {
     struct buf file;
     buf_init(&file, 1 << 20);
     CHECK(file_read(path, &file, &err) == STATUS_OK);
+    CHECK(memmem(file.data, file.length, "\ncomment TextureFile base_color.png\n", 36) != NULL);
     check_file(buf_text(&file), file.length, &mesh, &segments, &atlas);
     unlink(path);
     CHECK(mesh_ply_write("/nowhere/at/all.ply", &mesh, &segments, &atlas, &err) != STATUS_OK);
