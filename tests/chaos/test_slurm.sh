@@ -54,7 +54,7 @@ start() {
     shift
     rm -f "$dir/port"
     "$build/unbaked" --data "$dir/$folder" --listen "127.0.0.1:$port" --port-file "$dir/port" --set threads=1 \
-        --set max_attempts=3 --set checkpoint_interval_sec=0.3 --set min_free_mib=0 --set low_disk_mib=0 "$@" \
+        --set max_attempts=100 --set checkpoint_interval_sec=0.3 --set min_free_mib=0 --set low_disk_mib=0 "$@" \
         >>"$dir/$folder.log" 2>&1 &
     daemon=$!
     for _ in $(seq 600); do
@@ -139,10 +139,11 @@ did=""
 for ((i = 0; i < kills; i++)); do
     # It runs, and most times it has got further.
     for _ in $(seq 1200); do
-        [ -n "$(nodes)" ] || [ "$(shown 1 .state)" = succeeded ] && break
+        [ -n "$(nodes)" ] && break
+        case $(shown 1 .state) in succeeded | failed) break ;; esac
         sleep 0.05
     done
-    [ "$(shown 1 .state)" = succeeded ] && break
+    case $(shown 1 .state) in succeeded | failed) break ;; esac
     sleep "$((RANDOM % 2)).$((RANDOM % 10))"
     way=${ways[$((RANDOM % ${#ways[@]}))]}
     did="$did $way"
