@@ -80,7 +80,8 @@ static inline void painted_make(struct painted *room, int threads, bool tiles) {
     *room = (struct painted){.pool = parallel_new(threads), .tiles = tiles};
     make_mesh(&room->scene.mesh);
     segments_from_object_id(&room->segments, &room->scene.mesh);
-    CHECK(atlas_make(&room->atlas, &room->scene.mesh, &room->segments, PAINTED_TEXTURE, 0.0f, ATLAS_PADDING, &err) == STATUS_OK);
+    CHECK(atlas_make(&room->atlas, &room->scene.mesh, &room->segments, PAINTED_TEXTURE, 0.0f, ATLAS_PADDING, &err) ==
+          STATUS_OK);
     inverse_uv_make(&room->inverse, &room->atlas, room->scene.mesh.triangle_count, room->pool);
     CHECK(accel_new(&room->accel, &room->scene.mesh, room->pool, &err) == STATUS_OK);
     room->scene.photograph = mem_calloc(PAINTED_FRAMES, sizeof *room->scene.photograph);

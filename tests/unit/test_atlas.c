@@ -206,7 +206,8 @@ static void test_shape(vec3 (*place)(float, float, void *), uint32_t columns, ui
     CHECK(mesh_check(&mesh, "shape", NULL, &err) == STATUS_OK);
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
         struct atlas atlas;
-        CHECK_THAT(atlas_make(&atlas, &mesh, &segments, sizes[i], 0.0f, ATLAS_PADDING, &err) == STATUS_OK, "%s", err.message);
+        CHECK_THAT(atlas_make(&atlas, &mesh, &segments, sizes[i], 0.0f, ATLAS_PADDING, &err) == STATUS_OK, "%s",
+                   err.message);
         check_atlas(&atlas, &mesh, &segments);
         CHECK_THAT(atlas.chart_count <= most_charts, "%zu charts of %u x %u quads at %u", atlas.chart_count, columns,
                    rows, sizes[i]);

@@ -25,7 +25,8 @@ static void fixture_release(struct fixture *f) {
 /* Makes atlas and inverse; checks one thread against several. */
 static void fixture_make(struct fixture *f, uint32_t size) {
     struct error err = {0};
-    CHECK_THAT(atlas_make(&f->atlas, &f->mesh, &f->segments, size, 0.0f, ATLAS_PADDING, &err) == STATUS_OK, "%s", err.message);
+    CHECK_THAT(atlas_make(&f->atlas, &f->mesh, &f->segments, size, 0.0f, ATLAS_PADDING, &err) == STATUS_OK, "%s",
+               err.message);
     struct parallel *one = parallel_new(1), *five = parallel_new(5);
     struct inverse_uv other;
     inverse_uv_make(&f->inverse, &f->atlas, f->mesh.triangle_count, one);
