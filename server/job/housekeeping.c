@@ -71,10 +71,12 @@ void housekeeping_after_kill(const struct scheduler_config *config, struct store
         for (size_t i = 0; i < count; i++) {
             struct remote_row row;
             char *dir = layout_attempt(config->data_dir, jobs[i].id, jobs[i].attempt);
-            /* what runs elsewhere goes on, and writes */
-            if (store_remote_get(store, jobs[i].id, jobs[i].attempt, &row, &err) == STATUS_NOT_FOUND) {
+            enum status status = store_remote_get(store, jobs[i].id, jobs[i].attempt, &row, &err);
+            if (status == STATUS_NOT_FOUND) {
                 housekeeping_drop_temporary(dir);
                 housekeeping_tidy_job(config->data_dir, store, jobs[i].id);
+            } else if (status != STATUS_OK) { /* what runs elsewhere goes on, and writes */
+                log_warning("what killed jobs left cannot be removed: %s", err.message);
             }
             before = jobs[i].id;
             mem_free(dir);
