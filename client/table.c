@@ -1,6 +1,7 @@
 /* table.c -- see table.h. */
 #include "client/table.h"
 
+#include <assert.h>
 #include <stdarg.h>
 #include <string.h>
 
@@ -9,6 +10,7 @@
 #define CELL_MAX 4096
 
 void table_init(struct table *t, size_t columns, const char *const *headings) {
+    assert(columns <= TABLE_COLUMNS);
     *t = (struct table){.columns = columns};
     table_row(t);
     for (size_t i = 0; i < columns; i++) {

@@ -287,6 +287,7 @@ static void check_tokens(struct rig *rig) {
     snprintf(fields, sizeof fields, "Authorization: Bearer %s\r\nUnbake-Claimant: 00112233445566778899\r\n", token);
     IS(post(rig, "claim", fields, VERSION), 401);
     IS(post(rig, "claim", ANN, VERSION), 200);
+    buf_release(&reply);
     IS(rig_get(rig, "/v1/jobs", "Authorization: Bearer " TOKEN "\r\n", &reply), 401);
     number++;
     IS(post(rig, "claim", ANN, VERSION), 401); /* of no other attempt */
