@@ -10,11 +10,10 @@
 #include <string.h>
 
 #include "common/mem.h"
+#include "common/setting_faults.h"
 
-#define NAME_MAX_BYTES 64
 #define TEXT_MAX_BYTES 4096 /* of a value */
 #define FILE_MAX_BYTES 255  /* of a plain name */
-#define UNKNOWN_MAX 50      /* unknown names reported one by one; further ones are only counted */
 
 /* --- reading values --------------------------------------------------------------------------------------------- */
 
@@ -206,40 +205,21 @@ static bool check_value(const struct render_setting *t, const cJSON *value, enum
 
 /* --- checking all ----------------------------------------------------------------------------------------------- */
 
-struct render_faults {
-    cJSON *problems; /* borrowed; NULL: no list wanted */
-    size_t count;
-    char first[256];
-};
-
-static void add_fault(struct render_faults *f, const char *name, const char *reason, const char *hint) {
-    if (f->count++ == 0)
-        snprintf(f->first, sizeof f->first, "%.80s: %.160s", name, reason);
-    if (!f->problems || f->count > UNKNOWN_MAX)
-        return;
-    cJSON *problem = cJSON_CreateObject();
-    json_add_string(problem, "name", name);
-    json_add_string(problem, "reason", reason);
-    if (*hint)
-        json_add_string(problem, "hint", hint);
-    cJSON_AddItemToArray(f->problems, problem);
-}
-
-static void add_unknown(struct render_faults *f, const char *name) {
+static void add_unknown(struct setting_faults *f, const char *name) {
     char hint[128] = "";
     const char *nearest = render_settings_nearest(name);
     if (nearest)
         snprintf(hint, sizeof hint, "did you mean %s?", nearest);
-    add_fault(f, name, "there is no such setting", hint);
+    setting_faults_add(f, name, "there is no such setting", hint);
 }
 
 /* A setting that another makes meaningless is a fault, not ignored. */
-static void need(struct render_faults *f, const cJSON *object, const char *name, bool is_met, const char *reason) {
+static void need(struct setting_faults *f, const cJSON *object, const char *name, bool is_met, const char *reason) {
     if (render_settings_has(object, name) && !is_met)
-        add_fault(f, name, reason, "");
+        setting_faults_add(f, name, reason, "");
 }
 
-static void check_sky(struct render_faults *f, const cJSON *object) {
+static void check_sky(struct setting_faults *f, const cJSON *object) {
     static const char *const of_sky[] = {"date", "latitude", "longitude", "north",
                                          "suns", "time",     "turbidity", "utc_offset"};
     bool is_sky = render_settings_is(object, "environment", "sky");
@@ -248,14 +228,14 @@ static void check_sky(struct render_faults *f, const cJSON *object) {
         need(f, object, of_sky[i], is_sky, "belongs to environment=sky");
     for (size_t i = 0; i < 3 && is_sky; i++)
         if (!render_settings_has(object, of_sky[i]))
-            add_fault(f, of_sky[i], "environment=sky needs it", render_settings_find(of_sky[i], NULL)->help);
+            setting_faults_add(f, of_sky[i], "environment=sky needs it", render_settings_find(of_sky[i], NULL)->help);
     need(f, object, "time", !is_sky || render_settings_number(object, "suns") == 1.0,
          "with suns the times are those from sunrise to sunset");
     need(f, object, "environment_turn", has_map, "only a map is turned; a sky has north");
     need(f, object, "environment_scale", has_map || is_sky, "there is no environment");
 }
 
-static void check_cameras(struct render_faults *f, const cJSON *object) {
+static void check_cameras(struct setting_faults *f, const cJSON *object) {
     bool has_path = render_settings_has(object, "path");
     need(f, object, "view", !has_path, "a path names its views itself");
     need(f, object, "path_count", has_path, "belongs to path");
@@ -264,23 +244,23 @@ static void check_cameras(struct render_faults *f, const cJSON *object) {
          "only EXR has layers: format=exr or both");
 }
 
-static void check_units(struct render_faults *f, const cJSON *object) {
+static void check_units(struct setting_faults *f, const cJSON *object) {
     bool is_absolute = render_settings_number(object, "luminance_per_unit") > 0.0;
     need(f, object, "unit", is_absolute || render_settings_is(object, "unit", "radiance"),
          "nits are known only with luminance_per_unit");
 }
 
 /* "lamp.3.radius": whether the settings of lamp 3 belong to its kind; the same of things that are inserted. */
-static void check_lamp(struct render_faults *f, const cJSON *object, uint32_t number) {
+static void check_lamp(struct setting_faults *f, const cJSON *object, uint32_t number) {
     static const struct {
         const char *name, *kinds;
         bool is_needed;
     } of_kind[] = {{"position", "area|sphere|spot", true}, {"direction", "area|spot", true}, {"size", "area", false},
                    {"radius", "sphere|spot", false},       {"angle", "spot", false},         {"blend", "spot", false}};
-    char name[NAME_MAX_BYTES], reason[128];
+    char name[SETTING_NAME_MAX], reason[128];
     snprintf(name, sizeof name, "lamp.%u.kind", number);
     if (!render_settings_has(object, name)) {
-        add_fault(f, name, "is missing", "area, sphere or spot");
+        setting_faults_add(f, name, "is missing", "area, sphere or spot");
         return;
     }
     const char *kind = render_settings_text(object, name);
@@ -289,15 +269,15 @@ static void check_lamp(struct render_faults *f, const cJSON *object, uint32_t nu
         snprintf(name, sizeof name, "lamp.%u.%s", number, of_kind[i].name);
         snprintf(reason, sizeof reason, "kind=%s %s it", kind, belongs ? "needs" : "does not have");
         if (render_settings_has(object, name) ? !belongs : belongs && of_kind[i].is_needed)
-            add_fault(f, name, reason, "");
+            setting_faults_add(f, name, reason, "");
     }
     snprintf(name, sizeof name, "lamp.%u.lumen", number);
     need(f, object, name, render_settings_number(object, "luminance_per_unit") > 0.0,
          "lumen are understood only with luminance_per_unit");
 }
 
-static void check_families(struct render_faults *f, const cJSON *object) {
-    char name[NAME_MAX_BYTES];
+static void check_families(struct setting_faults *f, const cJSON *object) {
+    char name[SETTING_NAME_MAX];
     size_t count;
     uint32_t *number = render_settings_family(object, "lamp.", &count);
     for (size_t i = 0; i < count; i++)
@@ -307,29 +287,29 @@ static void check_families(struct render_faults *f, const cJSON *object) {
     for (size_t i = 0; i < count; i++) {
         snprintf(name, sizeof name, "insert.%u.file", number[i]);
         if (!render_settings_has(object, name))
-            add_fault(f, name, "is missing", "a .glb, .gltf, .obj or .ply");
+            setting_faults_add(f, name, "is missing", "a .glb, .gltf, .obj or .ply");
     }
     mem_free(number);
 }
 
-static void check_name(struct render_faults *f, const cJSON *value, enum render_files files) {
+static void check_name(struct setting_faults *f, const cJSON *value, enum render_files files) {
     struct reason why = {""};
     uint32_t number;
     const struct render_setting *t =
-        strlen(value->string) <= NAME_MAX_BYTES ? render_settings_find(value->string, &number) : NULL;
+        strlen(value->string) <= SETTING_NAME_MAX ? render_settings_find(value->string, &number) : NULL;
     bool is_counted = t && (strncmp(t->name, "lamp.", 5) == 0 || strncmp(t->name, "insert.", 7) == 0);
     if (!t)
         add_unknown(f, value->string);
     else if (is_counted && (number < 1 || number > RENDER_LAMPS_MAX))
-        add_fault(f, value->string, "is numbered from 1 to 1000", "");
+        setting_faults_add(f, value->string, "is numbered from 1 to 1000", "");
     else if (!check_value(t, value, files, &why))
-        add_fault(f, value->string, why.text, t->help);
+        setting_faults_add(f, value->string, why.text, t->help);
 }
 
 enum status render_settings_check(const cJSON *object, enum render_files files, cJSON *problems, struct error *err) {
-    struct render_faults faults = {.problems = problems};
+    struct setting_faults faults = {.problems = problems};
     if (!cJSON_IsObject(object)) {
-        add_fault(&faults, "settings", "must be an object of names and values", "");
+        setting_faults_add(&faults, "settings", "must be an object of names and values", "");
         return error_set(err, STATUS_INPUT, "settings must be a JSON object");
     }
     for (const cJSON *value = object->child; value; value = value->next)
@@ -340,32 +320,18 @@ enum status render_settings_check(const cJSON *object, enum render_files files, 
         check_units(&faults, object);
         check_families(&faults, object);
     }
-    if (faults.count == 0)
-        return STATUS_OK;
-    return faults.count == 1
-               ? error_set(err, STATUS_INPUT, "setting %s", faults.first)
-               : error_set(err, STATUS_INPUT, "setting %s (and %zu more)", faults.first, faults.count - 1);
+    return setting_faults_status(&faults, err);
+}
+
+static enum setting_form form_of(const char *name) {
+    const struct render_setting *t = render_settings_find(name, NULL);
+    if (t && (t->type == RENDER_INT || t->type == RENDER_REAL))
+        return SETTING_NUMBER;
+    return t && t->type == RENDER_BOOL ? SETTING_TRUTH : SETTING_WORDS;
 }
 
 enum status render_settings_parse_assignment(const char *text, cJSON *object, struct error *err) {
-    const char *equals = strchr(text, '=');
-    if (!equals || equals == text || equals - text > NAME_MAX_BYTES)
-        return error_set(err, STATUS_INPUT, "\"%.100s\" is not of the form name=value", text);
-    char name[NAME_MAX_BYTES + 1];
-    snprintf(name, sizeof name, "%.*s", (int)(equals - text), text);
-    const char *value = equals + 1;
-    if (cJSON_GetObjectItemCaseSensitive(object, name))
-        return error_set(err, STATUS_INPUT, "setting %s is given twice", name);
-    const struct render_setting *t = render_settings_find(name, NULL);
-    char *end = NULL;
-    double number = strtod(value, &end);
-    if (t && (t->type == RENDER_INT || t->type == RENDER_REAL) && *value && !*end && isfinite(number))
-        json_add_number(object, name, number);
-    else if (t && t->type == RENDER_BOOL && (!strcmp(value, "true") || !strcmp(value, "false")))
-        json_add_bool(object, name, value[0] == 't');
-    else
-        json_add_string(object, name, value);
-    return STATUS_OK;
+    return setting_assign(text, object, form_of, err);
 }
 
 /* --- values ----------------------------------------------------------------------------------------------------- */

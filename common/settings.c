@@ -10,10 +10,9 @@
 
 #include "common/mem.h"
 #include "common/nearest.h"
+#include "common/setting_faults.h"
 
-#define NAME_MAX_LENGTH 64
 #define TEXT_MAX_LENGTH 255
-#define UNKNOWN_MAX 50 /* unknown names reported one by one; further ones are only counted */
 
 static const struct setting table[] = {
     {"base_color_rate", SETTING_REAL, "", 1e-5, 1, NULL, "0.03", "listing1",
@@ -423,40 +422,17 @@ static bool apply_segment(struct settings *s, const cJSON *value, char *reason, 
     return true;
 }
 
-/* Problems of an object of settings. */
-struct faults {
-    cJSON *problems; /* borrowed; NULL: no list wanted */
-    size_t count;
-    char first[256];
-};
-
-static void add_fault(struct faults *f, const char *name, const char *reason, const char *hint) {
-    if (f->count++ == 0)
-        snprintf(f->first, sizeof f->first, "%.80s: %.160s", name, reason);
-    if (!f->problems)
-        return;
-    cJSON *problem = cJSON_CreateObject();
-    json_add_string(problem, "name", name);
-    json_add_string(problem, "reason", reason);
-    if (*hint)
-        json_add_string(problem, "hint", hint);
-    cJSON_AddItemToArray(f->problems, problem);
-}
-
-static void add_unknown(struct faults *f, const char *name) {
+static void add_unknown(struct setting_faults *f, const char *name) {
     char hint[128] = "";
     const char *nearest = nearest_name(name);
     if (nearest)
         snprintf(hint, sizeof hint, "did you mean %s?", nearest);
-    if (f->count < UNKNOWN_MAX)
-        add_fault(f, name, "there is no such setting", hint);
-    else
-        f->count++;
+    setting_faults_add(f, name, "there is no such setting", hint);
 }
 
 /* Resets settings that the method does not use; f: NULL when the method itself is invalid. */
-static void check_method(struct settings *s, const cJSON *object, struct faults *f) {
-    char reason[256], hint[128], chosen[NAME_MAX_LENGTH];
+static void check_method(struct settings *s, const cJSON *object, struct setting_faults *f) {
+    char reason[256], hint[128], chosen[SETTING_NAME_MAX];
     int method = index_of("method");
     choice_at(table[method].choices, (int)s->number[method], chosen, sizeof chosen);
     for (const cJSON *value = object->child; value; value = value->next) {
@@ -469,15 +445,15 @@ static void check_method(struct settings *s, const cJSON *object, struct faults 
             continue;
         snprintf(reason, sizeof reason, "only method=%s uses it, and the method is %s", t->method, chosen);
         snprintf(hint, sizeof hint, "leave it out, or set method=%s", t->method);
-        add_fault(f, t->name, reason, hint);
+        setting_faults_add(f, t->name, reason, hint);
     }
 }
 
 enum status settings_apply(struct settings *s, const cJSON *object, cJSON *problems, struct error *err) {
-    struct faults faults = {.problems = problems};
+    struct setting_faults faults = {.problems = problems};
     bool method_is_good = true;
     if (!cJSON_IsObject(object)) {
-        add_fault(&faults, "settings", "must be an object of names and values", "");
+        setting_faults_add(&faults, "settings", "must be an object of names and values", "");
         return error_set(err, STATUS_INPUT, "settings must be a JSON object");
     }
     for (const cJSON *value = object->child; value; value = value->next) {
@@ -485,11 +461,11 @@ enum status settings_apply(struct settings *s, const cJSON *object, cJSON *probl
         int i = index_of(value->string);
         if (strncmp(value->string, SEGMENT_PREFIX, strlen(SEGMENT_PREFIX)) == 0) {
             if (!apply_segment(s, value, reason, sizeof reason))
-                add_fault(&faults, value->string, reason, "");
+                setting_faults_add(&faults, value->string, reason, "");
         } else if (i < 0) {
             add_unknown(&faults, value->string);
         } else if (!apply_one(s, (size_t)i, value, reason, sizeof reason)) {
-            add_fault(&faults, value->string, reason, table[i].help);
+            setting_faults_add(&faults, value->string, reason, table[i].help);
             method_is_good = method_is_good && strcmp(value->string, "method") != 0;
         } else {
             s->is_given[i] = true;
@@ -497,40 +473,26 @@ enum status settings_apply(struct settings *s, const cJSON *object, cJSON *probl
     }
     follow_quality(s);
     if (s->segment_count > 0 && settings_is(s, "emitters", "any"))
-        add_fault(&faults, "emitters", "with emitters=any nothing is decided of single segments", "leave one out");
+        setting_faults_add(&faults, "emitters", "with emitters=any nothing is decided of single segments",
+                           "leave one out");
     check_method(s, object, method_is_good ? &faults : NULL);
-    if (faults.count == 0)
-        return STATUS_OK;
-    return faults.count == 1
-               ? error_set(err, STATUS_INPUT, "setting %s", faults.first)
-               : error_set(err, STATUS_INPUT, "setting %s (and %zu more)", faults.first, faults.count - 1);
+    return setting_faults_status(&faults, err);
+}
+
+static enum setting_form form_of(const char *name) {
+    const struct setting *t = settings_find(name);
+    if (t && (t->type == SETTING_INT || t->type == SETTING_REAL))
+        return SETTING_NUMBER;
+    return t && t->type == SETTING_BOOL ? SETTING_TRUTH : SETTING_WORDS;
 }
 
 enum status settings_parse_assignment(const char *text, cJSON *object, struct error *err) {
-    const char *equals = strchr(text, '=');
-    if (!equals || equals == text || equals - text > NAME_MAX_LENGTH)
-        return error_set(err, STATUS_INPUT, "\"%.100s\" is not of the form name=value", text);
-    char name[NAME_MAX_LENGTH + 1];
-    snprintf(name, sizeof name, "%.*s", (int)(equals - text), text);
-    const char *value = equals + 1;
-    if (cJSON_GetObjectItemCaseSensitive(object, name))
-        return error_set(err, STATUS_INPUT, "setting %s is given twice", name);
-    const struct setting *t = settings_find(name);
-    char *end = NULL;
-    double number = strtod(value, &end);
-    bool is_number = *value && !*end && isfinite(number);
-    if (t && (t->type == SETTING_INT || t->type == SETTING_REAL) && is_number)
-        json_add_number(object, name, number);
-    else if (t && t->type == SETTING_BOOL && (!strcmp(value, "true") || !strcmp(value, "false")))
-        json_add_bool(object, name, value[0] == 't');
-    else
-        json_add_string(object, name, value); /* the daemon reports the fault */
-    return STATUS_OK;
+    return setting_assign(text, object, form_of, err);
 }
 
 static void add_value(cJSON *object, const char *key, size_t i, const struct settings *s) {
     const struct setting *t = &table[i];
-    char word[NAME_MAX_LENGTH];
+    char word[SETTING_NAME_MAX];
     if (t->type == SETTING_BOOL)
         json_add_bool(object, key, s->number[i] != 0.0);
     else if (t->type == SETTING_CHOICE)
@@ -546,7 +508,7 @@ cJSON *settings_to_json(const struct settings *s) {
     for (size_t i = 0; i < TABLE_COUNT; i++)
         add_value(object, table[i].name, i, s);
     for (size_t i = 0; i < s->segment_count; i++) {
-        char name[NAME_MAX_LENGTH];
+        char name[SETTING_NAME_MAX];
         snprintf(name, sizeof name, SEGMENT_PREFIX "%u", s->segment[i].segment);
         json_add_string(object, name, s->segment[i].is_emitter ? "on" : "off");
     }
@@ -556,7 +518,7 @@ cJSON *settings_to_json(const struct settings *s) {
 /* "by_quality": {"draft": 128, "standard": 512, "fine": 2048}; in words, too, after the help. */
 static void add_help(cJSON *entry, const struct setting *t) {
     const double *amount = amounts_of(t->name);
-    char word[NAME_MAX_LENGTH], help[512];
+    char word[SETTING_NAME_MAX], help[512];
     snprintf(help, sizeof help, "%s", t->help);
     cJSON *object = amount ? cJSON_AddObjectToObject(entry, "by_quality") : NULL;
     for (int q = 0; object && q < QUALITIES; q++) {
@@ -586,7 +548,7 @@ cJSON *settings_describe(void) {
         }
         if (t->choices) {
             cJSON *choices = cJSON_AddArrayToObject(entry, "choices");
-            char word[NAME_MAX_LENGTH];
+            char word[SETTING_NAME_MAX];
             for (const char *at = t->choices; *at; at += strcspn(at, "|"), at += *at == '|')
                 cJSON_AddItemToArray(choices, cJSON_CreateString(choice_at(at, 0, word, sizeof word)));
         }
