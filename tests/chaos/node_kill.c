@@ -250,10 +250,14 @@ static void damage_cache(void) {
 /* The machine's scheduler takes it back: a checkpoint, then the next attempt goes on. */
 static void test_taken_back(int number) {
     struct remote_attempt a = {.lease_sec = LEASE_SEC};
-    int64_t job = rig_job(&rig);
-    begin(&a, job, 2, ITERATIONS);
-    a.pid = start_node(&a);
-    int code = follow(&a, 3, 0.0, number);
+    int64_t job = 0;
+    int code = 0;
+    for (int tries = 0; code == 0 && tries < 50; tries++) { /* until one is not at its end when the signal comes */
+        job = rig_job(&rig);
+        begin(&a, job, 2, ITERATIONS);
+        a.pid = start_node(&a);
+        code = follow(&a, 2, 0.0, number);
+    }
     CHECK_THAT(code == 85, "the node ended with %d", code);
     CHECK_STRING(a.row.end.way, "preempted");
     lose(&a);
