@@ -186,19 +186,22 @@ struct response *job_request_read(const struct request *r, struct job_request *w
     return NULL;
 }
 
+void job_request_faults(const cJSON *problems, cJSON *params) {
+    const cJSON *problem;
+    cJSON_ArrayForEach(problem, problems) {
+        const char *name = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(problem, "name"));
+        const char *reason = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(problem, "reason"));
+        const char *hint = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(problem, "hint"));
+        char *full = strcmp(name, "settings") == 0 ? mem_strdup(name) : mem_printf("settings.%s", name);
+        problem_param(params, full, hint, "%s", reason);
+        mem_free(full);
+    }
+}
+
 void job_request_settings(const struct job_request *w, struct settings *settings, cJSON *params) {
     cJSON *problems = cJSON_CreateArray();
-    if (w->settings && settings_apply(settings, w->settings, problems, NULL) != STATUS_OK) {
-        const cJSON *problem;
-        cJSON_ArrayForEach(problem, problems) {
-            const char *name = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(problem, "name"));
-            const char *reason = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(problem, "reason"));
-            const char *hint = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(problem, "hint"));
-            char *full = strcmp(name, "settings") == 0 ? mem_strdup(name) : mem_printf("settings.%s", name);
-            problem_param(params, full, hint, "%s", reason);
-            mem_free(full);
-        }
-    }
+    if (w->settings && settings_apply(settings, w->settings, problems, NULL) != STATUS_OK)
+        job_request_faults(problems, params);
     cJSON_Delete(problems);
 }
 

@@ -31,6 +31,8 @@ struct job_request {
 struct response *job_request_read(const struct request *r, struct job_request *w, bool is_new, cJSON *params);
 void job_request_release(struct job_request *w);
 
+/* Adds what is wrong with settings (common/setting_faults.h) to the faults of a request. */
+void job_request_faults(const cJSON *problems, cJSON *params);
 /* Applies the body's settings, if any, to *settings; faults as above, with "settings." before their names. */
 void job_request_settings(const struct job_request *w, struct settings *settings, cJSON *params);
 

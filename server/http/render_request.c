@@ -9,22 +9,11 @@
 #include "common/render_settings.h"
 #include "common/utf8.h"
 #include "server/data/work_file.h"
+#include "server/http/job_request.h"
 #include "server/transport/problem.h"
 
 #define VIEWS "views.json"             /* the cameras of a reconstruction's held-out views, as an output */
 #define VIEWS_LIMIT ((size_t)64 << 20) /* bytes */
-
-static void add_faults(const cJSON *problems, cJSON *params) {
-    const cJSON *problem;
-    cJSON_ArrayForEach(problem, problems) {
-        const char *name = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(problem, "name"));
-        const char *reason = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(problem, "reason"));
-        const char *hint = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(problem, "hint"));
-        char *full = strcmp(name, "settings") == 0 ? mem_strdup(name) : mem_printf("settings.%s", name);
-        problem_param(params, full, hint, "%s", reason);
-        mem_free(full);
-    }
-}
 
 /* Notes the files; their names become names in a folder and in paths of URLs. */
 static void find_files(struct render_request *q, cJSON *params) {
@@ -46,7 +35,7 @@ void render_request_read(struct render_request *q, const cJSON *settings, cJSON 
     struct error err;
     q->settings = settings;
     if (settings && render_settings_check(settings, RENDER_FILES_ATTACHED, problems, &err) != STATUS_OK)
-        add_faults(problems, params);
+        job_request_faults(problems, params);
     else if (settings)
         find_files(q, params);
     cJSON_Delete(problems);
