@@ -233,6 +233,9 @@ static void check_sky(struct setting_faults *f, const cJSON *object) {
          "with suns the times are those from sunrise to sunset");
     need(f, object, "environment_turn", has_map, "only a map is turned; a sky has north");
     need(f, object, "environment_scale", has_map || is_sky, "there is no environment");
+    need(f, object, "sky", has_map || is_sky, "there is no environment");
+    need(f, object, "sun", is_sky || render_settings_is(object, "environment", "found"),
+         "only a sky, or what was found, has a sun of its own");
 }
 
 static void check_cameras(struct setting_faults *f, const cJSON *object) {
@@ -242,6 +245,14 @@ static void check_cameras(struct setting_faults *f, const cJSON *object) {
     need(f, object, "multilayer",
          !render_settings_bool(object, "multilayer") || !render_settings_is(object, "format", "png"),
          "only EXR has layers: format=exr or both");
+}
+
+static void check_precision(struct setting_faults *f, const cJSON *object) {
+    bool has_exr = !render_settings_is(object, "format", "png") || render_settings_bool(object, "per_light");
+    need(f, object, "precision", has_exr, "belongs to EXR: format=exr or both, or per_light");
+    need(f, object, "precision",
+         !render_settings_is(object, "precision", "half") || !render_settings_bool(object, "multilayer"),
+         "layers of one file are float");
 }
 
 static void check_units(struct setting_faults *f, const cJSON *object) {
@@ -317,6 +328,7 @@ enum status render_settings_check(const cJSON *object, enum render_files files, 
     if (faults.count == 0) {
         check_sky(&faults, object);
         check_cameras(&faults, object);
+        check_precision(&faults, object);
         check_units(&faults, object);
         check_families(&faults, object);
     }

@@ -12,8 +12,9 @@
 #include "server/http/job_request.h"
 #include "server/transport/problem.h"
 
-#define VIEWS "views.json"             /* the cameras of a reconstruction's held-out views, as an output */
-#define VIEWS_LIMIT ((size_t)64 << 20) /* bytes */
+#define VIEWS "views.json"              /* the cameras of a reconstruction's held-out views, as an output */
+#define REPORT "report.json"            /* what it found: its segments, and which of them emit */
+#define OUTPUT_LIMIT ((size_t)64 << 20) /* bytes of either */
 
 /* Notes the files; their names become names in a folder and in paths of URLs. */
 static void find_files(struct render_request *q, cJSON *params) {
@@ -43,15 +44,15 @@ void render_request_read(struct render_request *q, const cJSON *settings, cJSON 
 
 /* --- what it costs ----------------------------------------------------------------------------- */
 
-/* The cameras of the source's held-out views; NULL where they cannot be read. The caller's. */
-static cJSON *read_views(struct api *api, int64_t source) {
+/* An output of the source that is JSON; NULL where it cannot be read. The caller's. */
+static cJSON *read_output(struct api *api, int64_t source, const char *name) {
     struct output_row row = {0};
     struct buf text;
     char chunk[65536];
     int fd = -1;
-    cJSON *views = NULL;
-    buf_init(&text, VIEWS_LIMIT);
-    if (store_output_get(api->store, source, VIEWS, &row, NULL) == STATUS_OK &&
+    cJSON *value = NULL;
+    buf_init(&text, OUTPUT_LIMIT);
+    if (store_output_get(api->store, source, name, &row, NULL) == STATUS_OK &&
         work_file_open_output(api->config.data_dir, source, row.attempt, row.name, &fd, NULL) == STATUS_OK) {
         ssize_t got;
         bool fits = true;
@@ -59,11 +60,11 @@ static cJSON *read_views(struct api *api, int64_t source) {
             fits = buf_append(&text, chunk, (size_t)got);
         close(fd);
         if (fits)
-            views = cJSON_ParseWithLength(buf_text(&text), text.length);
+            value = cJSON_ParseWithLength(buf_text(&text), text.length);
     }
     buf_release(&text);
     output_row_release(&row);
-    return views;
+    return value;
 }
 
 static double number_of(const cJSON *object, const char *name) {
@@ -94,12 +95,33 @@ static double count_views(const cJSON *settings, const cJSON *frames) {
     return count;
 }
 
+static double count_family(const cJSON *settings, const char *family) {
+    size_t count;
+    mem_free(render_settings_family(settings, family, &count));
+    return (double)count;
+}
+
+/* Pictures of a view: with per_light one of each source too, at most: of the emitters found, of those that the settings
+ * add or light, of sky and sun. 0: not known. */
+static double count_pictures(struct api *api, const cJSON *settings, int64_t source) {
+    if (!render_settings_bool(settings, "per_light"))
+        return 1.0;
+    cJSON *report = read_output(api, source, REPORT);
+    const cJSON *segments = cJSON_GetObjectItemCaseSensitive(report, "segments"), *segment;
+    double count = 0.0;
+    if (segments)
+        count = 3.0 + count_family(settings, "segment.") + count_family(settings, "lamp.") +
+                count_family(settings, "insert.");
+    cJSON_ArrayForEach(segment, segments)
+        count += cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(segment, "emitter"));
+    cJSON_Delete(report);
+    return count;
+}
+
 /* 0: not known. */
 static double cost_of(const cJSON *settings, const cJSON *frames) {
     uint32_t width, height;
     double pixels = render_settings_size(settings, &width, &height) ? (double)width * height : pixels_of(frames);
-    if (render_settings_bool(settings, "per_light")) /* a picture for each source */
-        return 0.0;
     return pixels * count_views(settings, frames) * render_settings_number(settings, "suns") *
            render_settings_number(settings, "spp");
 }
@@ -108,8 +130,9 @@ void render_request_look(struct api *api, struct render_request *q, int64_t sour
     cJSON *none = cJSON_CreateObject();
     const cJSON *settings = q->settings ? q->settings : none;
     bool knows_cameras = render_settings_is(settings, "cameras", "held_out");
-    cJSON *views = knows_cameras ? read_views(api, source) : NULL;
-    q->cost = cost_of(settings, cJSON_GetObjectItemCaseSensitive(views, "frames"));
+    cJSON *views = knows_cameras ? read_output(api, source, VIEWS) : NULL;
+    q->cost =
+        cost_of(settings, cJSON_GetObjectItemCaseSensitive(views, "frames")) * count_pictures(api, settings, source);
     cJSON_Delete(views);
     cJSON_Delete(none);
 }

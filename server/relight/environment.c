@@ -68,45 +68,110 @@ enum status environment_sky(const struct relight_job *job, uint32_t sun, struct 
     return STATUS_OK;
 }
 
-static void scale_map(struct image *map, double scale) {
+static void tint_map(struct image *map, const double factor[3]) {
     for (size_t i = 0; i < (size_t)map->width * map->height * map->channel_count; i++)
-        map->pixel[i] *= (float)scale;
+        map->pixel[i] *= (float)factor[i % map->channel_count];
 }
 
-enum status environment_read(const struct relight_job *job, const struct compass *compass, uint32_t sun, bool *has,
-                             struct image *map, struct error *err) {
-    const cJSON *s = job->settings;
-    double scale = render_settings_number(s, "environment_scale"), unit;
-    struct image picture = {0};
+static void add_map(struct image *sum, const struct image *map) {
+    for (size_t i = 0; i < (size_t)sum->width * sum->height * sum->channel_count; i++)
+        sum->pixel[i] += map->pixel[i];
+}
+
+static enum status read_sky(const struct relight_job *job, const struct compass *compass, uint32_t sun,
+                            enum distant_part part, struct image *map, struct error *err) {
     struct sky sky;
-    *map = (struct image){0};
-    *has = false;
-    if (render_settings_is(s, "environment", "none"))
-        return STATUS_OK;
-    if (render_settings_is(s, "environment", "sky")) {
-        enum status status = environment_sky(job, sun, &sky, err);
-        if (status != STATUS_OK)
-            return status;
-        unit = render_settings_number(s, "luminance_per_unit");
-        sky_map(&sky, compass, map);
-        scale_map(map, scale / (unit > 0.0 ? unit : ENVIRONMENT_SKY_UNIT));
-        *has = true;
-        return STATUS_OK;
+    double unit = render_settings_number(job->settings, "luminance_per_unit");
+    enum status status = environment_sky(job, sun, &sky, err);
+    if (status != STATUS_OK)
+        return status;
+    sky_map(&sky, compass, part, map);
+    double scale =
+        render_settings_number(job->settings, "environment_scale") / (unit > 0.0 ? unit : ENVIRONMENT_SKY_UNIT);
+    tint_map(map, (double[3]){scale, scale, scale});
+    return STATUS_OK;
+}
+
+/* The part of what was found: the reconstruction writes the sky without its sun beside the whole, where there is a sun. */
+static enum status read_found(const struct relight_job *job, enum distant_part part, struct image *picture,
+                              struct error *err) {
+    char *whole = file_join(job->outputs, "environment.exr"), *without = file_join(job->outputs, "sky.exr");
+    bool has_sun = access(without, F_OK) == 0;
+    struct image sky = {0};
+    enum status status = STATUS_OK;
+    if (access(whole, F_OK) == 0 && (has_sun || part != DISTANT_SUN))
+        status = read_map(has_sun && part == DISTANT_SKY ? without : whole, picture, err);
+    if (status == STATUS_OK && has_sun && part == DISTANT_SUN && picture->pixel)
+        status = read_map(without, &sky, err);
+    if (status == STATUS_OK && sky.pixel &&
+        (sky.width != picture->width || sky.height != picture->height || sky.channel_count != picture->channel_count))
+        status = error_set(err, STATUS_INPUT, "%s is not as large as %s", without, whole);
+    if (status == STATUS_OK && sky.pixel) {
+        tint_map(&sky, (double[3]){-1.0, -1.0, -1.0});
+        add_map(picture, &sky);
     }
+    image_release(&sky);
+    mem_free(without);
+    mem_free(whole);
+    return status;
+}
+
+/* A part as it is, *has false where there is none: a map of a file has no sun of its own. */
+static enum status read_part(const struct relight_job *job, const struct compass *compass, uint32_t sun,
+                             enum distant_part part, bool *has, struct image *map, struct error *err) {
+    const cJSON *s = job->settings;
     bool is_found = render_settings_is(s, "environment", "found");
-    char *path =
-        is_found ? file_join(job->outputs, "environment.exr") : files_path(job, render_settings_text(s, "environment"));
-    if (is_found && access(path, F_OK) != 0) {
+    struct image picture = {0};
+    enum status status = STATUS_OK;
+    *map = (struct image){0};
+    if (render_settings_is(s, "environment", "sky")) {
+        status = read_sky(job, compass, sun, part, map, err);
+    } else if (is_found) {
+        status = read_found(job, part, &picture, err);
+    } else if (!render_settings_is(s, "environment", "none") && part != DISTANT_SUN) {
+        char *path = files_path(job, render_settings_text(s, "environment"));
+        status = read_map(path, &picture, err);
         mem_free(path);
-        return STATUS_OK;
     }
-    enum status status = read_map(path, &picture, err);
-    if (status == STATUS_OK) {
+    if (status == STATUS_OK && picture.pixel)
         environment_orient(&picture, is_found ? ENVIRONMENT_OF_ROOM : ENVIRONMENT_OF_FILE, compass,
-                           (float)render_settings_number(s, "environment_turn"), (float)scale, map);
-        *has = true;
-    }
+                           (float)render_settings_number(s, "environment_turn"),
+                           (float)render_settings_number(s, "environment_scale"), map);
     image_release(&picture);
-    mem_free(path);
+    *has = status == STATUS_OK && map->pixel;
+    return status;
+}
+
+/* A part under the setting of its name. */
+static enum status read_tinted(const struct relight_job *job, const struct compass *compass, uint32_t sun,
+                               enum distant_part part, bool *has, struct image *map, struct error *err) {
+    const char *name = part == DISTANT_SUN ? "sun" : "sky";
+    double factor[3];
+    enum status status = read_part(job, compass, sun, part, has, map, err);
+    if (status != STATUS_OK || !render_settings_has(job->settings, name))
+        return status;
+    if (!*has)
+        return error_set(err, STATUS_INPUT, "setting %s: the reconstruction found none", name);
+    render_settings_factor(cJSON_GetObjectItemCaseSensitive(job->settings, name), factor);
+    tint_map(map, factor);
+    return STATUS_OK;
+}
+
+enum status environment_read(const struct relight_job *job, const struct compass *compass, uint32_t sun,
+                             enum distant_part part, bool *has, struct image *map, struct error *err) {
+    bool has_sun;
+    struct image disc = {0};
+    if (part != DISTANT_WHOLE)
+        return read_tinted(job, compass, sun, part, has, map, err);
+    if (!render_settings_has(job->settings, "sky") && !render_settings_has(job->settings, "sun"))
+        return read_part(job, compass, sun, DISTANT_WHOLE, has, map, err);
+    enum status status = read_tinted(job, compass, sun, DISTANT_SKY, has, map, err);
+    if (status == STATUS_OK)
+        status = read_tinted(job, compass, sun, DISTANT_SUN, &has_sun, &disc, err);
+    if (status == STATUS_OK && has_sun)
+        add_map(map, &disc);
+    if (status != STATUS_OK)
+        image_release(map);
+    image_release(&disc);
     return status;
 }

@@ -3,6 +3,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -13,6 +14,7 @@
 
 #define RECORD_LIMIT ((size_t)1 << 30) /* bytes of views.jsonl */
 #define NUMBER_DIGITS 5
+#define HALF_MOST 65504.0f /* largest finite number of IEEE 754 binary16 */
 
 /* --- the record ------------------------------------------------------------------------------------------------- */
 
@@ -157,12 +159,16 @@ enum status output_views(struct output *o, uint64_t pictures, cJSON *head, struc
 
 /* --- files ------------------------------------------------------------------------------------------------------ */
 
-static enum status put(struct output *o, const char *name, bool is_exr, const struct image *image, struct error *err) {
+enum file_form { FORM_PNG, FORM_HALF, FORM_FLOAT };
+
+static enum status put(struct output *o, const char *name, enum file_form form, const struct image *image,
+                       struct error *err) {
     char *path = file_join(o->job->out, name), *temporary = mem_printf("%s.part", path);
     const struct image_note note = {"comments", o->note};
-    enum status status = is_exr
-                             ? image_write_exr_noted(temporary, image, IMAGE_FLOAT, false, &note, o->note ? 1 : 0, err)
-                             : image_write_png(temporary, image, 1.0f, err);
+    enum image_exr_type type = form == FORM_HALF ? IMAGE_HALF : IMAGE_FLOAT;
+    enum status status = form == FORM_PNG
+                             ? image_write_png(temporary, image, 1.0f, err)
+                             : image_write_exr_noted(temporary, image, type, false, &note, o->note ? 1 : 0, err);
     if (status == STATUS_OK)
         status = file_put_in_place(temporary, path, err);
     else
@@ -192,16 +198,25 @@ static enum status list(struct output *o, const char *name, const char *pass, cJ
     return status;
 }
 
+/* A seen sun is brighter than half precision can say; the infinity that it would become spoils every sum. */
+static void fit_half(struct image *image) {
+    for (size_t i = 0; i < (size_t)image->width * image->height * image->channel_count; i++)
+        image->pixel[i] = fminf(image->pixel[i], HALF_MOST);
+}
+
 enum status output_pass(struct output *o, uint64_t picture, const struct render_pass *pass, const char *name,
                         struct output_formats formats, struct image *image, cJSON *files, struct error *err) {
     bool is_data = pass->kind == PASS_DATA;
+    bool is_half = !is_data && render_settings_is(o->job->settings, "precision", "half");
     enum status status = STATUS_OK;
     if (formats.is_exr || (is_data && formats.is_png)) {
         struct image measured;
         char *file = mem_printf("%0*llu_%s.exr", NUMBER_DIGITS, (unsigned long long)picture, name);
         image_copy(image, &measured);
         pass_measure(pass, &o->look, &measured);
-        status = put(o, file, true, &measured, err);
+        if (is_half)
+            fit_half(&measured);
+        status = put(o, file, is_half ? FORM_HALF : FORM_FLOAT, &measured, err);
         if (status == STATUS_OK)
             status = list(o, file, name, files, err);
         image_release(&measured);
@@ -210,7 +225,7 @@ enum status output_pass(struct output *o, uint64_t picture, const struct render_
     if (formats.is_png && !is_data && status == STATUS_OK) {
         char *file = mem_printf("%0*llu_%s.png", NUMBER_DIGITS, (unsigned long long)picture, name);
         pass_show(pass, &o->look, image);
-        status = put(o, file, false, image, err);
+        status = put(o, file, FORM_PNG, image, err);
         if (status == STATUS_OK)
             status = list(o, file, name, files, err);
         mem_free(file);
@@ -221,7 +236,7 @@ enum status output_pass(struct output *o, uint64_t picture, const struct render_
 enum status output_layers(struct output *o, uint64_t picture, const struct image *image, cJSON *files,
                           struct error *err) {
     char *file = mem_printf("%0*llu.exr", NUMBER_DIGITS, (unsigned long long)picture);
-    enum status status = put(o, file, true, image, err);
+    enum status status = put(o, file, FORM_FLOAT, image, err);
     if (status == STATUS_OK)
         status = list(o, file, "all", files, err);
     mem_free(file);
@@ -234,7 +249,7 @@ enum status output_preview(struct output *o, uint64_t picture, struct image *ima
     enum status status = file_make_dirs(folder, err);
     pass_show(passes_radiance(), &o->look, image);
     if (status == STATUS_OK)
-        status = put(o, file, false, image, err);
+        status = put(o, file, FORM_PNG, image, err);
     if (status == STATUS_OK)
         o->watch->preview(o->watch->user, file);
     mem_free(file);

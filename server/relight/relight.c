@@ -38,6 +38,7 @@ struct relight_state {
     struct picture_goal goal;
     uint32_t suns, sun;            /* sun: of distant light now */
     uint64_t picture;              /* being rendered */
+    size_t part;                   /* of it: 0: all sources, then each alone */
     double done, total, shown_sec; /* shown_sec: when the last preview was written */
     bool has_direct, has_first, needs_light;
 };
@@ -69,6 +70,13 @@ static void say_black(const struct relight_state *r, const char *why) {
 
 /* --- one picture ------------------------------------------------------------------------------------------------ */
 
+/* How much of the picture is done, as far as its part is by that share. */
+static double share_done(const struct relight_state *r, double of_part) {
+    size_t alone = render_settings_bool(r->job->settings, "per_light") ? r->room.source_count : 0;
+    size_t first = r->needs_light ? 0 : 1;
+    return ((double)(r->part - first) + fmin(1.0, of_part)) / (double)(alone + 1 - first);
+}
+
 /* A look at the picture between two rounds. */
 static bool look(void *user, const struct image *so_far, struct picture_quality quality) {
     struct relight_state *r = user;
@@ -77,8 +85,8 @@ static bool look(void *user, const struct image *so_far, struct picture_quality 
     if (w->should_stop && w->should_stop(w->user))
         return false;
     if (w->progress)
-        w->progress(w->user, r->done + fmin(1.0, (double)quality.spp / r->goal.most_spp), r->total);
-    if (w->preview && !is_last && clock_sec() - r->shown_sec >= PREVIEW_INTERVAL_SEC) {
+        w->progress(w->user, r->done + share_done(r, (double)quality.spp / r->goal.most_spp), r->total);
+    if (w->preview && !is_last && r->part == 0 && clock_sec() - r->shown_sec >= PREVIEW_INTERVAL_SEC) {
         struct image shown;
         image_take_rgb(so_far, &shown);
         output_preview(&r->output, r->picture, &shown, NULL); /* a picture that is missed does no harm */
@@ -136,6 +144,7 @@ static enum status put_sources(struct relight_state *r, const struct camera *cam
         struct picture_quality quality;
         struct image image;
         relit_shine(&r->room, i, r->pool);
+        r->part = i + 1;
         status =
             picture_render(&r->room.world, camera, &path, &r->goal, false, look, r, r->pool, &image, &quality, err);
         if (status != STATUS_OK)
@@ -145,6 +154,7 @@ static enum status put_sources(struct relight_state *r, const struct camera *cam
         image_release(&image);
     }
     relit_shine(&r->room, RELIT_ALL, r->pool);
+    r->part = 0;
     return status;
 }
 

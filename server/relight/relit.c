@@ -261,9 +261,9 @@ static void add_things(struct recovered *r, struct mesh *mesh, const struct thin
 
 /* --- all -------------------------------------------------------------------------------------------------------- */
 
-static void add_source(struct relit *r, char *name, uint32_t segment) {
+static void add_source(struct relit *r, char *name, uint32_t segment, enum distant_part part) {
     r->source = mem_realloc_array(r->source, r->source_count + 1, sizeof *r->source);
-    r->source[r->source_count++] = (struct relit_source){name, segment};
+    r->source[r->source_count++] = (struct relit_source){name, segment, part};
 }
 
 static void list_sources(struct relit *r, size_t room_segments, const struct things *things) {
@@ -271,10 +271,31 @@ static void list_sources(struct relit *r, size_t room_segments, const struct thi
         if (!(rgb_luminance(r->materials.emission[s]) > 0.0f))
             continue;
         add_source(r, s < room_segments ? mem_printf("light_%u", s) : mem_strdup(things->thing[s - room_segments].name),
-                   s);
+                   s, DISTANT_WHOLE);
     }
-    if (r->distant.pixel)
-        add_source(r, mem_strdup("environment"), LIGHT_ENVIRONMENT);
+    if (r->distant[DISTANT_SKY].pixel)
+        add_source(r, mem_strdup("sky"), LIGHT_ENVIRONMENT, DISTANT_SKY);
+    if (r->distant[DISTANT_SUN].pixel)
+        add_source(r, mem_strdup("sun"), LIGHT_ENVIRONMENT, DISTANT_SUN);
+}
+
+static void release_distant(struct relit *r) {
+    for (int part = DISTANT_WHOLE; part <= DISTANT_SUN; part++)
+        image_release(&r->distant[part]);
+}
+
+static enum status read_distant(struct relit *r, const struct relight_job *job, const struct compass *compass,
+                                uint32_t sun, struct error *err) {
+    bool has, has_parts = render_settings_bool(job->settings, "per_light");
+    enum status status = STATUS_OK;
+    release_distant(r);
+    for (int part = DISTANT_WHOLE; part <= (has_parts ? DISTANT_SUN : DISTANT_WHOLE) && status == STATUS_OK; part++)
+        status = environment_read(job, compass, sun, (enum distant_part)part, &has, &r->distant[part], err);
+    return status;
+}
+
+static const struct image *light_of(const struct relit *r, enum distant_part part) {
+    return r->distant[part].pixel ? &r->distant[part] : NULL;
 }
 
 /* Takes what recovered_read made, all but the world, which is not there yet. */
@@ -289,15 +310,14 @@ static void take(struct recovered *from, struct relit *r) {
 
 static enum status build(const struct relight_job *job, const struct compass *compass, size_t room_segments,
                          const struct things *things, struct parallel *pool, struct relit *r, struct error *err) {
-    bool has;
     r->emission = mem_array(r->segments.count, sizeof *r->emission);
     memcpy(r->emission, r->materials.emission, r->segments.count * sizeof *r->emission);
     if (r->mesh.triangle_count == 0)
         return error_set(err, STATUS_INPUT, "setting remove: nothing of the room is left");
-    enum status status = environment_read(job, compass, 0, &has, &r->distant, err);
+    enum status status = read_distant(r, job, compass, 0, err);
     if (status == STATUS_OK)
-        status = world_init(&r->world, &r->mesh, &r->segments, &r->atlas, &r->materials, has ? &r->distant : NULL, pool,
-                            err);
+        status = world_init(&r->world, &r->mesh, &r->segments, &r->atlas, &r->materials, light_of(r, DISTANT_WHOLE),
+                            pool, err);
     if (status == STATUS_OK)
         list_sources(r, room_segments, things);
     return status;
@@ -340,7 +360,7 @@ void relit_release(struct relit *r) {
         mem_free(r->source[i].name);
     mem_free(r->source);
     mem_free(r->emission);
-    image_release(&r->distant);
+    release_distant(r);
     world_release(&r->world);
     materials_release(&r->materials);
     atlas_release(&r->atlas);
@@ -351,11 +371,9 @@ void relit_release(struct relit *r) {
 
 enum status relit_set_sun(struct relit *r, const struct relight_job *job, const struct compass *compass, uint32_t sun,
                           struct parallel *pool, struct error *err) {
-    bool has;
-    image_release(&r->distant);
-    enum status status = environment_read(job, compass, sun, &has, &r->distant, err);
+    enum status status = read_distant(r, job, compass, sun, err);
     if (status == STATUS_OK)
-        world_set_environment(&r->world, has ? &r->distant : NULL, pool);
+        world_set_environment(&r->world, light_of(r, DISTANT_WHOLE), pool);
     return status;
 }
 
@@ -364,7 +382,8 @@ void relit_shine(struct relit *r, size_t source, struct parallel *pool) {
     uint32_t alone = is_all ? 0 : r->source[source].segment;
     for (uint32_t s = 0; s < r->segments.count; s++)
         r->materials.emission[s] = is_all || s == alone ? r->emission[s] : rgb_gray(0.0f);
-    bool is_distant = r->distant.pixel && (is_all || alone == LIGHT_ENVIRONMENT);
-    world_set_environment(&r->world, is_distant ? &r->distant : NULL, pool);
+    enum distant_part part = is_all ? DISTANT_WHOLE : r->source[source].part;
+    bool is_distant = is_all || alone == LIGHT_ENVIRONMENT;
+    world_set_environment(&r->world, is_distant ? light_of(r, part) : NULL, pool);
     world_update_lights(&r->world);
 }

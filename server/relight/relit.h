@@ -10,12 +10,14 @@
 #include "common/error.h"
 #include "common/parallel.h"
 #include "server/relight/relight_job.h"
+#include "server/relight/sky.h"
 #include "server/render/world.h"
 
 /* What shines: a segment of the room, a thing that was added, or distant light. */
 struct relit_source {
-    char *name;       /* "light_27", "lamp_1", "insert_2", "environment"; owned */
-    uint32_t segment; /* or LIGHT_ENVIRONMENT */
+    char *name;             /* "light_27", "lamp_1", "insert_2", "sky", "sun"; owned */
+    uint32_t segment;       /* or LIGHT_ENVIRONMENT */
+    enum distant_part part; /* of distant light */
 };
 
 struct relit {
@@ -24,10 +26,10 @@ struct relit {
     struct atlas atlas;       /* no charts: corners only */
     struct materials materials;
     struct world world;
-    rgb *emission;        /* [segments.count] with all sources; owned */
-    struct image distant; /* distant light, where there is any */
+    rgb *emission;                         /* [segments.count] with all sources; owned */
+    struct image distant[DISTANT_SUN + 1]; /* distant light, where there is any; its parts only with per_light */
     size_t source_count;
-    struct relit_source *source; /* [source_count]; the environment is the last; owned */
+    struct relit_source *source; /* [source_count]; sky and sun are the last; owned */
 };
 
 /* `mesh`, the outputs' own, is taken over. The environment is that of sun 0. */

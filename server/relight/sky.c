@@ -241,19 +241,20 @@ static rgb on_ground(const struct compass *compass, const struct image *map) {
     return rgb_make((float)sum[0], (float)sum[1], (float)sum[2]);
 }
 
-void sky_map(const struct sky *sky, const struct compass *compass, struct image *map) {
+void sky_map(const struct sky *sky, const struct compass *compass, enum distant_part part, struct image *map) {
     image_init_rgb(map, MAP_WIDTH, MAP_HEIGHT);
     if (!(sky->sun.elevation > 0.0))
         return;
     vec3 sun = towards_sun(sky);
-    for (uint32_t y = 0; y < map->height; y++) {
+    for (uint32_t y = 0; y < map->height && part != DISTANT_SUN; y++) {
         for (uint32_t x = 0; x < map->width; x++) {
             vec3 d = compass_to_map(compass, latlong_pixel(map->width, map->height, x, y));
             if (d.y > 0.0f)
                 add_pixel(map, x, y, sky_radiance(sky, acos((double)d.y), angle_between(d, sun)));
         }
     }
-    add_sun(sky, sun, compass, map);
+    if (part != DISTANT_SKY)
+        add_sun(sky, sun, compass, map);
     rgb ground = rgb_scale(on_ground(compass, map), (float)(GROUND_ALBEDO / PI));
     for (uint32_t y = 0; y < map->height; y++)
         for (uint32_t x = 0; x < map->width; x++)

@@ -38,7 +38,9 @@ void sky_zenith(const struct sky *sky, double *x, double *y, double *luminance);
 #define SKY_SUN_ANGLE 6.7443e-5 /* solid angle of the sun's disc, sr (the paper's) */
 
 /* The map of distant light in the room's frame, cd/m2: sky, sun, and below the horizon a grey ground lit by both. Black
- * when the sun is below the horizon. *map is the caller's. */
-void sky_map(const struct sky *sky, const struct compass *compass, struct image *map);
+ * when the sun is below the horizon. A part is what is left without the other: light of the sky alone (and the ground
+ * that it lights), or of the sun; their sum is the whole. *map is the caller's. */
+enum distant_part { DISTANT_WHOLE, DISTANT_SKY, DISTANT_SUN };
+void sky_map(const struct sky *sky, const struct compass *compass, enum distant_part part, struct image *map);
 
 #endif

@@ -246,6 +246,65 @@ static void test_sums(void) {
     relit_remove(dir);
 }
 
+static double mean_of(const char *out, const char *name) {
+    struct error err;
+    struct image image;
+    if (relit_read(out, name, &image, &err) != STATUS_OK)
+        return 0.0;
+    double mean = relit_mean(&image);
+    image_release(&image);
+    return mean;
+}
+
+#define OPEN_ROOM "\"format\":\"exr\",\"spp\":256,\"max_depth\":4,\"remove\":\"1\","
+#define NOON                                                                                                           \
+    "\"environment\":\"sky\",\"date\":\"2024-06-21\",\"latitude\":47,\"longitude\":8.5,\"time\":\"12:00\",\"up\":\"y\""
+
+/* A room without a ceiling under a sky: sun and sky apart are what they are alone, under their own settings, in half
+ * precision too; and what was found has a sun of its own where sky.exr is beside it. */
+static void test_sun_apart(void) {
+    char *dir = lit_room(CENTRE_VIEW), *out, *path;
+    struct error err;
+    struct image image, map;
+    CHECK_THAT(relit_run(dir, "{" OPEN_ROOM NOON ",\"per_light\":true,\"precision\":\"half\"}", pool, &out, &err) ==
+                   STATUS_OK,
+               "%s", err.message);
+    double whole = mean_of(out, "00000_radiance.exr"), sky = mean_of(out, "00000_sky.exr"),
+           sun = mean_of(out, "00000_sun.exr"), lamp = mean_of(out, "00000_light_2.exr");
+    CHECK(sky > 0.0 && sun > 0.0);
+    CHECK_NEAR((sky + sun + lamp) / whole, 1.0, 0.02);
+    relit_remove(out);
+    picture(dir, "{" OPEN_ROOM NOON ",\"lights\":\"off\",\"sun\":\"off\",\"sky\":\"2\"}", &image);
+    CHECK_NEAR(relit_mean(&image) / sky, 2.0, 0.04);
+    image_release(&image);
+    picture(dir, "{" OPEN_ROOM NOON ",\"lights\":\"off\",\"sun\":\"0,0,1\",\"sky\":\"off\"}", &image);
+    CHECK(image.pixel[0] == 0.0f && relit_mean(&image) > 0.0);
+    image_release(&image);
+    CHECK(relit_picture(dir, "{" OPEN_ROOM "\"sun\":\"off\"}", pool, &image, &err) == STATUS_INPUT);
+    CHECK_STRING(err.message, "setting sun: the reconstruction found none");
+    image_init_rgb(&map, 16, 9);
+    for (size_t i = 0; i < 16 * 9 * 3; i++)
+        map.pixel[i] = 1.0f;
+    path = file_join(dir, "sky.exr");
+    CHECK(image_write_exr(path, &map, IMAGE_FLOAT, false, NULL) == STATUS_OK);
+    mem_free(path);
+    for (size_t i = 0; i < 3; i++)
+        map.pixel[3 * (16 * 2 + 4) + i] = 50.0f;
+    path = file_join(dir, "environment.exr");
+    CHECK(image_write_exr(path, &map, IMAGE_FLOAT, false, NULL) == STATUS_OK);
+    mem_free(path);
+    CHECK_THAT(relit_run(dir, "{" OPEN_ROOM "\"per_light\":true}", pool, &out, &err) == STATUS_OK, "%s", err.message);
+    whole = mean_of(out, "00000_radiance.exr");
+    sky = mean_of(out, "00000_sky.exr");
+    sun = mean_of(out, "00000_sun.exr");
+    lamp = mean_of(out, "00000_light_2.exr");
+    CHECK(sky > 0.0 && sun > 0.0);
+    CHECK_NEAR((sky + sun + lamp) / whole, 1.0, 0.02);
+    relit_remove(out);
+    image_release(&map);
+    relit_remove(dir);
+}
+
 /* Light adds up and scales; nothing that shines is told; what is not there is
  * told. */
 static void test_lights(void) {
@@ -294,6 +353,34 @@ static void test_closed(void) {
     relit_remove(dir);
 }
 
+struct progress_heard {
+    double last;
+    bool goes_back;
+};
+static void hear_progress(void *user, double done, double total) {
+    struct progress_heard *heard = user;
+    heard->goes_back = heard->goes_back || done < heard->last || done > total;
+    heard->last = done;
+}
+
+/* Sources that are rendered alone are parts of their picture: progress never goes back. */
+static void test_progress(void) {
+    char *dir = lit_room(CENTRE_VIEW), out[] = "/tmp/unbake-progress-XXXXXX";
+    struct error err;
+    struct progress_heard heard = {0};
+    cJSON *settings = cJSON_CreateObject();
+    json_add_int(settings, "spp", 128);
+    json_add_bool(settings, "per_light", true);
+    CHECK(mkdtemp(out) != NULL);
+    struct relight_job job = {.outputs = dir, .settings = settings, .out = out};
+    struct relight_watch watch = {.user = &heard, .progress = hear_progress};
+    CHECK_THAT(relight_run(&job, &watch, pool, &err) == STATUS_OK, "%s", err.message);
+    CHECK(!heard.goes_back && heard.last == 1.0);
+    cJSON_Delete(settings);
+    CHECK(file_remove_tree(out, NULL) == STATUS_OK);
+    relit_remove(dir);
+}
+
 /* A render that was stopped goes on where it was: what is there whole is not
  * rendered again. */
 static void test_resume(void) {
@@ -325,8 +412,10 @@ int main(void) {
     test_lamps();
     test_panorama();
     test_sums();
+    test_sun_apart();
     test_lights();
     test_closed();
+    test_progress();
     test_resume();
     parallel_free(pool);
     return check_result();

@@ -83,6 +83,11 @@ static void test_faults(void) {
         {"{\"path\":\"0,1\",\"view\":\"0\"}", "view"},
         {"{\"path_count\":9}", "path_count"},
         {"{\"multilayer\":true}", "multilayer"},
+        {"{\"sky\":\"dim\"}", "sky"},
+        {"{\"environment\":\"none\",\"sky\":2}", "sky"},
+        {"{\"environment\":\"a.hdr\",\"sun\":\"off\"}", "sun"},
+        {"{\"precision\":\"half\"}", "precision"},
+        {"{\"precision\":\"half\",\"multilayer\":true,\"format\":\"exr\"}", "precision"},
     };
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         cJSON *problems = cJSON_CreateArray();

@@ -53,7 +53,7 @@ static void test_map(void) {
     struct sky sky = {.sun = {0.6, 2.0}, .turbidity = 3.0, .north = 0.3};
     struct compass compass = compass_of(vec3_make(0.0f, 0.0f, 1.0f));
     struct image map;
-    sky_map(&sky, &compass, &map);
+    sky_map(&sky, &compass, DISTANT_WHOLE, &map);
     double sum = 0.0, direction[3] = {0, 0, 0};
     for (uint32_t i = 0; i < map.width * map.height; i++) {
         vec3 d = latlong_pixel(map.width, map.height, i % map.width, i / map.width);
@@ -75,7 +75,28 @@ static void test_map(void) {
     image_release(&map);
 }
 
+/* Sky and sun add up to the whole, the ground that each of them lights included; the sky alone has no disc. */
+static void test_parts(void) {
+    struct sky sky = {.sun = {0.6, 2.0}, .turbidity = 3.0};
+    struct compass compass = compass_of(vec3_make(0.0f, 1.0f, 0.0f));
+    struct image whole, part[2];
+    float brightest = 0.0f;
+    sky_map(&sky, &compass, DISTANT_WHOLE, &whole);
+    sky_map(&sky, &compass, DISTANT_SKY, &part[0]);
+    sky_map(&sky, &compass, DISTANT_SUN, &part[1]);
+    for (size_t i = 0; i < (size_t)whole.width * whole.height * 3; i++) {
+        float sum = part[0].pixel[i] + part[1].pixel[i];
+        CHECK_NEAR(sum, whole.pixel[i], 1e-4f * whole.pixel[i]);
+        brightest = fmaxf(brightest, part[0].pixel[i]);
+    }
+    CHECK_THAT(brightest < 1e6f, "the sky alone is as bright as %g", (double)brightest);
+    image_release(&whole);
+    image_release(&part[0]);
+    image_release(&part[1]);
+}
+
 int main(void) {
+    test_parts();
     test_position();
     test_zenith();
     test_sun();
