@@ -6,6 +6,7 @@
  *      evaluate      reads the outputs of its source, and a scene that holds a truth: its source's unless another is named
  */
 #include <limits.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "common/mem.h"
@@ -38,6 +39,7 @@ struct job_submission {
  * failed. */
 static struct response *find_scene(struct job_submission *s, const char *id) {
     size_t digits = strspn(id, "0123456789abcdef");
+    char hint[SCENE_ID_SIZE + 64];
     struct error err;
     if (digits < 8 || digits > 64 || id[digits] != '\0') {
         problem_param(s->params, "scene", NULL, "is not a scene's id: 8 to 64 lower-case hex digits");
@@ -49,8 +51,10 @@ static struct response *find_scene(struct job_submission *s, const char *id) {
         problem_param(s->params, "scene", NULL, "%s", err.message);
     else if (status != STATUS_OK)
         return problem_from(s->r, &err);
-    else if (s->scene.state == SCENE_REJECTED)
-        problem_param(s->params, "scene", "GET /v1/scenes/{id} lists what is wrong with it", "was rejected");
+    else if (s->scene.state == SCENE_REJECTED) {
+        snprintf(hint, sizeof hint, "GET /v1/scenes/%s lists what is wrong with it", s->scene.id);
+        problem_param(s->params, "scene", hint, "was rejected");
+    }
     return NULL;
 }
 

@@ -235,6 +235,8 @@ echo "this is no archive" >"$work/bad.zip"
 run 4 submit "$work/bad.zip" --watch
 has "$err" "was rejected"
 bad=$("$build/unbake" scenes -q | head -n 1)
+run 4 submit --scene "$bad" --json
+jq -e --arg id "$bad" '.invalid_params[0].hint | startswith("GET /v1/scenes/" + $id)' <<<"$err" >/dev/null || fail "no hint that names the scene: $err"
 run 0 scenes show "$bad" --json
 so '.state == "rejected" and (.problems | length) > 0'
 make_room "$work/broken"
