@@ -13,6 +13,7 @@
 #include "common/mem.h"
 #include "server/ingest/archive.h"
 #include "server/ingest/applied.h"
+#include "server/ingest/doubled.h"
 #include "server/ingest/mesh_choice.h"
 #include "server/ingest/mesh/mesh_file.h"
 #include "server/ingest/path.h"
@@ -279,6 +280,7 @@ enum status bundle_load(const char *dir, const struct reading *given, const stru
         status = settle_coordinates(&t, name, reading.coordinates, scene, &f, err);
     reading_apply_frames(&reading, &t);
     scene->pose_axes = reading.axes != AXES_OF_FORMAT ? reading.axes : t.axes;
+    doubled_settle(&t, name, &f);
     if (status == STATUS_OK && has_frames)
         status = load_photographs(root, name, &t, limits, pool, scene, &f, err);
     if (status == STATUS_OK && f.problem_count > 0 && listing.link_count > 0)

@@ -55,37 +55,6 @@ struct loading {
     float clip;
 };
 
-/* --- names ------------------------------------------------------------------------------- */
-
-struct named {
-    const char *file;
-    size_t number; /* of the frame */
-};
-
-static int by_file(const void *a, const void *b) {
-    const struct named *x = a, *y = b;
-    int order = strcmp(x->file, y->file);
-    return order ? order : (x->number > y->number) - (x->number < y->number);
-}
-
-/* Reports pictures with two poses, one of which must be wrong. The readers of sources have found the files, so "a" and
- * "a.png" are the same. */
-static void find_duplicates(const struct loading *l, const char *name, struct findings *f) {
-    size_t count = l->transforms->frame_count;
-    struct named *sorted = mem_array(count, sizeof *sorted);
-    for (size_t i = 0; i < count; i++) {
-        const struct frame *frame = &l->transforms->frame[i];
-        sorted[i] = (struct named){frame->file, frame->number};
-    }
-    if (count > 1)
-        qsort(sorted, count, sizeof *sorted, by_file);
-    for (size_t i = 1; i < count; i++)
-        if (strcmp(sorted[i].file, sorted[i - 1].file) == 0)
-            findings_problem(f, name, "frames[%zu] and frames[%zu] both name %s", sorted[i - 1].number,
-                             sorted[i].number, sorted[i].file);
-    mem_free(sorted);
-}
-
 /* --- one photograph ---------------------------------------------------------------------- */
 
 static void set_exposure(const struct frame *frame, const struct image_info *info, struct photograph *photo,
@@ -367,7 +336,6 @@ enum status photos_load(const char *dir, const char *name, const struct frames *
         l.path[i] = file_is_in(dir, t->frame[i].file) ? t->frame[i].file : NULL;
     l.color = mem_calloc(t->frame_count, sizeof *l.color);
     l.fit = mem_calloc(t->frame_count, sizeof *l.fit);
-    find_duplicates(&l, name, f);
     photo_fit_all(dir, name, l.path, t, pool, l.fit, f);
     pthread_mutex_init(&l.gate.mutex, NULL);
     pthread_cond_init(&l.gate.freed, NULL);

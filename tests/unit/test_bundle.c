@@ -17,6 +17,8 @@ static struct parallel *pool;
 #define POSE "\"transform_matrix\":[[1,0,0,0.5],[0,1,0,0.5],[0,0,1,2],[0,0,0,1]]"
 #define LENS "\"w\":8,\"h\":6,\"fl_x\":7,\"fl_y\":7.5,\"cx\":4,\"cy\":3"
 #define FRAME(name) "{\"file_path\":\"" name "\"," POSE "}"
+#define OTHER_POSE "\"transform_matrix\":[[1,0,0,0.5],[0,1,0,0.5],[0,0,1,2.001],[0,0,0,1]]"
+#define FRAME_ELSEWHERE(name) "{\"file_path\":\"" name "\"," OTHER_POSE "}"
 #define THREE FRAME("a.exr") "," FRAME("./b.png") "," FRAME("c.exr")
 #define MESH                                                                                                           \
     "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"                  \
@@ -196,6 +198,22 @@ static void test_variants(void) {
     cJSON_Delete(problems);
 }
 
+/* A photograph that two frames name with one pose is used once: NeRF's test views are often copies of the others. */
+static void test_doubled(void) {
+    struct scene scene;
+    struct error err;
+    cJSON *problems;
+    put_good();
+    put("transforms.json", "{" LENS ",\"test_filenames\":[\"c.exr\"],\"frames\":[" FRAME("a.exr") "," FRAME(
+                               "b.png") "," FRAME("c.exr") "],\"test_frames\":[" FRAME("./b") "," FRAME("c.exr") "]}");
+    CHECK_THAT(load(&scene, &problems, &err) == STATUS_OK, "%s", err.message);
+    CHECK(scene.photograph_count == 3 && scene.named_count == 5);
+    CHECK(!scene.photograph[1].is_test && scene.photograph[2].is_test);
+    CHECK(has_warning(&scene, "2 frames name a photograph that another one names with the same pose, b.png"));
+    scene_release(&scene);
+    cJSON_Delete(problems);
+}
+
 #define TOP(extra) "{" LENS "," extra "\"frames\":[" THREE "]}"
 #define ONE_OF_THREE(frame) "{" LENS ",\"frames\":[" frame "," FRAME("b.png") "," FRAME("c.exr") "," FRAME("a.exr") "]}"
 #define MATRIX(rows) ONE_OF_THREE("{\"file_path\":\"d.exr\",\"transform_matrix\":" rows "}")
@@ -247,11 +265,12 @@ static const struct bad bad_bundles[] = {
     {MATRIX("7"), NULL, NULL, "transforms.json", "4 (or 3) rows of 4"},
     {ONE_OF_THREE("{" POSE "}"), NULL, NULL, "transforms.json", "frames[0]: no file_path"},
     {ONE_OF_THREE("7"), NULL, NULL, "transforms.json", "frames[0]: must be an object"},
-    {ONE_OF_THREE("{\"file_path\":\"../../a.exr\"," POSE "}"), NULL, NULL, "transforms.json",
+    {ONE_OF_THREE("{\"file_path\":\"../../a.exr\"," OTHER_POSE "}"), NULL, NULL, "transforms.json",
      "frames[0] and frames[3] both name a.exr"},
     {ONE_OF_THREE("{\"file_path\":\"\"," POSE "}"), NULL, NULL, "transforms.json", "file_path is empty"},
-    {ONE_OF_THREE(FRAME("./a.exr")), NULL, NULL, "transforms.json", "frames[0] and frames[3] both name a.exr"},
-    {ONE_OF_THREE(FRAME("c")), NULL, NULL, "transforms.json", "frames[0] and frames[2] both name c.exr"},
+    {ONE_OF_THREE(FRAME_ELSEWHERE("./a.exr")), NULL, NULL, "transforms.json",
+     "frames[0] and frames[3] both name a.exr"},
+    {ONE_OF_THREE(FRAME_ELSEWHERE("c")), NULL, NULL, "transforms.json", "frames[0] and frames[2] both name c.exr"},
     {ONE_OF_THREE("{\"file_path\":\"d\"," POSE ",\"split\":\"dev\"}"), NULL, NULL, "transforms.json", "split must be"},
     {ONE_OF_THREE("{\"file_path\":\"d\"," POSE ",\"exposure\":-1}"), NULL, NULL, "transforms.json", "exposure is -1"},
     {"{" LENS ",\"frames\":[{\"file_path\":\"a.exr\"," POSE
@@ -557,6 +576,7 @@ int main(void) {
     test_good();
     test_exif();
     test_variants();
+    test_doubled();
     test_bad();
     test_root();
     test_formats();
