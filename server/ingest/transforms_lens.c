@@ -79,6 +79,16 @@ static bool has(const struct frame_context *c, const char *key) {
     return value && !cJSON_IsNull(value);
 }
 
+/* instant-ngp says by such members that the lens is another one than camera_model or is_fisheye name (its json_binding.h). */
+static void refuse_others(struct frame_context *c) {
+    static const char *const members[] = {"ftheta_p0", "latlong", "equirectangular", "orthographic"};
+    for (size_t i = 0; i < sizeof members / sizeof *members; i++)
+        if (has(c, members[i]) &&
+            !cJSON_IsFalse(cJSON_GetObjectItemCaseSensitive(frame_context_holder(c, members[i]), members[i])))
+            frame_context_problem(c, "the lens is described by %s, which is not read: render or cut perspective views",
+                                  members[i]);
+}
+
 /* The lens's polynomials. Beside k5 and k6, k4 is OpenCV's, of the denominator; alone, it is nerfstudio's, of the eighth
  * power of the radius (its camera_utils.py; ns-process-data writes it for RealityCapture's lenses). */
 static void read_distortion(struct frame_context *c, struct lens *lens) {
@@ -119,6 +129,7 @@ static double angle(struct frame_context *c, const char *key) {
 }
 
 void transforms_lens_read(struct frame_context *c, struct lens *lens) {
+    refuse_others(c);
     read_distortion(c, lens);
     lens->width = side(c, "w");
     lens->height = side(c, "h");

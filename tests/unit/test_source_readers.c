@@ -199,6 +199,36 @@ static void test_alicevision(void) {
     source_rig_stop(&rig);
 }
 
+/* Rotations stored column by column, of the world into the rig and of the rig into the camera: by 90 degrees around z and
+ * around x. */
+#define RIG(independent, status)                                                                                       \
+    "{\"version\":[1,2,0],\"views\":[{\"poseId\":\"1\",\"intrinsicId\":\"9\",\"rigId\":\"7\",\"subPoseId\":\"1\","     \
+    "\"isPoseIndependant\":\"" independent                                                                             \
+    "\",\"path\":\"b.jpg\"}],\"intrinsics\":[{\"intrinsicId\":\"9\",\"width\":160,\"height\":120,"                     \
+    "\"pxFocalLength\":[104,104],\"principalPoint\":[80,60],\"type\":\"pinhole\"}],"                                   \
+    "\"poses\":[{\"poseId\":\"1\",\"pose\":{\"transform\":{\"rotation\":[0,-1,0,1,0,0,0,0,1],\"center\":[1,2,3]}}}],"  \
+    "\"rigs\":[{\"rigId\":\"7\",\"subPoses\":[{\"status\":\"constant\"},{\"status\":\"" status                         \
+    "\",\"pose\":{\"rotation\":[1,0,0,0,0,-1,0,1,0],\"center\":[0.1,0.2,0.3]}}]}]}"
+
+/* A camera of a rig stands where the rig and its place in it put it. */
+static void test_alicevision_rig(void) {
+    source_rig_start(&rig, "Meshroom");
+    put("b.jpg", "");
+    put("cameras.sfm", RIG("false", "estimated"));
+    CHECK(source_rig_read(&rig) && rig.t.frame_count == 1);
+    const struct exact_pose *pose = &rig.t.frame[0].world_from_camera;
+    CHECK_NEAR(pose->translation[0], 1 - 0.2, 1e-12);
+    CHECK_NEAR(pose->translation[1], 2 + 0.1, 1e-12);
+    CHECK_NEAR(pose->translation[2], 3 + 0.3, 1e-12);
+    CHECK_NEAR(pose->rotation[0][2], 1, 1e-12); /* the camera's z is the rig's -y, the world's x */
+    CHECK_NEAR(pose->rotation[1][0], 1, 1e-12);
+    put("cameras.sfm", RIG("true", "estimated"));
+    CHECK(source_rig_read(&rig) && rig.t.frame_count == 1 && rig.t.frame[0].world_from_camera.translation[0] == 1.0);
+    put("cameras.sfm", RIG("false", "uninitialized"));
+    CHECK(source_rig_read(&rig) && rig.t.frame_count == 0 && source_rig_warned(&rig, "1 photographs have no pose"));
+    source_rig_stop(&rig);
+}
+
 #define SFM(lens)                                                                                                      \
     "[{\"cameras\":{\"v2\":{\"width\":160,\"height\":120," lens                                                        \
     "}},\"shots\":{\"b.jpg\":{\"camera\":\"v2\",\"rotation\":[" AXIS_ANGLE_JSON "],\"translation\":[" T_JSON           \
@@ -211,6 +241,10 @@ static void test_opensfm(void) {
     put("opensfm/reconstruction.json", SFM("\"projection_type\":\"perspective\",\"focal\":0.65,\"k1\":0.1,\"k2\":0"));
     check_lens(&check(0, 1, "images/b.jpg")->lens, 104, 80, 60, 0.1, 0, 0);
     CHECK(source_rig_warned(&rig, "1 photographs in images/ have no pose"));
+    put("odm_georeferencing/coords.txt", "WGS84 UTM 32N\n600000 5000000\n");
+    CHECK(source_rig_read(&rig) && source_rig_warned(&rig, "may be in other coordinates"));
+    put("opensfm/reconstruction.topocentric.json", "[]"); /* since version 2.0: the other one is georeferenced */
+    CHECK(source_rig_read(&rig) && !source_rig_warned(&rig, "may be in other coordinates"));
     put("opensfm/reconstruction.geocoords.json",
         SFM("\"projection_type\":\"brown\",\"focal_x\":0.65,\"focal_y\":0.66,\"c_x\":0.0125,\"c_y\":-0.0125,\"k1\":0.1,"
             "\"p1\":0.01,\"p2\":0.02"));
@@ -439,6 +473,7 @@ int main(void) {
     test_bundler();
     test_openmvg();
     test_alicevision();
+    test_alicevision_rig();
     test_opensfm();
     test_realitycapture();
     test_realitycapture_xmp();

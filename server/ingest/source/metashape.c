@@ -6,7 +6,9 @@
  * their origin in the chunk's region, x to the east and z up ("local"). A model in a projected system fits none of these.
  *
  * Distortion: k1 to k4 of even powers, p1 (r^2 + 2 x^2) + 2 p2 x y for x: OpenCV's with p1 and p2 exchanged; cx, cy from
- * the picture's centre; fx = f + b1. */
+ * the picture's centre; fx = f + b1. A fisheye has the same of x and y scaled to the angle from the axis, which with p1
+ * and p2 is COLMAP's THIN_PRISM_FISHEYE. b2 (skew) and p3, p4 (of higher order of p1, p2) are not modelled: what they
+ * are at the picture's corner is told. */
 #include <math.h>
 #include <string.h>
 
@@ -43,31 +45,59 @@ static struct xml_node *of_id(const struct xml_node *parent, const char *name, c
     return NULL;
 }
 
-/* STATUS_INPUT for sensors that are neither frame nor fisheye cameras. */
-static enum status read_sensor(const struct xml_node *sensor, const char *name, struct lens *lens, struct error *err) {
+/* What is counted over all cameras of a file. */
+struct meta_counts {
+    size_t unposed_count;
+    double left_out_px; /* most that a parameter which is not modelled moves a pixel */
+};
+
+#define LEFT_OUT_TOLD_PX 0.5 /* below, it is less than the noise of any alignment */
+
+/* Pixels that skew and the higher orders of tangential distortion move the corner of the picture. */
+static double left_out(const struct xml_node *c, const struct lens *lens) {
+    double x = 0.5 * lens->width / lens->fl_y, y = 0.5 * lens->height / lens->fl_y, r2 = x * x + y * y;
+    double skew = value_of(c, "b2", value_of(c, "skew", 0.0)) * y;
+    double share = value_of(c, "p3", 0.0) * r2 + value_of(c, "p4", 0.0) * r2 * r2;
+    double tangential = 3.0 * hypot(lens->p[0], lens->p[1]) * r2 * share * lens->fl_y;
+    return fabs(skew) + fabs(tangential);
+}
+
+/* Focal length in y of a calibration, and what that in x has more; before version 1.2 both were written. NAN: none. */
+static double read_focal(const struct xml_node *c, double *more) {
+    double fx = value_of(c, "fx", NAN), fy = value_of(c, "fy", NAN);
+    *more = isnan(fx) || isnan(fy) ? value_of(c, "b1", 0.0) : fx - fy;
+    return value_of(c, "f", fy);
+}
+
+static bool is_type(const char *type, const char *name) { return type && strcmp(type, name) == 0; }
+
+/* STATUS_INPUT for sensors that are neither frame nor equidistant fisheye cameras. */
+static enum status read_sensor(const struct xml_node *sensor, const char *name, struct lens *lens,
+                               struct meta_counts *counts, struct error *err) {
     const char *type = xml_attribute(sensor, "type");
+    bool is_fisheye = is_type(type, "fisheye") || is_type(type, "equidistant_fisheye");
     struct xml_node *resolution = xml_child(sensor, "resolution");
     struct xml_node *c = of_id(sensor, "calibration", "class", "adjusted");
-    double width = NAN, height = NAN, f;
+    double width = NAN, height = NAN, f, more;
     c = c ? c : xml_child(sensor, "calibration");
     if (!c || !resolution || !numbers_parse(xml_attribute(resolution, "width"), 1, &width) ||
-        !numbers_parse(xml_attribute(resolution, "height"), 1, &height) || isnan(f = value_of(c, "f", NAN)))
+        !numbers_parse(xml_attribute(resolution, "height"), 1, &height) || isnan(f = read_focal(c, &more)))
         return error_set(err, STATUS_INPUT, "%s: a sensor has no calibration: the photographs are not aligned", name);
-    if (type && strcmp(type, "frame") != 0 && strcmp(type, "fisheye") != 0)
-        return error_set(err, STATUS_INPUT, "%s: cameras of type %.40s are not read", name, type);
-    *lens = lens_pinhole(width, height, f + value_of(c, "b1", 0.0), f, 0.5 * width + value_of(c, "cx", 0.0),
+    if (type && !is_fisheye && !is_type(type, "frame")) {
+        error_set(err, STATUS_INPUT, "%s: cameras of type %.40s are not read", name, type);
+        return error_hint(err, "export undistorted photographs with their cameras (Export, Undistort Photos)");
+    }
+    *lens = lens_pinhole(width, height, f + more, f, 0.5 * width + value_of(c, "cx", 0.0),
                          0.5 * height + value_of(c, "cy", 0.0));
     lens->k[0] = value_of(c, "k1", 0.0);
     lens->k[1] = value_of(c, "k2", 0.0);
     lens->k[2] = value_of(c, "k3", 0.0);
     lens->p[0] = value_of(c, "p2", 0.0);
     lens->p[1] = value_of(c, "p1", 0.0);
-    if (type && strcmp(type, "fisheye") == 0) {
-        lens->model = CAMERA_OPENCV_FISHEYE;
-        lens->k[3] = value_of(c, "k4", 0.0);
-    } else if (value_of(c, "k4", 0.0) != 0.0) {
-        lens->k8 = value_of(c, "k4", 0.0);
-    }
+    *(is_fisheye ? &lens->k[3] : &lens->k8) = value_of(c, "k4", 0.0);
+    if (is_fisheye)
+        lens->model = lens->p[0] != 0.0 || lens->p[1] != 0.0 ? CAMERA_THIN_PRISM_FISHEYE : CAMERA_OPENCV_FISHEYE;
+    counts->left_out_px = fmax(counts->left_out_px, left_out(c, lens));
     return STATUS_OK;
 }
 
@@ -129,7 +159,7 @@ static void place_camera(double chunk[3][4], double camera[4][4], double m[3][4]
 }
 
 static enum status read_camera(struct xml_node *chunk, struct xml_node *camera, struct frame_list *list,
-                               size_t *unposed_count, struct error *err) {
+                               struct meta_counts *counts, struct error *err) {
     const char *label = xml_attribute(camera, "label"), *enabled = xml_attribute(camera, "enabled");
     struct xml_node *transform = xml_child(camera, "transform");
     struct xml_node *sensor = of_id(xml_child(chunk, "sensors"), "sensor", "id", xml_attribute(camera, "sensor_id"));
@@ -141,12 +171,12 @@ static enum status read_camera(struct xml_node *chunk, struct xml_node *camera, 
     if (enabled && (strcmp(enabled, "false") == 0 || strcmp(enabled, "0") == 0))
         return STATUS_OK;
     if (!label || !transform || !sensor) {
-        (*unposed_count)++;
+        counts->unposed_count++;
         return STATUS_OK;
     }
     if (!numbers_parse(transform->text, 16, own[0]))
         return error_set(err, STATUS_INPUT, "%s: the transform of %.200s is not 16 numbers", list->name, label);
-    enum status status = read_sensor(sensor, list->name, &lens, err);
+    enum status status = read_sensor(sensor, list->name, &lens, counts, err);
     if (status == STATUS_OK)
         status = read_chunk(outer ? outer : xml_child(chunk, "transform"), list->name, placed, err);
     if (status != STATUS_OK)
@@ -159,13 +189,13 @@ static enum status read_camera(struct xml_node *chunk, struct xml_node *camera, 
 
 /* All cameras, also those in groups. */
 static enum status read_cameras(struct xml_node *chunk, struct xml_node *parent, struct frame_list *list,
-                                size_t *unposed_count, struct error *err) {
+                                struct meta_counts *counts, struct error *err) {
     enum status status = STATUS_OK;
     for (struct xml_node *node = parent ? parent->first : NULL; node && status == STATUS_OK; node = node->next) {
         if (strcmp(node->name, "camera") == 0)
-            status = read_camera(chunk, node, list, unposed_count, err);
+            status = read_camera(chunk, node, list, counts, err);
         else if (strcmp(node->name, "group") == 0)
-            status = read_cameras(chunk, node, list, unposed_count, err);
+            status = read_cameras(chunk, node, list, counts, err);
     }
     return status;
 }
@@ -175,18 +205,23 @@ static enum status read(const struct source_place *place, struct frames *t, stru
     struct mapping file;
     struct error own;
     struct xml_node *root = NULL;
-    size_t unposed_count = 0;
+    struct meta_counts counts = {0};
     enum status status = listing_open(place->listing, place->found, "an XML file", &file, &own);
     if (status == STATUS_OK)
         status = xml_parse(file.data, file.size, place->found, &root, &own);
     mapping_close(&file);
     struct xml_node *chunk = xml_find(root, "chunk");
     if (status == STATUS_OK)
-        status = read_cameras(chunk, xml_child(chunk, "cameras"), &list, &unposed_count, &own);
+        status = read_cameras(chunk, xml_child(chunk, "cameras"), &list, &counts, &own);
     xml_free(root);
     frame_list_finish(&list);
-    if (unposed_count > 0)
-        findings_warning(f, "%s: %zu photographs have no pose and are not used", place->found, unposed_count);
+    if (counts.unposed_count > 0)
+        findings_warning(f, "%s: %zu photographs have no pose and are not used", place->found, counts.unposed_count);
+    if (counts.left_out_px > LEFT_OUT_TOLD_PX)
+        findings_warning(f,
+                         "%s: b2 (skew), p3 and p4 are not modelled, which moves the photographs' corners by %.2g "
+                         "pixels: optimise the cameras without them, or export undistorted photographs",
+                         place->found, counts.left_out_px);
     photo_folder_settle(place->listing, place->base, false, t, f);
     return findings_settle(f, place->found, status, &own, err);
 }

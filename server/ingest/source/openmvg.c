@@ -37,13 +37,28 @@ static const cJSON *data_of(const cJSON *value) {
     return cJSON_GetObjectItemCaseSensitive(wrapper, "data");
 }
 
+/* Whether all that is said of the lens is known: distortion is an array, and of a name of its own in each type. */
+static bool is_known(const cJSON *data) {
+    static const char *const known[] = {"principal_point", "disto_k1", "disto_k3", "disto_t2", "fisheye"};
+    const cJSON *member;
+    cJSON_ArrayForEach(member, data) {
+        bool is_one = !cJSON_IsArray(member);
+        for (size_t i = 0; i < sizeof known / sizeof *known; i++)
+            is_one = is_one || strcmp(member->string, known[i]) == 0;
+        if (!is_one)
+            return false;
+    }
+    return true;
+}
+
 /* Reads an intrinsic; STATUS_INPUT for models that are not pinhole or fisheye. The type's name is given where a type
  * is used first; the arrays of coefficients tell it everywhere. */
 static enum status read_lens(const cJSON *value, const char *name, struct lens *lens, struct error *err) {
     const cJSON *data = data_of(value), *inner = cJSON_GetObjectItemCaseSensitive(data, "value0");
     const cJSON *base = inner ? inner : data;
     double centre[2] = {NAN, NAN}, f = json_member(base, "focal_length");
-    if (!json_numbers(cJSON_GetObjectItemCaseSensitive(base, "principal_point"), 2, centre))
+    if (!json_numbers(cJSON_GetObjectItemCaseSensitive(base, "principal_point"), 2, centre) || isnan(f) ||
+        !is_known(data))
         return error_set(err, STATUS_INPUT, "%s: an intrinsic is no pinhole or fisheye camera", name);
     *lens = lens_pinhole(json_member(base, "width"), json_member(base, "height"), f, f, centre[0], centre[1]);
     const cJSON *fisheye = cJSON_GetObjectItemCaseSensitive(data, "fisheye");

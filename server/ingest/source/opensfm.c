@@ -2,17 +2,20 @@
  *
  * Shots are world-to-camera, an axis times an angle and a translation, with our camera axes. Lengths of a lens are shares
  * of the picture's longer side. OpenDroneMap writes the reconstruction a second time in the coordinates of its
- * georeferenced mesh (odm_textured_model_geo.obj): reconstruction.geocoords.json, which is preferred. */
+ * georeferenced mesh (odm_textured_model_geo.obj): reconstruction.geocoords.json, which is preferred. Since version 2.0
+ * it is that which it calls reconstruction.json, and the other one reconstruction.topocentric.json. */
 #include <math.h>
 #include <string.h>
 
 #include "common/mem.h"
+#include "server/ingest/path.h"
 #include "server/ingest/source/frame_list.h"
 #include "server/ingest/source/photo_folder.h"
 #include "server/ingest/source/values.h"
 
 #define PLAIN "reconstruction.json"
 #define GEOREFERENCED "reconstruction.geocoords.json"
+#define TOPOCENTRIC "reconstruction.topocentric.json"
 
 static char *recognise(const struct listing *l, const char *base) {
     static const char *const names[] = {"opensfm/" GEOREFERENCED, "opensfm/" PLAIN, GEOREFERENCED, PLAIN};
@@ -90,13 +93,13 @@ static const cJSON *largest_part(const cJSON *tree, struct findings *f, const ch
 
 /* A georeferenced mesh beside poses that are not. */
 static void warn_of_georeference(const struct source_place *place, struct findings *f) {
-    if (strstr(place->found, GEOREFERENCED))
-        return;
-    const struct listed_file *coordinates = listing_find(place->listing, place->base, "odm_georeferencing/coords.txt");
-    if (coordinates)
+    char *other = mem_printf("%.*s" TOPOCENTRIC, (int)(path_base(place->found) - place->found), place->found);
+    bool is_georeferenced = strstr(place->found, GEOREFERENCED) || listing_find(place->listing, "", other);
+    mem_free(other);
+    if (!is_georeferenced && listing_find(place->listing, place->base, "odm_georeferencing/coords.txt"))
         findings_warning(f,
-                         "%s is in other coordinates than a georeferenced mesh (*_geo): if they do not fit, copy "
-                         "opensfm/" GEOREFERENCED " of the project, too",
+                         "%s may be in other coordinates than a georeferenced mesh (*_geo): if they do not fit, copy "
+                         "all of the project's opensfm/reconstruction*.json",
                          place->found);
 }
 

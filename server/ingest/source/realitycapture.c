@@ -5,7 +5,8 @@
  * Ry(roll) with OpenGL's camera axes. f is a focal length of 35 mm film: f / 36 of the longer side; px and py likewise.
  * In XMP, xcr:Rotation turns the world into the camera, row-major, with our camera axes; xcr:Position is the camera's
  * centre; xcr:PrincipalPointU and V are shares of the longer side. xcr:DistortionModel "division" is Fitzgibbon's, of
- * coordinates in focal lengths; others are Brown's. z is up in both. */
+ * coordinates in focal lengths; "brown3", "brown4" and those with "t2" are Brown's. The table does not say which model
+ * its coefficients are of: Brown's have three at least, so that k1 alone is a division model's. z is up in both. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -98,7 +99,7 @@ static void rotate(const double degrees[3], double r[3][3]) {
 }
 
 static enum status read_row(char *line, size_t number, const struct rc_columns *table, struct frame_list *list,
-                            struct error *err) {
+                            size_t *division_count, struct error *err) {
     char *cell[MAX_COLUMNS], place[48];
     double v[COLUMN_COUNT] = {0.0}, r[3][3], m[3][4];
     size_t count = split(line, cell);
@@ -112,6 +113,10 @@ static enum status read_row(char *line, size_t number, const struct rc_columns *
     for (int i = 0; i < 12; i++)
         m[i / 4][i % 4] = i % 4 < 3 ? r[i / 4][i % 4] : v[X + i / 4];
     struct lens lens = make_lens(v[F] / FILM_WIDTH_MM, v[PX] / FILM_WIDTH_MM, v[PY] / FILM_WIDTH_MM, v + K1);
+    if (v[K1] != 0.0 && v[K2] == 0.0 && v[K3] == 0.0 && v[K4] == 0.0 && v[T1] == 0.0 && v[T2] == 0.0) {
+        lens.model = CAMERA_DIVISION;
+        (*division_count)++;
+    }
     snprintf(place, sizeof place, "line %zu", number);
     return frame_list_add(list, m, &lens, cell[table->place[NAME]], place, NULL, err);
 }
@@ -125,17 +130,23 @@ static enum status read_table(const struct source_place *place, struct frames *t
     enum status status = listing_text(place->listing, place->found, MAX_CSV_BYTES, &text, &own);
     const char *at = text ? text : "";
     bool has_header = false; /* "#cameras N" may come before it */
+    size_t division_count = 0;
     for (size_t number = 1; status == STATUS_OK && (line = line_take(&at)) != NULL; number++) {
         char *header = has_header ? NULL : strstr(line, "#name");
         if (header) {
             status = read_header(header, place->found, &table, &own);
             has_header = true;
         } else if (has_header && line[strspn(line, " \t,")] != '\0') {
-            status = read_row(line, number, &table, &list, &own);
+            status = read_row(line, number, &table, &list, &division_count, &own);
         }
         mem_free(line);
     }
     mem_free(text);
+    if (division_count > 0)
+        findings_warning(f,
+                         "%s: %zu lenses have k1 alone and are taken for RealityCapture's division model, since its "
+                         "Brown models have three coefficients; the XMP files say which it is",
+                         place->found, division_count);
     photo_folder_settle(place->listing, place->base, false, t, f);
     return findings_settle(f, place->found, status, &own, err);
 }
@@ -156,18 +167,48 @@ static char *recognise_xmp(const struct listing *l, const char *base) {
     return NULL;
 }
 
-/* A value that is an attribute of rdf:Description or an element in it. */
-static bool take(struct xml_node *description, const char *name, size_t count, double *value) {
+/* The text of an attribute of rdf:Description or an element in it; NULL: neither. */
+static const char *text_of(struct xml_node *description, const char *name) {
     const char *attribute = xml_attribute(description, name);
     struct xml_node *child = xml_child(description, name);
-    const char *text = attribute ? attribute : child ? child->text : NULL;
+    return attribute ? attribute : child ? child->text : NULL;
+}
+
+static bool take(struct xml_node *description, const char *name, size_t count, double *value) {
+    const char *text = text_of(description, name);
     return text && numbers_parse(text, count, value);
+}
+
+/* STATUS_INPUT for what is not modelled. */
+static enum status set_model(struct xml_node *d, const char *name, const double distortion[6], struct lens *lens,
+                             struct error *err) {
+    static const char *const brown[] = {"perspective", "brown3", "brown4", "brown3t2", "brown4t2"};
+    const char *model = text_of(d, "xcr:DistortionModel");
+    double skew = 0.0, aspect = 1.0;
+    take(d, "xcr:Skew", 1, &skew);
+    take(d, "xcr:AspectRatio", 1, &aspect);
+    if (fabs(skew) > 1e-6 || fabs(aspect - 1.0) > 1e-6) {
+        error_set(err, STATUS_INPUT, "%s: a lens with xcr:Skew %.6g and xcr:AspectRatio %.6g is not read", name, skew,
+                  aspect);
+        return error_hint(err, "export undistorted photographs with their cameras");
+    }
+    for (size_t i = 0; i < sizeof brown / sizeof *brown; i++)
+        if (!model || strcasecmp(model, brown[i]) == 0)
+            return STATUS_OK;
+    if (strcasecmp(model, "division") != 0)
+        error_set(err, STATUS_INPUT, "%s: the distortion model \"%.40s\" is not read", name, model);
+    else if (distortion[1] != 0.0 || distortion[2] != 0.0 || distortion[3] != 0.0)
+        error_set(err, STATUS_INPUT, "%s: the distortion model \"%.40s\" has more than one coefficient", name, model);
+    else {
+        lens->model = CAMERA_DIVISION;
+        return STATUS_OK;
+    }
+    return error_hint(err, "set RealityCapture's distortion model to Brown3 and align again");
 }
 
 static enum status read_description(struct xml_node *d, const char *photograph, struct frame_list *list,
                                     size_t *unposed_count, struct error *err) {
     double r[3][3], centre[3], focal, u = 0.0, v = 0.0, distortion[6] = {0.0}, m[3][4];
-    const char *model = xml_attribute(d, "xcr:DistortionModel");
     if (!take(d, "xcr:Rotation", 9, r[0]) || !take(d, "xcr:Position", 3, centre) ||
         !take(d, "xcr:FocalLength35mm", 1, &focal)) {
         (*unposed_count)++;
@@ -177,14 +218,9 @@ static enum status read_description(struct xml_node *d, const char *photograph, 
     take(d, "xcr:PrincipalPointV", 1, &v);
     take(d, "xcr:DistortionCoeficients", 6, distortion);
     struct lens lens = make_lens(focal / FILM_WIDTH_MM, u, v, distortion);
-    if (model && strncasecmp(model, "division", 8) == 0) {
-        if (distortion[1] != 0.0 || distortion[2] != 0.0 || distortion[3] != 0.0) {
-            error_set(err, STATUS_INPUT, "%s: the distortion model \"%.40s\" has more than one coefficient", list->name,
-                      model);
-            return error_hint(err, "set RealityCapture's distortion model to Brown3 and align again");
-        }
-        lens.model = CAMERA_DIVISION;
-    }
+    enum status status = set_model(d, list->name, distortion, &lens, err);
+    if (status != STATUS_OK)
+        return status;
     pose_at_centre(r, centre, m);
     return frame_list_add(list, m, &lens, photograph, "xcr:Rotation", NULL, err);
 }
