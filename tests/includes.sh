@@ -59,6 +59,11 @@ forbid server/transport "$engine|server/(http|events|uploads|data|job|worker|adm
     'transport sees net, and of store only users.h'
 forbid server/events "$engine|server/(http|net|uploads|data|worker|admin)/" 'events see transport and store'
 forbid server/http "$engine|server/worker/" 'http never sees the engine or the worker'
+# Within http: jobs and nodes, the resources of several files, stand on what all resources share.
+forbid "$(ls server/http/*.[ch] | grep -v '/routes\.c$' | xargs)" 'server/http/(jobs|nodes)/' \
+    'of http only the route table sees its folders'
+forbid server/http/jobs 'server/http/(nodes/|routes|service|metrics|page)' 'http/jobs sees what resources share'
+forbid server/http/nodes 'server/http/(jobs/|routes|service|metrics|page)' 'http/nodes sees what resources share'
 forbid server/uploads "$engine|server/(http|events|transport|net|job|worker|admin)/" 'uploads see only data and store'
 forbid server/data "$engine|server/(http|events|transport|net|uploads|job|worker|admin)/" 'data sees only store'
 forbid server/admin "$engine|server/(uploads|job|http|events|transport)/|server/net/[^t]" \
@@ -107,7 +112,7 @@ own 'seccomp\.h' server/worker/confine_calls.c
 
 # Paths in the data folder are made in one place. (Of the engine's files only worker knows the names.)
 paths=$(grep -nE 'file_join\([^"]*, "|"(%s/)?(scenes|jobs|uploads|trash)/[%a-zX]|%s/(out|files|archive|previews)/|"(checkpoint\.db|worker\.log|state\.db|admin\.sock)' \
-    server/*.c server/{http,events,transport,net,uploads,data,store,job,node,worker,admin}/*.[ch] | grep -vE '^server/data/layout\.|/manual\.c')
+    server/*.c server/{http,http/jobs,http/nodes,events,transport,net,uploads,data,store,job,node,worker,admin}/*.[ch] | grep -vE '^server/data/layout\.|/manual\.c')
 [ -z "$paths" ] || { printf 'only server/data/layout.c makes paths in the data folder:\n%s\n' "$paths"; bad=1; }
 
 # Each unit and one that it includes, a pair a line.

@@ -2,7 +2,7 @@
  *
  * A file counts against its owner's share from its first byte: as an arrival, then as a part of its job's folder. It is in
  * its place, durably, before its row says so. */
-#include "server/http/job_files.h"
+#include "server/http/jobs/job_files.h"
 
 #include "common/file.h"
 #include "common/mem.h"
@@ -10,7 +10,7 @@
 #include "server/data/trash.h"
 #include "server/http/auth.h"
 #include "server/http/handlers.h"
-#include "server/http/job_reply.h"
+#include "server/http/jobs/job_reply.h"
 #include "server/http/limits.h"
 #include "server/http/scene_body.h"
 #include "server/http/space.h"

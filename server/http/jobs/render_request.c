@@ -1,5 +1,5 @@
 /* render_request.c -- see render_request.h. */
-#include "server/http/render_request.h"
+#include "server/http/jobs/render_request.h"
 
 #include <string.h>
 #include <unistd.h>
@@ -9,7 +9,7 @@
 #include "common/render_settings.h"
 #include "common/utf8.h"
 #include "server/data/work_file.h"
-#include "server/http/job_request.h"
+#include "server/http/jobs/job_request.h"
 #include "server/transport/problem.h"
 
 #define VIEWS "views.json"              /* the cameras of a reconstruction's held-out views, as an output */

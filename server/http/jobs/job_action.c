@@ -4,7 +4,7 @@
 #include "server/http/auth.h"
 #include "server/http/extension.h"
 #include "server/http/handlers.h"
-#include "server/http/job_reply.h"
+#include "server/http/jobs/job_reply.h"
 #include "server/transport/problem.h"
 
 static struct response *act(struct api *api, const struct request *r,

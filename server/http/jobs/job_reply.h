@@ -1,6 +1,6 @@
 /* job_reply.h -- the reply that shows a job: its JSON view, with its revision as ETag. */
-#ifndef UNBAKE_HTTP_JOB_REPLY_H
-#define UNBAKE_HTTP_JOB_REPLY_H
+#ifndef UNBAKE_HTTP_JOBS_JOB_REPLY_H
+#define UNBAKE_HTTP_JOBS_JOB_REPLY_H
 
 #include "server/http/api.h"
 #include "server/transport/message.h"

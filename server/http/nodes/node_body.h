@@ -1,10 +1,10 @@
 /* node_body.h -- the body of a PUT by a node, a file of its attempt, on its way to disk: under a name that nobody reads
  * until it is whole and has the digest that Repr-Digest gives. */
-#ifndef UNBAKE_HTTP_NODE_BODY_H
-#define UNBAKE_HTTP_NODE_BODY_H
+#ifndef UNBAKE_HTTP_NODES_NODE_BODY_H
+#define UNBAKE_HTTP_NODES_NODE_BODY_H
 
 #include "server/http/api.h"
-#include "server/http/node.h"
+#include "server/http/nodes/node.h"
 #include "server/transport/message.h"
 
 /* Start of the body of r: sets r->upload, or refuses with a reply. The request's key has been checked. */

@@ -1,5 +1,5 @@
 /* job_request.c -- see job_request.h. */
-#include "server/http/job_request.h"
+#include "server/http/jobs/job_request.h"
 
 #include <limits.h>
 #include <math.h>

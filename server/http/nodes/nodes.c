@@ -10,7 +10,7 @@
 #include "common/protocol.h"
 #include "server/data/layout.h"
 #include "server/http/handlers.h"
-#include "server/http/node.h"
+#include "server/http/nodes/node.h"
 #include "server/transport/body.h"
 #include "server/transport/problem.h"
 

@@ -1,7 +1,7 @@
 /* node.h -- who asks in the name of an attempt: the node that runs it (server/node), which shows the attempt's own token
  * and says which claimant it is. No user's token opens these routes, and an attempt's opens no others. */
-#ifndef UNBAKE_HTTP_NODE_H
-#define UNBAKE_HTTP_NODE_H
+#ifndef UNBAKE_HTTP_NODES_NODE_H
+#define UNBAKE_HTTP_NODES_NODE_H
 
 #include "server/http/api.h"
 #include "server/store/remote.h"

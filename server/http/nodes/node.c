@@ -1,5 +1,5 @@
 /* node.c -- see node.h. */
-#include "server/http/node.h"
+#include "server/http/nodes/node.h"
 
 #include <limits.h>
 #include <stdio.h>

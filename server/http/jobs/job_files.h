@@ -1,6 +1,6 @@
 /* job_files.h -- PUT /v1/jobs/{job}/files/{name}: files that a job's settings name, sent before it begins. */
-#ifndef UNBAKE_HTTP_JOB_FILES_H
-#define UNBAKE_HTTP_JOB_FILES_H
+#ifndef UNBAKE_HTTP_JOBS_JOB_FILES_H
+#define UNBAKE_HTTP_JOBS_JOB_FILES_H
 
 #include "server/http/api.h"
 #include "server/transport/message.h"

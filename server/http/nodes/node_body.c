@@ -1,5 +1,5 @@
 /* node_body.c -- see node_body.h. */
-#include "server/http/node_body.h"
+#include "server/http/nodes/node_body.h"
 
 #include <string.h>
 

@@ -1,5 +1,5 @@
 /* job_reply.c -- see job_reply.h. */
-#include "server/http/job_reply.h"
+#include "server/http/jobs/job_reply.h"
 
 #include <stdio.h>
 

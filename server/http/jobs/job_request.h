@@ -1,6 +1,6 @@
 /* job_request.h -- the body of POST /v1/jobs or of PATCH /v1/jobs/ID. */
-#ifndef UNBAKE_HTTP_JOB_REQUEST_H
-#define UNBAKE_HTTP_JOB_REQUEST_H
+#ifndef UNBAKE_HTTP_JOBS_JOB_REQUEST_H
+#define UNBAKE_HTTP_JOBS_JOB_REQUEST_H
 
 #include <stdbool.h>
 #include <stdint.h>

@@ -1,6 +1,6 @@
 /* render_request.h -- the settings of a render in POST /v1/jobs: checked, and what they mean beforehand. */
-#ifndef UNBAKE_HTTP_RENDER_REQUEST_H
-#define UNBAKE_HTTP_RENDER_REQUEST_H
+#ifndef UNBAKE_HTTP_JOBS_RENDER_REQUEST_H
+#define UNBAKE_HTTP_JOBS_RENDER_REQUEST_H
 
 #include "common/json.h"
 #include "server/http/api.h"

@@ -17,8 +17,8 @@
 #include "server/data/work_file.h"
 #include "server/http/file_reply.h"
 #include "server/http/handlers.h"
-#include "server/http/node.h"
-#include "server/http/node_body.h"
+#include "server/http/nodes/node.h"
+#include "server/http/nodes/node_body.h"
 #include "server/net/field.h"
 #include "server/transport/problem.h"
 
