@@ -10,8 +10,15 @@
 #include "common/render_settings.h"
 #include "common/settings.h"
 
+const struct client_option version_options[] = {
+    {"verbose", 'v', OPTION_FLAG, NULL, "all libraries, a line each"},
+    FORMAT_OPTION,
+    {0},
+};
+
 const struct client_option settings_options[] = {
     {"kind", 'k', OPTION_TEXT, "KIND", "of which jobs: reconstruct (the default) or render"},
+    FORMAT_OPTION,
     {0},
 };
 
@@ -37,7 +44,7 @@ void setting_default(struct buf *out, const cJSON *setting) {
 }
 
 static void print_settings(struct client *c, const cJSON *items) {
-    static const char *const headings[] = {"setting", ">default", "values", "meaning"};
+    static const char *const headings[] = {"setting", ">default", "~values", "|meaning"};
     struct table t;
     const cJSON *setting;
     table_init(&t, 4, headings);
@@ -140,6 +147,7 @@ static void print_versions_json(struct client *c, const cJSON *server) {
     cJSON *object = cJSON_CreateObject(), *client = cJSON_CreateObject();
     cJSON *libraries = cJSON_CreateObject();
     json_add_string(client, "version", UNBAKE_VERSION);
+    json_add_string(client, "api", PROTOCOL_API);
     json_add_string(libraries, "libcurl", request_library_version());
     json_add_string(libraries, "libarchive", archive_version_details());
     json_add(client, "libraries", libraries);
@@ -149,9 +157,34 @@ static void print_versions_json(struct client *c, const cJSON *server) {
     cJSON_Delete(object);
 }
 
+static void print_client_verbose(struct client *c) {
+    field_print(c, "unbake", UNBAKE_VERSION);
+    field_print(c, "  API", PROTOCOL_API);
+    field_print(c, "  libcurl", request_library_version());
+    field_print(c, "  libarchive", archive_version_details());
+}
+
+static void print_server_verbose(struct client *c, const cJSON *server) {
+    const cJSON *library;
+    field_print(c, "unbaked", member_text(server, "version"));
+    field_print(c, "  at", request_server(c->request));
+    field_print(c, "  API", member_text(server, "api"));
+    cJSON_ArrayForEach(library, cJSON_GetObjectItemCaseSensitive(server, "libraries")) {
+        char *name = mem_printf("  %s", member_name(library));
+        field_print(c, name, cJSON_IsString(library) ? library->valuestring : "?");
+        mem_free(name);
+    }
+}
+
+/* Differing versions are no fault: within an API version servers and clients of any versions fit. */
+static void note_difference(struct client *c, const cJSON *server) {
+    if (strcmp(member_text(server, "api"), PROTOCOL_API) != 0)
+        client_note(c, "this client speaks API %s, the server %.40s", PROTOCOL_API, member_text(server, "api"));
+}
+
 /* An unreachable server is part of the answer, not a failure. */
 int version_run(struct client *c, const struct options *o) {
-    (void)o;
+    bool verbose = options_flag(o, "verbose");
     struct reply reply;
     struct error err;
     reply_init(&reply);
@@ -163,11 +196,16 @@ int version_run(struct client *c, const struct options *o) {
     else if (c->json)
         print_versions_json(c, reply.json);
     else {
-        printf("unbake %s, libcurl %s, %s\n", UNBAKE_VERSION, request_library_version(), archive_version_details());
+        if (verbose)
+            print_client_verbose(c);
+        else
+            printf("unbake %s, libcurl %s, %s\n", UNBAKE_VERSION, request_library_version(), archive_version_details());
         if (status == STATUS_OK)
-            print_server(c, reply.json);
+            (verbose ? print_server_verbose : print_server)(c, reply.json);
         else
             client_say(c, "%s", err.message);
+        if (status == STATUS_OK)
+            note_difference(c, reply.json);
     }
     reply_release(&reply);
     return code;

@@ -12,6 +12,7 @@
 const struct client_option check_options[] = {
     ROOM_OPTIONS,
     {"pictures", 0, OPTION_TEXT, "DIR", "keep the pictures of the check there: the mesh over photographs, a plan"},
+    FORMAT_OPTION,
     {0},
 };
 

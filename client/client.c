@@ -133,6 +133,12 @@ void field_print(struct client *c, const char *name, const char *value) {
 }
 
 void client_print_json(struct client *c, const cJSON *value) {
+    const cJSON *item;
+    if (c->format == FORMAT_JSONL && cJSON_IsArray(value)) {
+        cJSON_ArrayForEach(item, value)
+            client_print_json(c, item);
+        return;
+    }
     char *text = json_text(value);
     fprintf(c->out.out, "%s\n", text);
     fflush(c->out.out);

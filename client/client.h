@@ -5,6 +5,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "client/format.h"
 #include "client/options.h"
 #include "client/terminal.h"
 #include "common/error.h"
@@ -14,14 +15,16 @@
 /* Exit statuses: part of the interface, listed in the help and in README.md. */
 enum client_exit {
     CLIENT_OK = 0,
-    CLIENT_JOB_FAILED = 1,   /* the job that was watched failed or was cancelled */
-    CLIENT_USAGE = 2,        /* the command line is at fault */
-    CLIENT_NOT_FOUND = 3,    /* no such job, scene or output */
-    CLIENT_REFUSED = 4,      /* the server refused and said why */
-    CLIENT_UNREACHABLE = 5,  /* no answer from the server, after several tries */
-    CLIENT_CONFLICT = 6,     /* the current state of the job or scene forbids it */
-    CLIENT_LOCAL = 7,        /* a file here cannot be read or written */
-    CLIENT_INTERRUPTED = 130 /* Ctrl-C; a submitted job goes on */
+    CLIENT_JOB_FAILED = 1,    /* the job that was watched failed or was cancelled */
+    CLIENT_USAGE = 2,         /* the command line is at fault */
+    CLIENT_NOT_FOUND = 3,     /* no such job, scene or output */
+    CLIENT_REFUSED = 4,       /* the server refused and said why */
+    CLIENT_UNREACHABLE = 5,   /* no answer from the server, after several tries */
+    CLIENT_CONFLICT = 6,      /* the current state of the job or scene forbids it */
+    CLIENT_LOCAL = 7,         /* a file here cannot be read or written */
+    CLIENT_JOB_CANCELLED = 8, /* `wait`: no job failed, but one was cancelled */
+    CLIENT_TIME_OVER = 9,     /* `wait`: the time was over before the jobs were */
+    CLIENT_INTERRUPTED = 130  /* Ctrl-C; a submitted job goes on */
 };
 
 #define CLIENT_RETRY_SEC 3.0
@@ -30,7 +33,9 @@ struct client {
     struct http_request *request;
     struct terminal out; /* stdout: results */
     struct terminal err; /* stderr: progress of transfers, messages */
-    bool json, quiet;
+    enum client_format format;
+    bool json; /* format is not FORMAT_TEXT */
+    bool quiet;
     double retry_sec; /* --retry; negative: each command's own default */
 };
 
@@ -50,6 +55,8 @@ const struct command *command_table(size_t *count);
 /* The options that every command takes. */
 extern const struct client_option command_shared_options[];
 const struct command *command_find(const char *name);
+/* Whether it asks no server: c->request is NULL then. */
+bool command_is_local(const struct command *command);
 /* Exit statuses for the help; ends with a NULL meaning. */
 extern const struct command_exit {
     int status;
@@ -72,7 +79,7 @@ void client_say(struct client *c, const char *format, ...) __attribute__((format
 /* Prints "name       value" to stdout, with control characters removed; nothing if the value is "". */
 void field_print(struct client *c, const char *name, const char *value);
 
-/* A line of JSON to stdout. */
+/* A line of JSON to stdout; of an array with FORMAT_JSONL a line an item. */
 void client_print_json(struct client *c, const cJSON *value);
 
 /* The job's number from a word: the number itself, or `last` for the newest job. */

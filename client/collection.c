@@ -12,6 +12,7 @@ const struct client_option collection_options[] = {
     {"limit", 'n', OPTION_WHOLE, "N", "list at most so many (20); 0: all"},
     {"dry-run", 0, OPTION_FLAG, NULL, "with rm: only say what would be removed"},
     KEEPING_OPTIONS,
+    FORMAT_OPTION,
     {0},
 };
 

@@ -14,7 +14,8 @@
 static const struct client_option no_options[] = {{0}};
 
 const struct client_option command_shared_options[] = {
-    {"server", 0, OPTION_TEXT, "URL", "where unbaked listens; else $UNBAKE_SERVER, else " PROTOCOL_DEFAULT_SERVER},
+    {"server", 0, OPTION_TEXT, "URL|NAME",
+     "where unbaked listens, or a name of ~/.config/unbake/config; else $UNBAKE_SERVER, else that file's, else " PROTOCOL_DEFAULT_SERVER},
     {"ca", 0, OPTION_TEXT, "FILE", "certificates (PEM) to trust for https; else $UNBAKE_CA, else the system's"},
     {"json", 0, OPTION_FLAG, NULL, "print JSON, also for errors (those go to stderr)"},
     {"quiet", 'q', OPTION_FLAG, NULL, "print only results: no progress, no remarks"},
@@ -51,10 +52,11 @@ static const struct command table[] = {
     {"evaluate", "JOB", "compare a reconstruction with the truth of its room",
      "The room must have come with it: truth/ beside its photographs, as `unbaked demo` writes it.\n",
      "  unbake evaluate 17 -o figures\n", 1, 1, evaluate_options, evaluate_run},
-    {"list", "", "list jobs, newest first", "", "  unbake list\n  unbake list --state failed --limit 5\n", 0, 0,
-     list_options, list_run},
+    {"list", "", "list jobs, newest first", "",
+     "  unbake list\n  unbake list --state failed --limit 5\n  unbake list -o jsonl | jq -r '[.id, .name] | @tsv'\n", 0,
+     0, list_options, list_run},
     {"show", "JOB", "show one job: state, settings, outputs", "",
-     "  unbake show 17\n  unbake show last --json | jq .settings\n", 1, 1, no_options, show_run},
+     "  unbake show 17\n  unbake show last -o json | jq .settings\n", 1, 1, show_options, show_run},
     {"watch", "JOB", "follow a job until it ends",
      "On a terminal one line shows stage, progress, numbers and time left; on a pipe a line is\n"
      "printed when something changes, and every 10 s. When the server restarts, watching\n"
@@ -63,6 +65,14 @@ static const struct command table[] = {
      "its environment.\n",
      "  unbake watch last\n  unbake watch 17 --exec 'notify-send \"$UNBAKE_NAME: $UNBAKE_STATE\"'\n  unbake watch 17 --json --all | jq -c 'select(.event == \"metric\").data'\n",
      1, 1, watch_options, watch_run},
+    {"wait", "JOB...", "wait until jobs have ended, for scripts",
+     "Ends with 0 when all have succeeded, with 1 when one has failed, else with 8 when one was cancelled, and with 9\n"
+     "when --timeout was over before. A line is printed for each job as it ends. Jobs that are paused are waited for.\n",
+     "  unbake wait 17 18 19 && unbake get 19\n  unbake wait last --timeout 3600 -q\n", 1, ANY_NUMBER, wait_options,
+     wait_run},
+    {"open", "[JOB]", "show a job's page in a browser",
+     "Takes $BROWSER, else what the desktop opens web pages with. The address is printed, also where there is no browser.\n",
+     "  unbake open last\n  unbake open 17 --print\n", 0, 1, open_options, open_run},
     {"logs", "JOB", "print the job's log", "", "  unbake logs 17\n  unbake logs last --follow\n", 1, 1, logs_options,
      logs_run},
     {"get", "JOB [NAME...]", "fetch a job's outputs, also while it runs",
@@ -114,8 +124,13 @@ static const struct command table[] = {
     {"settings", "[NAME...]", "list what --set can set, with ranges and defaults", "",
      "  unbake settings\n  unbake settings texture_size\n  unbake settings --kind render\n", 0, ANY_NUMBER,
      settings_options, settings_run},
-    {"version", "", "print the versions of the client and of the server", "", "  unbake version --json\n", 0, 0,
-     no_options, version_run},
+    {"servers", "", "list the servers that have names",
+     "They are in ~/.config/unbake/config (or $XDG_CONFIG_HOME/unbake/config): `server = NAME` names the one that is\n"
+     "taken by default, [NAME] begins a server, with `url`, and where needed `ca` (certificates to trust) and\n"
+     "`token_file` (a file with its token, which nobody else may read). * marks the one that is taken.\n",
+     "  unbake servers\n  unbake list --server lab\n", 0, 0, servers_options, servers_run},
+    {"version", "", "print the versions of the client and of the server", "",
+     "  unbake version -v\n  unbake version -o json\n", 0, 0, version_options, version_run},
     {"manual", "PAGE", "write unbake.1, or the completion for bash or zsh", "",
      "  unbake manual unbake.1 | man -l -\n  source <(unbake manual bash)\n", 1, 1, no_options, manual_run},
 };
@@ -132,6 +147,10 @@ const struct command *command_find(const char *name) {
         if (strcmp(table[i].name, name) == 0)
             return &table[i];
     return NULL;
+}
+
+bool command_is_local(const struct command *command) {
+    return command->run == servers_run || command->run == manual_run;
 }
 
 const char *command_option_help(const struct client_option *option) {
@@ -158,6 +177,8 @@ const struct command_exit command_exit_statuses[] = {
     {CLIENT_UNREACHABLE, "the server cannot be reached"},
     {CLIENT_CONFLICT, "the current state does not allow it"},
     {CLIENT_LOCAL, "a file here cannot be read or written"},
+    {CLIENT_JOB_CANCELLED, "wait: a job was cancelled, none failed"},
+    {CLIENT_TIME_OVER, "wait: the jobs had not ended in time"},
     {CLIENT_INTERRUPTED, "interrupted; a submitted job continues"},
     {0, NULL},
 };

@@ -25,8 +25,20 @@ int logs_run(struct client *c, const struct options *o);
 /* Follows a job to its end. `all`: from its first event on, not from now. */
 int watch_job(struct client *c, int64_t job, bool all);
 
+/* wait.c */
+extern const struct client_option wait_options[];
+int wait_run(struct client *c, const struct options *o);
+
+/* open.c */
+extern const struct client_option open_options[];
+int open_run(struct client *c, const struct options *o);
+
+/* servers.c */
+extern const struct client_option servers_options[];
+int servers_run(struct client *c, const struct options *o);
+
 /* jobs.c */
-extern const struct client_option list_options[], retry_options[], rm_options[];
+extern const struct client_option list_options[], show_options[], retry_options[], rm_options[];
 int list_run(struct client *c, const struct options *o);
 int show_run(struct client *c, const struct options *o);
 int cancel_run(struct client *c, const struct options *o);
@@ -69,7 +81,7 @@ int manual_run(struct client *c, const struct options *o);
  * its default. */
 void setting_values(struct buf *out, const cJSON *setting);
 void setting_default(struct buf *out, const cJSON *setting);
-extern const struct client_option settings_options[];
+extern const struct client_option settings_options[], version_options[];
 int settings_run(struct client *c, const struct options *o);
 int version_run(struct client *c, const struct options *o);
 

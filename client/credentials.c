@@ -14,11 +14,11 @@
 
 #define FILE_MAX_BYTES ((size_t)1 << 20)
 
-char *credentials_path(void) {
+char *credentials_folder_file(const char *name) {
     const char *config = getenv("XDG_CONFIG_HOME"), *home = getenv("HOME");
     if (config && config[0] == '/')
-        return mem_printf("%s/unbake/tokens", config);
-    return home && home[0] == '/' ? mem_printf("%s/.config/unbake/tokens", home) : NULL;
+        return mem_printf("%s/unbake/%s", config, name);
+    return home && home[0] == '/' ? mem_printf("%s/.config/unbake/%s", home, name) : NULL;
 }
 
 /* The file's text, "" where there is none. */
@@ -45,7 +45,7 @@ static bool is_of(const char *line, const char *server, const char **token) {
 
 enum status credentials_find(const char *server, char **token, struct error *err) {
     struct buf text;
-    char *path = credentials_path();
+    char *path = credentials_folder_file("tokens");
     *token = NULL;
     if (!path)
         return STATUS_OK;
@@ -59,6 +59,24 @@ enum status credentials_find(const char *server, char **token, struct error *err
     }
     buf_release(&text);
     mem_free(path);
+    return status;
+}
+
+enum status credentials_read(const char *path, char **token, struct error *err) {
+    struct buf text;
+    *token = NULL;
+    if (access(path, F_OK) != 0)
+        return error_set_errno(err, errno, "cannot read the token in %s", path);
+    enum status status = read_all(path, &text, err);
+    const char *begin = buf_text(&text) + strspn(buf_text(&text), " \t\r\n");
+    size_t length = 0;
+    while (begin[length] > ' ' && begin[length] <= '~') /* what a token may have */
+        length++;
+    if (status == STATUS_OK && (length == 0 || begin[length + strspn(begin + length, " \t\r\n")] != '\0'))
+        status = error_set(err, STATUS_INPUT, "%s does not hold a token, and nothing else", path);
+    if (status == STATUS_OK)
+        *token = mem_strndup(begin, length);
+    buf_release(&text);
     return status;
 }
 
@@ -86,7 +104,7 @@ static enum status replace(const char *path, const struct buf *text, struct erro
 
 enum status credentials_keep(const char *server, const char *token, struct error *err) {
     struct buf text, kept;
-    char *path = credentials_path();
+    char *path = credentials_folder_file("tokens");
     if (!path)
         return error_set(err, STATUS_IO, "there is no home folder to keep a token in: HOME is not set");
     char *dir = mem_strndup(path, (size_t)(strrchr(path, '/') - path));

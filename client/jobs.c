@@ -14,8 +14,11 @@ const struct client_option list_options[] = {
     {"state", 's', OPTION_TEXT, "STATE", "only jobs that are queued, running, paused, succeeded, ..."},
     {"kind", 'k', OPTION_TEXT, "KIND", "only jobs of that kind: reconstruct, render or evaluate"},
     {"limit", 'n', OPTION_WHOLE, "N", "at most so many (20); 0: all"},
+    FORMAT_OPTION,
     {0},
 };
+
+const struct client_option show_options[] = {FORMAT_OPTION, {0}};
 
 const struct client_option retry_options[] = {
     {"from", 0, OPTION_TEXT, "STAGE", "do that stage and all after it anew"},
@@ -56,8 +59,8 @@ static void put_kind(struct table *t, size_t column, const cJSON *job) {
 }
 
 static void print_jobs(struct client *c, const cJSON *items) {
-    static const char *const headings[] = {">job", "state", ">done",    "stage",  ">left",
-                                           ">age", "?kind", ">expires", "?owner", "name"};
+    static const char *const headings[] = {">job", "state", ">done",     "~stage",  "~>left",
+                                           ">age", "?kind", "~>expires", "~?owner", "name"};
     struct table t;
     const cJSON *job;
     table_init(&t, 10, headings);

@@ -8,6 +8,7 @@
 
 #include "client/commands.h"
 #include "client/credentials.h"
+#include "client/servers.h"
 #include "common/mem.h"
 #include "common/nearest.h"
 #include "common/protocol.h"
@@ -44,14 +45,6 @@ static int unknown_command(struct client *c, const char *name) {
     return client_fail(c, NULL, &err);
 }
 
-/* Whether --json is among the words, even if they could not be parsed. */
-static bool asks_for_json(int argc, char *const *argv) {
-    for (int i = 1; i < argc && strcmp(argv[i], "--") != 0; i++)
-        if (strcmp(argv[i], "--json") == 0)
-            return true;
-    return false;
-}
-
 /* Shared options may precede the command (`unbake --json list`): they are moved behind its name. */
 static void put_command_first(int argc, char **argv) {
     int at = 1;
@@ -77,8 +70,9 @@ static int check_words(struct client *c, const struct command *command, const ch
     return client_fail(c, NULL, &err);
 }
 
-/* Sets the request's token for its server, and the certificates to trust. */
-static int present_token(struct client *c, const struct options *o) {
+/* Sets the request's token for its server, and the certificates to trust. `entry`: the server's in the configuration, if
+ * it has a name there. */
+static int present_token(struct client *c, const struct options *o, const struct server_entry *entry) {
     struct error err;
     const char *given = getenv("UNBAKE_TOKEN"), *ca = getenv("UNBAKE_CA");
     char *kept = NULL;
@@ -88,11 +82,15 @@ static int present_token(struct client *c, const struct options *o) {
                       "UNBAKE_TOKEN is not a token: it contains blanks or other characters that no token has");
             return client_fail(c, NULL, &err);
         }
-    ca = options_text(o, "ca", ca && *ca ? ca : NULL);
+    ca = options_text(o, "ca", ca && *ca ? ca : entry ? entry->ca : NULL);
     if (ca)
         request_set_ca(c->request, ca);
-    if ((!given || !*given) && credentials_find(request_server(c->request), &kept, &err) != STATUS_OK)
-        return client_fail(c, NULL, &err);
+    if (!given || !*given) {
+        enum status status = entry && entry->token_file ? credentials_read(entry->token_file, &kept, &err)
+                                                        : credentials_find(request_server(c->request), &kept, &err);
+        if (status != STATUS_OK)
+            return client_fail(c, NULL, &err);
+    }
     request_set_token(c->request, kept ? kept : given && *given ? given : NULL);
     mem_free(kept);
     return CLIENT_OK;
@@ -104,14 +102,12 @@ static const struct request_advice advice = {
     .any = "is unbaked running there? --server URL or UNBAKE_SERVER names another",
 };
 
-static int run(struct client *c, const struct command *command, const struct options *o) {
-    const char *server = getenv("UNBAKE_SERVER");
-    server = options_text(o, "server", server && *server ? server : PROTOCOL_DEFAULT_SERVER);
+static int run_at(struct client *c, const struct command *command, const struct options *o, const char *url,
+                  const struct server_entry *entry) {
     int signal_fd = block_signals();
-    c->retry_sec = options_seconds(o, "retry", -1.0);
-    c->request = request_new(server, c->retry_sec >= 0.0 ? c->retry_sec : CLIENT_RETRY_SEC, signal_fd);
+    c->request = request_new(url, c->retry_sec >= 0.0 ? c->retry_sec : CLIENT_RETRY_SEC, signal_fd);
     request_set_advice(c->request, &advice);
-    int code = present_token(c, o);
+    int code = present_token(c, o, entry);
     if (code == CLIENT_OK)
         code = command->run(c, o);
     request_free(c->request);
@@ -120,12 +116,29 @@ static int run(struct client *c, const struct command *command, const struct opt
     return code;
 }
 
+static int run(struct client *c, const struct command *command, const struct options *o) {
+    struct servers servers;
+    struct error err;
+    const char *url;
+    const struct server_entry *entry;
+    c->retry_sec = options_seconds(o, "retry", -1.0);
+    if (command_is_local(command))
+        return command->run(c, o);
+    enum status status = servers_read(&servers, &err);
+    if (status == STATUS_OK)
+        status = servers_find(&servers, servers_word(o), &url, &entry, &err);
+    int code = status == STATUS_OK ? run_at(c, command, o, url, entry) : client_fail(c, NULL, &err);
+    servers_release(&servers);
+    return code;
+}
+
 /* Finds the command, checks its words and runs it; returns the exit status. */
 static int dispatch(struct client *c, int argc, char **argv) {
     struct options o;
     struct error err;
     put_command_first(argc, argv);
-    c->json = asks_for_json(argc, argv);
+    c->format = format_guess(argc, argv);
+    c->json = c->format != FORMAT_TEXT;
     const char *name = argc > 1 ? argv[1] : "";
     bool help = strcmp(name, "help") == 0;
     if (help && argc > 2) {
@@ -150,7 +163,9 @@ static int dispatch(struct client *c, int argc, char **argv) {
     int code = CLIENT_OK;
     enum status status = options_parse(&o, argc - 2, argv + 2, command->options, command_shared_options, &err);
     if (status == STATUS_OK)
-        c->json = options_flag(&o, "json");
+        status = format_read(&o, &c->format, &err);
+    if (status == STATUS_OK)
+        c->json = c->format != FORMAT_TEXT;
     c->quiet = options_flag(&o, "quiet");
     if (options_flag(&o, "help"))
         command_help(command, stdout);

@@ -70,10 +70,15 @@ static void page_1(void) {
         manual_item(stdout, status, NULL, command_exit_statuses[i].meaning);
     }
     manual_section(stdout, "ENVIRONMENT");
-    manual_item(stdout, "UNBAKE_SERVER", NULL, "the server's URL, else " PROTOCOL_DEFAULT_SERVER);
+    manual_item(stdout, "UNBAKE_SERVER", NULL, "the server's URL, or its name in the configuration");
     manual_item(stdout, "UNBAKE_TOKEN", NULL, "a token, in place of the one that `unbake login` kept");
     manual_item(stdout, "UNBAKE_CA", NULL, "certificates to trust for https, as --ca");
     manual_item(stdout, "NO_COLOR", NULL, "no colours");
+    manual_item(stdout, "BROWSER", NULL, "what `unbake open` shows pages with");
+    manual_section(stdout, "FILES");
+    manual_text(stdout,
+                "~/.config/unbake/config names servers: see `servers`. ~/.config/unbake/tokens holds the tokens "
+                "that `unbake login` keeps. $XDG_CONFIG_HOME replaces ~/.config.\n");
     manual_section(stdout, "SEE ALSO");
     manual_text(stdout, "unbaked(8), unbaked.conf(5)\n");
 }
@@ -111,6 +116,10 @@ static void completion(bool zsh) {
     completion_words(stdout, "--kind");
     for (size_t i = 0; command_job_kinds[i]; i++)
         completion_word(stdout, command_job_kinds[i], "");
+    completion_words_end(stdout);
+    completion_words(stdout, "--format");
+    for (size_t i = 0; format_names[i]; i++)
+        completion_word(stdout, format_names[i], "");
     completion_words_end(stdout);
     completion_words(stdout, "--state");
     for (size_t i = 0; command_job_states[i]; i++)

@@ -11,7 +11,7 @@
 #include "common/protocol.h"
 
 static void print_scenes(struct client *c, const cJSON *items) {
-    static const char *const headings[] = {"scene", "state", "?fit", ">size", ">age", ">expires", "?owner", "name"};
+    static const char *const headings[] = {"scene", "state", "?fit", "~>size", ">age", "~>expires", "~?owner", "name"};
     struct table t;
     const cJSON *scene;
     table_init(&t, 8, headings);

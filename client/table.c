@@ -8,15 +8,22 @@
 #include "common/mem.h"
 
 #define CELL_MAX 4096
+#define LAST_WANTED 16 /* columns: of a name in a list this much tells it from others */
+#define LAST_LEAST 8   /* columns: less is not worth a column */
 
 void table_init(struct table *t, size_t columns, const char *const *headings) {
     assert(columns <= TABLE_COLUMNS);
     *t = (struct table){.columns = columns};
     table_row(t);
     for (size_t i = 0; i < columns; i++) {
-        t->right[i] = headings[i][0] == '>';
-        t->optional[i] = headings[i][0] == '?';
-        table_set(t, i, COLOUR_DIM, "%s", headings[i] + (t->right[i] || t->optional[i]));
+        const char *heading = headings[i];
+        for (; *heading && strchr(">?~|", *heading); heading++) {
+            t->right[i] = t->right[i] || *heading == '>';
+            t->optional[i] = t->optional[i] || *heading == '?';
+            t->lesser[i] = t->lesser[i] || *heading == '~';
+            t->wraps = t->wraps || *heading == '|';
+        }
+        table_set(t, i, COLOUR_DIM, "%s", heading);
     }
 }
 
@@ -58,35 +65,67 @@ void table_set(struct table *t, size_t column, enum colour colour, const char *f
 
 static void put_spaces(FILE *out, size_t count) { fprintf(out, "%*s", (int)count, ""); }
 
-static void print_row(const struct table *t, size_t row, const size_t *width, struct terminal *terminal) {
-    size_t used = 0, edge = terminal->live ? terminal_width(terminal) : 0;
+/* Prints the last cell between column `from` and the edge (0: none), broken at blanks where the table wraps. */
+static void print_last(const struct table *t, const char *text, size_t from, size_t edge, struct terminal *terminal) {
+    size_t room = edge > from + LAST_LEAST ? edge - from : edge ? LAST_LEAST : CELL_MAX;
+    while (t->wraps && strlen(text) > room) { /* no fewer bytes than columns */
+        size_t length = room;
+        while (length > 0 && text[length] != ' ')
+            length--;
+        if (length == 0)
+            break;
+        fprintf(terminal->out, "%.*s\n", (int)length, text);
+        put_spaces(terminal->out, from);
+        text += length + 1;
+    }
+    struct buf cell;
+    buf_init(&cell, CELL_MAX);
+    buf_puts(&cell, text);
+    text_cut(&cell, room);
+    fputs(buf_text(&cell), terminal->out);
+    buf_release(&cell);
+}
+
+static void print_row(const struct table *t, size_t row, const size_t *width, size_t edge, struct terminal *terminal) {
+    size_t used = 0;
     for (size_t i = 0; i < t->columns; i++) {
         if (width[i] == 0)
             continue;
-        struct buf cell;
-        buf_init(&cell, CELL_MAX);
-        buf_puts(&cell, t->cell[row * t->columns + i]);
+        const char *text = t->cell[row * t->columns + i];
         bool last = i + 1 == t->columns;
-        if (last && edge > used + 8)
-            text_cut(&cell, edge - used);
-        size_t columns = text_columns(buf_text(&cell));
-        size_t pad = columns < width[i] ? width[i] - columns : 0;
+        size_t columns = text_columns(text), pad = columns < width[i] ? width[i] - columns : 0;
         enum colour colour = t->colour[row * t->columns + i];
         if (t->right[i])
             put_spaces(terminal->out, pad);
-        const char *on = colour ? terminal_colour(terminal, colour) : "";
-        const char *off = colour ? terminal_colour(terminal, COLOUR_NONE) : "";
-        fprintf(terminal->out, "%s%s%s", on, buf_text(&cell), off);
+        fputs(colour ? terminal_colour(terminal, colour) : "", terminal->out);
+        if (last)
+            print_last(t, text, used, edge, terminal);
+        else
+            fputs(text, terminal->out);
+        fputs(colour ? terminal_colour(terminal, COLOUR_NONE) : "", terminal->out);
         if (!t->right[i] && !last)
             put_spaces(terminal->out, pad);
         fputs(last ? "\n" : "  ", terminal->out);
         used += width[i] + 2;
-        buf_release(&cell);
+    }
+}
+
+/* Omits lesser columns until a last column of a readable width fits before the edge. */
+static void make_room(const struct table *t, size_t *width, size_t edge) {
+    size_t last = t->columns - 1, wanted = width[last] < LAST_WANTED ? width[last] : LAST_WANTED;
+    for (size_t i = t->columns; i-- > 0;) {
+        size_t used = wanted;
+        for (size_t j = 0; j < last; j++)
+            used += width[j] ? width[j] + 2 : 0;
+        if (used <= edge)
+            return;
+        if (t->lesser[i])
+            width[i] = 0;
     }
 }
 
 void table_print(const struct table *t, struct terminal *terminal) {
-    size_t width[TABLE_COLUMNS] = {0};
+    size_t width[TABLE_COLUMNS] = {0}, edge = terminal->live ? terminal_width(terminal) : 0;
     for (size_t i = t->columns; i < t->rows * t->columns; i++) {
         size_t columns = text_columns(t->cell[i]);
         if (columns > width[i % t->columns])
@@ -97,6 +136,8 @@ void table_print(const struct table *t, struct terminal *terminal) {
         if (columns > width[i] && !(t->optional[i] && width[i] == 0))
             width[i] = columns;
     }
+    if (edge)
+        make_room(t, width, edge);
     for (size_t row = 0; row < t->rows; row++)
-        print_row(t, row, width, terminal);
+        print_row(t, row, width, edge, terminal);
 }

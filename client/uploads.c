@@ -6,11 +6,13 @@
 
 const struct client_option collect_options[] = {
     {"dry-run", 0, OPTION_FLAG, NULL, "only say what would be removed"},
+    FORMAT_OPTION,
     {0},
 };
 
 static void print_uploads(struct client *c, const cJSON *items) {
-    static const char *const headings[] = {"upload", ">done", ">size", ">age", ">expires", "scene", "?owner", "name"};
+    static const char *const headings[] = {"upload",    ">done",  "~>size",  "~>age",
+                                           "~>expires", "~scene", "~?owner", "name"};
     struct table t;
     const cJSON *item;
     table_init(&t, 8, headings);
@@ -55,7 +57,7 @@ int uploads_run(struct client *c, const struct options *o) {
 }
 
 static void print_collected(struct client *c, const cJSON *reply, bool dry_run) {
-    static const char *const headings[] = {"kind", "id", ">files", ">size", "expired", "name"};
+    static const char *const headings[] = {"kind", "id", "~>files", ">size", "~expired", "name"};
     struct table t;
     const cJSON *item;
     char size[16];

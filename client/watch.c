@@ -5,15 +5,12 @@
  * SILENCE_SEC. The end of the job, not the end of a stream, ends the watching; what GET says
  * about the job then is its outcome. */
 #include <math.h>
-#include <signal.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include "client/commands.h"
-#include "client/findings.h"
 #include "client/meter.h"
+#include "client/outcome.h"
 #include "client/sse.h"
 #include "client/view.h"
 #include "common/clock.h"
@@ -206,48 +203,6 @@ static enum status follow(struct watch *w, struct reply *reply, struct error *er
 
 /* --- the end ------------------------------------------------------------------------------- */
 
-static void print_rejection(struct client *c, const cJSON *job) {
-    struct reply reply;
-    reply_init(&reply);
-    char *path = mem_printf("/v1/scenes/%s", member_text(job, "scene"));
-    if (request_get(c->request, path, &reply, NULL) == STATUS_OK)
-        findings_print_faults(c, reply.json);
-    mem_free(path);
-    reply_release(&reply);
-}
-
-static void print_outcome(struct client *c, const cJSON *job) {
-    const char *state = member_text(job, "state");
-    double started = time_parse(member_text(job, "started_at"));
-    double finished = time_parse(member_text(job, "finished_at"));
-    long long id = member_whole(job, "id", 0);
-    FILE *out = c->out.out;
-    terminal_clear(&c->out);
-    fprintf(out, "job %lld %s%s%s", id, terminal_colour(&c->out, state_colour(state)), state,
-            terminal_colour(&c->out, COLOUR_NONE));
-    if (isfinite(started) && isfinite(finished)) {
-        char took[16];
-        format_duration(took, finished - started);
-        fprintf(out, " after %s", took);
-    }
-    struct buf text;
-    buf_init(&text, 1 << 16);
-    if (*member_text(job, "reason")) {
-        buf_puts(&text, ": ");
-        terminal_clean(&text, member_text(job, "reason"));
-    }
-    if (*member_text(job, "hint")) {
-        buf_puts(&text, "\n  hint: ");
-        terminal_clean(&text, member_text(job, "hint"));
-    }
-    fprintf(out, "%s\n", buf_text(&text));
-    buf_release(&text);
-    if (strcmp(state, JOB_STATE_SUCCEEDED) == 0)
-        fprintf(out, "fetch its outputs with: unbake get %lld\n", id);
-    else if (strcmp(state, JOB_STATE_FAILED) == 0)
-        print_rejection(c, job);
-}
-
 static int interrupted(struct client *c, int64_t job) {
     struct error err;
     error_set(&err, STATUS_CANCELLED, "interrupted; job %lld continues", (long long)job);
@@ -272,7 +227,7 @@ static int watch_events(struct watch *w, struct client *c, int64_t job, bool all
     if (status == STATUS_OK && !w->only_log) {
         status = client_job_get(c, job, &reply, &err);
         if (status == STATUS_OK && !c->json && !c->quiet)
-            print_outcome(c, reply.json);
+            outcome_print(c, reply.json);
         if (status == STATUS_OK && strcmp(member_text(reply.json, "state"), JOB_STATE_SUCCEEDED) != 0)
             code = CLIENT_JOB_FAILED;
     }
@@ -287,40 +242,6 @@ static int watch_events(struct watch *w, struct client *c, int64_t job, bool all
 
 int watch_job(struct client *c, int64_t job, bool all) { return watch_events(&(struct watch){0}, c, job, all); }
 
-/* Runs a command after the job's end. Returns `code`, the job's own exit status, unless the command cannot be run. */
-static int run_command(struct client *c, int64_t job, const char *command, int code) {
-    struct reply reply;
-    struct error err;
-    sigset_t none;
-    char number[24];
-    int status;
-    reply_init(&reply);
-    if (client_job_get(c, job, &reply, &err) != STATUS_OK) {
-        code = client_fail(c, &reply, &err);
-        reply_release(&reply);
-        return code;
-    }
-    snprintf(number, sizeof number, "%lld", (long long)job);
-    setenv("UNBAKE_JOB", number, 1);
-    setenv("UNBAKE_STATE", member_text(reply.json, "state"), 1);
-    setenv("UNBAKE_NAME", member_text(reply.json, "name"), 1);
-    setenv("UNBAKE_REASON", member_text(reply.json, "reason"), 1);
-    reply_release(&reply);
-    fflush(NULL);
-    pid_t pid = fork();
-    if (pid == 0) { /* main blocks signals; the command needs them */
-        sigemptyset(&none);
-        sigprocmask(SIG_SETMASK, &none, NULL);
-        execl("/bin/sh", "sh", "-c", command, (char *)NULL);
-        _exit(127);
-    }
-    if (pid > 0 && waitpid(pid, &status, 0) == pid && WIFEXITED(status) && WEXITSTATUS(status) < 126)
-        return code;
-    error_set(&err, STATUS_INTERNAL, "--exec: the command could not be run");
-    client_fail(c, NULL, &err);
-    return CLIENT_LOCAL;
-}
-
 int watch_run(struct client *c, const struct options *o) {
     struct reply reply;
     struct error err;
@@ -334,7 +255,7 @@ int watch_run(struct client *c, const struct options *o) {
         return code;
     code = watch_job(c, job, options_flag(o, "all"));
     if (command && (code == CLIENT_OK || code == CLIENT_JOB_FAILED))
-        code = run_command(c, job, command, code);
+        code = outcome_run_command(c, job, command, code);
     return code;
 }
 

@@ -6,6 +6,7 @@
 #define PROTOCOL_DEFAULT_SERVER "http://127.0.0.1:7117"
 
 #define UNBAKE_VERSION "0.1.0"
+#define PROTOCOL_API "v1" /* the first part of every path; names and meanings in it only grow */
 
 /* Event types of GET /v1/jobs/{id}/events. */
 /* A webhook's secret as standardwebhooks.com writes it: this and the base64 of a key of so many bytes. The text of any

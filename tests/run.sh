@@ -27,7 +27,7 @@ unit/test_worker_faults chaos/test_disk_faults"
 slow_tsan="$slow_asan render/test_relight_forms render/test_sampling render/test_sun_caustics
 unit/test_checkpoint_faults unit/test_checkpoint_parts unit/test_export unit/test_store_faults
 api/test_one_job unit/test_attempt_faults unit/test_corrections unit/test_checkpoint unit/test_captures api/test_client_check unit/test_many_photographs unit/test_bundle unit/test_segment
-render/test_detail unit/test_evaluate api/test_metrics
+render/test_detail unit/test_evaluate api/test_metrics api/test_client_scripts
 api/test_http_durable api/test_http_threads api/test_client_commands chaos/test_power_cut chaos/test_daemon_kill
 chaos/test_memory_faults
 $(cd tests && echo fuzz/test_*.c | sed 's/\.c//g')"

@@ -81,7 +81,7 @@ struct response *system_version(struct api *api, struct request *r) {
     cJSON *value = cJSON_CreateObject();
     json_add_string(value, "name", "unbaked");
     json_add_string(value, "version", UNBAKE_VERSION);
-    json_add_string(value, "api", "v1");
+    json_add_string(value, "api", PROTOCOL_API);
     cJSON *libraries = cJSON_AddObjectToObject(value, "libraries");
     for (size_t i = 0; i < api->config.library_count; i++)
         json_add_string(libraries, api->config.libraries[i].name, api->config.libraries[i].version);

@@ -40,7 +40,7 @@ check_links() {
 # --- files, functions, targets ---
 check_names() {
     local name path
-    for name in $(code | sed 's|build/tests/||g' | grep -oE '\b(client|common|config|deploy|server|tests)/[A-Za-z0-9_./*-]*[A-Za-z0-9_/*]' | sort -u); do
+    for name in $(code | sed 's|build/tests/||g; s|~/\.config/[a-z/]*||g' | grep -oE '\b(client|common|config|deploy|server|tests)/[A-Za-z0-9_./*-]*[A-Za-z0-9_/*]' | sort -u); do
         # shellcheck disable=SC2086
         compgen -G "$name" >/dev/null || [ -e "$(dirname "$document")/$name" ] || say "there is no $name"
     done

@@ -14,7 +14,7 @@
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     char *before = NULL, *after = NULL, *other = NULL;
     setenv("XDG_CONFIG_HOME", fuzz_folder(), 1);
-    char *dir = file_join(fuzz_folder(), "unbake"), *path = credentials_path();
+    char *dir = file_join(fuzz_folder(), "unbake"), *path = credentials_folder_file("tokens");
     mkdir(dir, 0700);
     umask(077);
     fuzz_write(path, data, size);
