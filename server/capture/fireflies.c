@@ -23,15 +23,20 @@ static float value_at(const struct photograph *photo, size_t at) {
     return (image_float_from_half(pixel[0]) + image_float_from_half(pixel[1]) + image_float_from_half(pixel[2])) / 3.0f;
 }
 
-/* The brightest of the eight neighbours. */
-static float brightest_neighbour(const struct photograph *photo, long x0, long y0) {
+/* Whether a pixel of that value is more than MIN_RATIO times as bright as each of the eight neighbours; in *brightest,
+ * the brightest of them. Most pixels are known not to be by the first neighbour. */
+static bool outshines(const struct photograph *photo, long x0, long y0, float value, float *brightest) {
     long width = (long)photo->camera.width, height = (long)photo->camera.height;
-    float brightest = 0.0f;
-    for (long y = y0 > 0 ? y0 - 1 : 0; y <= y0 + 1 && y < height; y++)
-        for (long x = x0 > 0 ? x0 - 1 : 0; x <= x0 + 1 && x < width; x++)
+    *brightest = 0.0f;
+    for (long y = y0 > 0 ? y0 - 1 : 0; y <= y0 + 1 && y < height; y++) {
+        for (long x = x0 > 0 ? x0 - 1 : 0; x <= x0 + 1 && x < width; x++) {
             if (x != x0 || y != y0)
-                brightest = fmaxf(brightest, value_at(photo, (size_t)(y * width + x)));
-    return brightest;
+                *brightest = fmaxf(*brightest, value_at(photo, (size_t)(y * width + x)));
+            if (!(value > MIN_RATIO * *brightest))
+                return false;
+        }
+    }
+    return true;
 }
 
 /* Standard deviation of a pixel whose true value is `value`; of 8 bits at least that of black. */
@@ -42,9 +47,9 @@ static float deviation_of(const struct fireflies_job *job, long x, long y, float
 }
 
 static bool is_firefly(const struct fireflies_job *job, long x, long y) {
-    float value = value_at(job->photo, (size_t)(y * (long)job->photo->camera.width + x));
-    float neighbour = brightest_neighbour(job->photo, x, y);
-    return value > MIN_RATIO * neighbour && value - neighbour > NOISE_DEVIATIONS * deviation_of(job, x, y, neighbour);
+    float value = value_at(job->photo, (size_t)(y * (long)job->photo->camera.width + x)), neighbour;
+    return outshines(job->photo, x, y, value, &neighbour) &&
+           value - neighbour > NOISE_DEVIATIONS * deviation_of(job, x, y, neighbour);
 }
 
 static void mark_row(void *user, size_t row, int thread) {
