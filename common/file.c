@@ -221,6 +221,36 @@ enum status file_list(const char *path, char ***names, size_t *count, struct err
     return status;
 }
 
+enum status file_list_numbered(const char *dir, int (*number_of)(const char *name), int **numbers, size_t *count,
+                               struct error *err) {
+    char **names = NULL;
+    size_t name_count = 0;
+    *count = 0;
+    enum status status = file_list(dir, &names, &name_count, err);
+    *numbers = mem_array(name_count + 1, sizeof **numbers);
+    for (size_t i = 0; status == STATUS_OK && i < name_count; i++) {
+        int number = number_of(names[i]);
+        size_t at = number > 0 ? (*count)++ : 0;
+        for (; number > 0 && at > 0 && (*numbers)[at - 1] > number; at--)
+            (*numbers)[at] = (*numbers)[at - 1];
+        if (number > 0)
+            (*numbers)[at] = number;
+    }
+    file_free_names(names, name_count);
+    return status;
+}
+
+bool file_path_is_plain(const char *path) {
+    for (const char *at = path;; at++) {
+        size_t length = strcspn(at, "/");
+        if (length == 0 || (length == 1 && at[0] == '.') || (length == 2 && memcmp(at, "..", 2) == 0))
+            return false;
+        at += length;
+        if (*at == '\0')
+            return true;
+    }
+}
+
 /* Removes what `name` is inside the folder `dir_fd`. `path` is for messages. */
 static enum status remove_at(int dir_fd, const char *name, const char *path, struct error *err) {
     char **names;

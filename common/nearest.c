@@ -47,3 +47,8 @@ void nearest_offer(struct nearest *n, const char *candidate) {
         n->distance = edits;
     }
 }
+
+void nearest_tell(const struct nearest *n, const char *where, const char *kind, struct buf *problems) {
+    buf_printf(problems, "%s: unknown %s \"%s\"%s%s%s\n", where, kind, n->typed, n->best ? "; did you mean " : "",
+               n->best ? n->best : "", n->best ? "?" : "");
+}

@@ -4,6 +4,8 @@
 
 #include <stddef.h>
 
+#include "common/buf.h"
+
 /* Offer every valid name; `best` is then the one with the smallest Levenshtein distance, the first of equals. Names
  * further away than a third of the longer length plus one are not suggested, nor are names of more than 63 bytes; a
  * name that begins with `typed` counts as distance 1. */
@@ -15,5 +17,8 @@ struct nearest {
 
 void nearest_init(struct nearest *n, const char *typed);
 void nearest_offer(struct nearest *n, const char *candidate);
+
+/* Adds the line "WHERE: unknown KIND "TYPED"", and the suggestion if there is one. */
+void nearest_tell(const struct nearest *n, const char *where, const char *kind, struct buf *problems);
 
 #endif

@@ -9,6 +9,7 @@
 
 #include "common/file.h"
 #include "common/mem.h"
+#include "common/assignment.h"
 #include "common/nearest.h"
 #include "server/executor/sites.h"
 #include "server/net/address.h"
@@ -169,8 +170,7 @@ void config_set(struct config *c, const char *name, const char *value, const cha
         nearest_init(&nearest, name);
         for (size_t i = 0; i < TABLE_COUNT; i++)
             nearest_offer(&nearest, table[i].name);
-        buf_printf(problems, "%s: unknown option \"%s\"%s%s%s\n", where, name, nearest.best ? "; did you mean " : "",
-                   nearest.best ? nearest.best : "", nearest.best ? "?" : "");
+        nearest_tell(&nearest, where, "option", problems);
         return;
     }
     char **origin = &c->where[option - table];
@@ -206,28 +206,14 @@ void config_release(struct config *c) {
     }
 }
 
-/* `text` without white space at its ends; changes it. */
-static char *trim(char *text) {
-    text += strspn(text, " \t\r");
-    size_t length = strlen(text);
-    while (length > 0 && strchr(" \t\r", text[length - 1]))
-        length--;
-    text[length] = '\0';
-    return text;
-}
-
 static void read_line(struct config *c, char *line, const char *where, bool *seen, struct buf *problems) {
     line[strcspn(line, "#")] = '\0';
-    line = trim(line);
-    if (*line == '\0')
+    char *name, *value;
+    bool is_one = assignment_split(line, &name, &value);
+    if (!is_one && *name != '\0')
+        buf_printf(problems, "%s: \"%s\" is not of the form name = value\n", where, name);
+    if (!is_one)
         return;
-    char *equals = strchr(line, '=');
-    if (!equals) {
-        buf_printf(problems, "%s: \"%s\" is not of the form name = value\n", where, line);
-        return;
-    }
-    *equals = '\0';
-    char *name = trim(line), *value = trim(equals + 1);
     const struct config_option *option = find(name);
     if (option && seen[option - table])
         buf_printf(problems, "%s: %s is given twice\n", where, name);

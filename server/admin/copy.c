@@ -16,18 +16,7 @@
 
 #define CHUNK_BYTES ((size_t)1 << 20)
 
-bool copy_path_is_plain(const char *path) {
-    if (!utf8_is_name(path))
-        return false;
-    for (const char *at = path;; at++) {
-        size_t length = strcspn(at, "/");
-        if (length == 0 || (length == 1 && at[0] == '.') || (length == 2 && memcmp(at, "..", 2) == 0))
-            return false;
-        at += length;
-        if (*at == '\0')
-            return true;
-    }
-}
+bool copy_path_is_plain(const char *path) { return utf8_is_name(path) && file_path_is_plain(path); }
 
 static bool give(const struct copy *c, int fd) { return c->owner == (uid_t)-1 || fchown(fd, c->owner, c->group) == 0; }
 

@@ -17,23 +17,10 @@
 /* The numbers of the attempts that have folders, ascending; *numbers is the caller's. */
 static enum status list_attempts(const char *data_dir, int64_t job_id, int **numbers, size_t *count,
                                  struct error *err) {
-    char *dir = layout_job(data_dir, job_id), **names = NULL;
-    size_t name_count = 0;
-    *numbers = NULL;
-    *count = 0;
-    enum status status = file_list(dir, &names, &name_count, err);
+    char *dir = layout_job(data_dir, job_id);
+    enum status status = file_list_numbered(dir, layout_attempt_number, numbers, count, err);
     if (status == STATUS_NOT_FOUND) /* a job that has not begun */
         status = STATUS_OK;
-    *numbers = mem_array(name_count + 1, sizeof **numbers);
-    for (size_t i = 0; status == STATUS_OK && i < name_count; i++) {
-        int number = layout_attempt_number(names[i]);
-        size_t at = number > 0 ? (*count)++ : 0;
-        for (; number > 0 && at > 0 && (*numbers)[at - 1] > number; at--)
-            (*numbers)[at] = (*numbers)[at - 1];
-        if (number > 0)
-            (*numbers)[at] = number;
-    }
-    file_free_names(names, name_count);
     mem_free(dir);
     return status;
 }

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/assignment.h"
 #include "common/file.h"
 #include "common/mem.h"
 #include "common/nearest.h"
@@ -101,35 +102,23 @@ static void unknown_key(const char *name, const char *where, struct buf *problem
     nearest_init(&nearest, name);
     for (size_t i = 0; i < KEY_COUNT; i++)
         nearest_offer(&nearest, keys[i].name);
-    buf_printf(problems, "%s: unknown key \"%s\"%s%s%s\n", where, name, nearest.best ? "; did you mean " : "",
-               nearest.best ? nearest.best : "", nearest.best ? "?" : "");
-}
-
-static char *trim(char *text) {
-    text += strspn(text, " \t\r");
-    size_t length = strlen(text);
-    while (length > 0 && strchr(" \t\r", text[length - 1]))
-        length--;
-    text[length] = '\0';
-    return text;
+    nearest_tell(&nearest, where, "key", problems);
 }
 
 /* One key with its whole value. */
 static void read_entry(struct site *site, char *entry, const char *where, bool *seen, struct buf *problems) {
-    char *equals = strchr(entry, '=');
-    if (!equals) {
-        buf_printf(problems, "%s: \"%s\" is not of the form key = value\n", where, trim(entry));
+    char *name, *value;
+    if (!assignment_split(entry, &name, &value)) {
+        buf_printf(problems, "%s: \"%s\" is not of the form key = value\n", where, name);
         return;
     }
-    *equals = '\0';
-    const char *name = trim(entry);
     for (size_t i = 0; i < KEY_COUNT; i++) {
         if (strcmp(keys[i].name, name) != 0)
             continue;
         if (seen[i])
             buf_printf(problems, "%s: %s is given twice\n", where, name);
         seen[i] = true;
-        set(site, &keys[i], trim(equals + 1), where, problems);
+        set(site, &keys[i], value, where, problems);
         return;
     }
     unknown_key(name, where, problems);
@@ -147,7 +136,7 @@ static void read_entries(struct site *site, const char *path, char **rest, bool 
         bool goes_on = !is_last && (*line == ' ' || *line == '\t') && entry.length > 0;
         if (!is_last && *line == '#')
             continue;
-        if (!goes_on && entry.length > 0 && *trim(entry.data)) {
+        if (!goes_on && entry.length > 0 && *assignment_trim(entry.data)) {
             char *where = mem_printf("%s:%zu", path, begun);
             read_entry(site, entry.data, where, seen, problems);
             mem_free(where);
@@ -157,7 +146,7 @@ static void read_entries(struct site *site, const char *path, char **rest, bool 
             begun = number;
         }
         if (!is_last)
-            buf_printf(&entry, "%s%s", goes_on ? " " : "", trim(line));
+            buf_printf(&entry, "%s%s", goes_on ? " " : "", assignment_trim(line));
     }
     buf_release(&entry);
 }

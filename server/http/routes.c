@@ -12,6 +12,7 @@
 #include "server/http/nodes/node_body.h"
 #include "server/http/scene_body.h"
 #include "server/http/upload_body.h"
+#include "server/http/whole_body.h"
 #include "server/net/field.h"
 #include "server/transport/problem.h"
 #include "server/uploads/upload.h"
@@ -257,7 +258,7 @@ static struct response *take(struct api *api, struct request *r, const void *dat
         if (upload_bytes(r->upload) + length > api->config.max_upload_bytes)
             return too_large(r, api->config.max_upload_bytes);
         return r->route->body == ROUTE_BODY_FILE ? node_body_data(api, r, data, length)
-                                                 : scene_body_data(api, r, data, length);
+                                                 : whole_body_data(api, r, data, length);
     }
     if (r->patch)
         return upload_body_data(api, r, data, length);

@@ -11,7 +11,7 @@
 #include "server/http/handlers.h"
 #include "server/http/limits.h"
 #include "server/http/retention.h"
-#include "server/http/scene_body.h"
+#include "server/http/whole_body.h"
 #include "server/http/scene_reading.h"
 #include "server/http/space.h"
 #include "server/http/views.h"
@@ -70,7 +70,7 @@ struct response *scenes_list(struct api *api, struct request *r) {
 
 struct response *scenes_add(struct api *api, struct request *r) {
     char id[SHA256_HEX_SIZE], name[13];
-    struct response *refusal = scene_body_end(r, id);
+    struct response *refusal = whole_body_end(r, id);
     if (refusal)
         return refusal;
     const char *given = target_query(&r->target, "name");

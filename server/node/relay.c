@@ -157,7 +157,7 @@ static enum status send_output(struct relay *r, const cJSON *line, bool *is_sent
     int fd;
     *is_sent = false;
     if (json_string(line, "name", "a line", "", &name, NULL) != STATUS_OK ||
-        json_string(line, "sha256", "a line", "", &wanted, NULL) != STATUS_OK || !scene_cache_is_name(name) ||
+        json_string(line, "sha256", "a line", "", &wanted, NULL) != STATUS_OK || !file_path_is_plain(name) ||
         work_file_open_output(r->data_dir, r->job_id, r->number, name, &fd, NULL) != STATUS_OK)
         return STATUS_OK;
     enum status status = send_open(r, fd, "outputs", name, "", wanted, is_sent, err);

@@ -20,17 +20,6 @@
 
 /* --- one file --------------------------------------------------------------------------------- */
 
-bool scene_cache_is_name(const char *name) {
-    for (const char *at = name;; at++) {
-        size_t length = strcspn(at, "/");
-        if (length == 0 || (length == 1 && at[0] == '.') || (length == 2 && memcmp(at, "..", 2) == 0))
-            return false;
-        at += length;
-        if (*at == '\0')
-            return true;
-    }
-}
-
 static enum status read_file_entry(const cJSON *file, const char **name, uint64_t *bytes, const char **sha256,
                                    struct error *err) {
     double number;
@@ -39,7 +28,7 @@ static enum status read_file_entry(const cJSON *file, const char **name, uint64_
         status = json_string(file, "sha256", "the list of files", "", sha256, err);
     if (status == STATUS_OK)
         status = json_number(file, "bytes", "the list of files", -1.0, &number, err);
-    if (status == STATUS_OK && (!scene_cache_is_name(*name) || !(number >= 0.0 && number <= 0x1p53)))
+    if (status == STATUS_OK && (!file_path_is_plain(*name) || !(number >= 0.0 && number <= 0x1p53)))
         status = error_set(err, STATUS_INPUT, "the list of files names \"%.100s\" with %g bytes", *name, number);
     *bytes = status == STATUS_OK ? (uint64_t)number : 0;
     return status;

@@ -46,7 +46,5 @@ void cached_scene_release(struct cached_scene *scene);
  * once where they are wrong. */
 enum status scene_cache_fetch_file(const char *path, const cJSON *file, const struct scene_source *source,
                                    struct error *err);
-/* Whether a name of a list stays below the folder that it is joined to. */
-bool scene_cache_is_name(const char *name);
 
 #endif

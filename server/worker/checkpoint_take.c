@@ -26,25 +26,6 @@ struct taking {
     void *bytes;       /* of one tile */
 };
 
-/* The numbers of the parts in the folder, ascending; the caller's. */
-static enum status list_parts(const char *dir, int **numbers, size_t *count, struct error *err) {
-    char **names = NULL;
-    size_t name_count = 0;
-    *count = 0;
-    enum status status = file_list(dir, &names, &name_count, err);
-    *numbers = mem_array(name_count + 1, sizeof **numbers);
-    for (size_t i = 0; status == STATUS_OK && i < name_count; i++) {
-        int number = layout_part_number(names[i]);
-        size_t at = number > 0 ? (*count)++ : 0;
-        for (; number > 0 && at > 0 && (*numbers)[at - 1] > number; at--)
-            (*numbers)[at] = (*numbers)[at - 1];
-        if (number > 0)
-            (*numbers)[at] = number;
-    }
-    file_free_names(names, name_count);
-    return status;
-}
-
 static enum status open_part(const struct taking *t, int number, struct part_head *head, struct open_part *part,
                              struct error *err) {
     char *path = layout_part(t->dir, number);
@@ -190,7 +171,7 @@ enum status checkpoint_parts_take(struct checkpoint_file *f, const char *dir, in
     size_t count;
     note[0] = '\0';
     *next = 1;
-    enum status status = list_parts(dir, &numbers, &count, err);
+    enum status status = file_list_numbered(dir, layout_part_number, &numbers, &count, err);
     if (status == STATUS_OK && count > 0) {
         *next = numbers[count - 1] + 1;
         status = begin(&t, numbers[count - 1], &why);

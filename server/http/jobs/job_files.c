@@ -12,8 +12,7 @@
 #include "server/http/handlers.h"
 #include "server/http/jobs/job_reply.h"
 #include "server/http/limits.h"
-#include "server/http/scene_body.h"
-#include "server/http/space.h"
+#include "server/http/whole_body.h"
 #include "server/job/measure.h"
 #include "server/store/job_files.h"
 #include "server/transport/problem.h"
@@ -24,25 +23,12 @@
 struct response *job_files_begin(struct api *api, struct request *r) {
     struct response *refusal = NULL;
     struct error err;
-    uint64_t length = r->content_length > 0 ? (uint64_t)r->content_length : 0;
     int64_t id = auth_job_id(api, r, ACCESS_CHANGE, &refusal);
     if (!refusal && (!r->has_body || r->content_length == 0))
         refusal = problem_full(r, 400, "the body, the file, is missing", "curl -T sky.hdr URL", NULL);
     if (!refusal && store_job_file_check(api->store, id, r->target.segments[NAME_SEGMENT], &err) != STATUS_OK)
         refusal = problem_from(r, &err);
-    if (refusal)
-        return refusal;
-    pthread_mutex_lock(&api->folder.scene_mutex); /* two at once would both find room */
-    refusal = limits_check_file(api, r, length);
-    if (!refusal)
-        refusal = space_check_room(api, r, length);
-    if (!refusal)
-        refusal = space_check_share(api, r, NULL, length);
-    if (!refusal &&
-        upload_new(&r->upload, api->arrivals, r->caller.user_id, api->folder.dir, length, &err) != STATUS_OK)
-        refusal = problem_from(r, &err);
-    pthread_mutex_unlock(&api->folder.scene_mutex);
-    return refusal;
+    return refusal ? refusal : whole_body_begin(api, r, limits_check_file);
 }
 
 /* Moves the file to its place and enters it. The caller holds the mutex. */
@@ -81,7 +67,7 @@ struct response *job_files_put(struct api *api, struct request *r) {
     bool queued = false;
     int64_t id = auth_job_id(api, r, ACCESS_CHANGE, &refusal);
     if (!refusal)
-        refusal = scene_body_end(r, hex);
+        refusal = whole_body_end(r, hex);
     if (refusal)
         return refusal;
     pthread_mutex_lock(&api->folder.scene_mutex); /* job_files.h: one at a time */

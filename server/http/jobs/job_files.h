@@ -5,7 +5,7 @@
 #include "server/http/api.h"
 #include "server/transport/message.h"
 
-/* The head is complete: makes r->upload, or returns the refusal. What arrives goes through scene_body_data. */
+/* The head is complete: makes r->upload, or returns the refusal. What arrives goes through whole_body_data. */
 struct response *job_files_begin(struct api *api, struct request *r);
 
 #endif
