@@ -10,7 +10,7 @@
 #include "common/protocol.h"
 
 const struct client_option check_options[] = {
-    ROOM_OPTIONS,
+    ROOM_OPTIONS(OPTION_TEXT),
     {"pictures", 0, OPTION_TEXT, "DIR", "keep the pictures of the check there: the mesh over photographs, a plan"},
     FORMAT_OPTION,
     {0},
@@ -120,11 +120,18 @@ static int show(struct client_room *room, struct reply *reply, struct error *err
 }
 
 int check_run(struct client *c, const struct options *o) {
-    struct client_room room;
+    const char *scene = options_text(o, "scene", NULL);
+    struct client_room room = {.client = c};
     struct reply reply;
     struct error err;
     reply_init(&reply);
-    enum status status = client_room_open(&room, c, o, &reply, &err);
+    enum status status = STATUS_OK;
+    if ((scene != NULL) == (o->word_count == 1)) {
+        error_set(&err, STATUS_INPUT, scene ? "ROOM and --scene exclude each other" : "missing argument ROOM");
+        status = error_hint(&err, "an example: unbake check living-room/");
+    }
+    if (status == STATUS_OK)
+        status = client_room_open(&room, c, o, scene ? NULL : o->word[0], scene, &reply, &err);
     if (status == STATUS_OK)
         status = check(&room, o, &reply, &err);
     int code = show(&room, &reply, &err, status);

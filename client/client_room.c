@@ -102,21 +102,16 @@ enum status client_room_look(struct client_room *room, struct reply *reply, stru
     return STATUS_OK;
 }
 
-enum status client_room_open(struct client_room *room, struct client *c, const struct options *o, struct reply *reply,
-                             struct error *err) {
-    const char *scene = options_text(o, "scene", NULL);
+enum status client_room_open(struct client_room *room, struct client *c, const struct options *o, const char *path,
+                             const char *scene, struct reply *reply, struct error *err) {
     *room = (struct client_room){.client = c};
-    if ((scene != NULL) == (o->word_count == 1)) {
-        error_set(err, STATUS_INPUT, scene ? "ROOM and --scene exclude each other" : "missing argument ROOM");
-        return error_hint(err, "an example: unbake submit living-room/ --watch");
-    }
     enum status status = read_options(room, o, err);
     if (status != STATUS_OK)
         return status;
     if (scene)
         room->scene = mem_strdup(scene);
     else
-        status = measure(room, o->word[0], err);
+        status = measure(room, path, err);
     if (status == STATUS_OK)
         status = client_room_look(room, reply, err);
     return status == STATUS_NOT_FOUND && reply->code == 404 ? STATUS_OK : status;

@@ -25,16 +25,18 @@ struct client_room {
     struct meter meter;
 };
 
-#define ROOM_OPTIONS                                                                                                   \
-    {"scene", 0, OPTION_TEXT, "SCENE", "a room that is there already, instead of ROOM"}, {                             \
+/* `kind`: OPTION_TEXT, or OPTION_LIST where there may be several. */
+#define ROOM_OPTIONS(kind)                                                                                             \
+    {"scene", 0, kind, "SCENE", "a room that is there already, instead of ROOM"}, {                                    \
         "scene-set", 0, OPTION_LIST, "KEY=VALUE",                                                                      \
             "how the room is to be read: transforms, mesh, axes, mesh_axes, scale, shift, coordinates, lens, "         \
             "distortion or exposures"                                                                                  \
     }
 
-/* ROOM of the command line, or --scene: what is there of it. STATUS_OK also where it is not on the server. */
-enum status client_room_open(struct client_room *room, struct client *c, const struct options *o, struct reply *reply,
-                             struct error *err);
+/* What is there of a room: of the folder or archive at `path`, or of the scene (one of them is NULL), which is to be read
+ * as the options say. STATUS_OK also where it is not on the server. */
+enum status client_room_open(struct client_room *room, struct client *c, const struct options *o, const char *path,
+                             const char *scene, struct reply *reply, struct error *err);
 void client_room_release(struct client_room *room);
 
 /* Asks the server for the scene. */

@@ -26,15 +26,19 @@ const struct client_option command_shared_options[] = {
 };
 
 static const struct command table[] = {
-    {"submit", "ROOM", "upload a room and queue a job on it",
+    {"submit", "ROOM...", "upload rooms and queue a job on each",
      "ROOM is a folder or an archive (.zip, .tar, .tar.gz, .tar.zst) with a mesh, photographs and\n"
      "their cameras. A folder is packed on the fly; hidden files are left out. A room that the\n"
      "server has already is not sent again. With --scene no ROOM is needed. The server checks the room first; a job\n"
-     "on one whose mesh and photographs do not fit is refused, unless it is told --set fit=ignore.\n",
+     "on one whose mesh and photographs do not fit is refused, unless it is told --set fit=ignore.\n\n"
+     "--matrix KEY=A,B queues a job for each value; with several, for each combination. Jobs that are submitted\n"
+     "together have the label `group`; `list --label` and `compare` take it. With --label group=NAME of your own the\n"
+     "same command may be repeated: it queues what is not there yet. A room that fails does not keep the others.\n",
      "  unbake submit living-room/ --watch\n"
      "  unbake submit room.zip --name kitchen --set texture_size=4096 --set seed=7\n"
-     "  unbake submit --scene 3f2a91c0 --set quality=fine --priority 5\n",
-     0, 1, submit_options, submit_run},
+     "  unbake submit --scene 3f2a91c0 --set quality=fine --priority 5\n"
+     "  unbake submit rooms/* --label group=flat --matrix quality=draft,fine --matrix seed=1,2,3\n",
+     0, ANY_NUMBER, submit_options, submit_run},
     {"check", "ROOM", "tell whether the server can work with a room, before any job",
      "The room is sent, once; its content is kept. Shows what was found, whether mesh and photographs fit and,\n"
      "where they do not, how they would. Ends with 4 when the room is rejected, with 6 when it does not fit.\n",
@@ -53,8 +57,14 @@ static const struct command table[] = {
      "The room must have come with it: truth/ beside its photographs, as `unbaked demo` writes it.\n",
      "  unbake evaluate 17 -o figures\n", 1, 1, evaluate_options, evaluate_run},
     {"list", "", "list jobs, newest first", "",
-     "  unbake list\n  unbake list --state failed --limit 5\n  unbake list -o jsonl | jq -r '[.id, .name] | @tsv'\n", 0,
-     0, list_options, list_run},
+     "  unbake list\n  unbake list --state failed --limit 5\n  unbake list -o jsonl | jq -r '[.id, .name] | @tsv'\n"
+     "  unbake cancel $(unbake list --label group=flat --limit 0 -q)\n",
+     0, 0, list_options, list_run},
+    {"compare", "JOB|LABEL...", "show jobs side by side: settings that differ, main figures",
+     "A LABEL is KEY=VALUE, or KEY for all its values: of all jobs that have it. Figures are those of the held-out\n"
+     "photographs (report.json), or of an evaluation; `-` is a setting that was not given. The time is from the first\n"
+     "start to the end.\n",
+     "  unbake compare group=flat\n  unbake compare 17 18 21 --json\n", 1, ANY_NUMBER, compare_options, compare_run},
     {"show", "JOB", "show one job: state, settings, outputs", "",
      "  unbake show 17\n  unbake show last -o json | jq .settings\n", 1, 1, show_options, show_run},
     {"watch", "JOB", "follow a job until it ends",

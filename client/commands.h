@@ -8,6 +8,10 @@
 extern const struct client_option submit_options[];
 int submit_run(struct client *c, const struct options *o);
 
+/* compare.c */
+extern const struct client_option compare_options[];
+int compare_run(struct client *c, const struct options *o);
+
 /* check.c */
 extern const struct client_option check_options[];
 int check_run(struct client *c, const struct options *o);

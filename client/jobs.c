@@ -13,6 +13,7 @@
 const struct client_option list_options[] = {
     {"state", 's', OPTION_TEXT, "STATE", "only jobs that are queued, running, paused, succeeded, ..."},
     {"kind", 'k', OPTION_TEXT, "KIND", "only jobs of that kind: reconstruct, render or evaluate"},
+    {"label", 'l', OPTION_TEXT, "KEY[=VALUE]", "only jobs with that label"},
     {"limit", 'n', OPTION_WHOLE, "N", "at most so many (20); 0: all"},
     FORMAT_OPTION,
     {0},
@@ -91,13 +92,29 @@ static void print_jobs(struct client *c, const cJSON *items) {
     table_release(&t);
 }
 
+/* "/v1/jobs?state=failed&label=a%3Db": of each that is not NULL; the caller's. */
+static char *list_path(const char *state, const char *kind, const char *label) {
+    const char *const names[] = {"state", "kind", "label"}, *const values[] = {state, kind, label};
+    struct buf path;
+    buf_init(&path, 1 << 20);
+    buf_puts(&path, "/v1/jobs");
+    char separator = '?';
+    for (size_t i = 0; i < 3; i++) {
+        if (!values[i])
+            continue;
+        buf_printf(&path, "%c%s=", separator, names[i]);
+        request_escape(&path, values[i], false);
+        separator = '&';
+    }
+    return buf_detach(&path);
+}
+
 int list_run(struct client *c, const struct options *o) {
     const char *state = options_text(o, "state", NULL), *kind = options_text(o, "kind", NULL);
     long limit = options_whole(o, "limit", 20);
     struct reply reply;
     struct error err;
     cJSON *items = NULL;
-    char path[96];
     int code = CLIENT_OK;
     reply_init(&reply);
     enum status status =
@@ -107,12 +124,9 @@ int list_run(struct client *c, const struct options *o) {
     if (limit < 0)
         status = error_set(&err, STATUS_INPUT, "--limit must be 0 or more, not %ld", limit);
     if (status == STATUS_OK) {
-        snprintf(path, sizeof path, "/v1/jobs%s%s%s%s", state ? "?state=" : "", state ? state : "",
-                 !kind   ? ""
-                 : state ? "&kind="
-                         : "?kind=",
-                 kind ? kind : "");
+        char *path = list_path(state, kind, options_text(o, "label", NULL));
         status = client_list(c, path, (size_t)limit, &items, &reply, &err);
+        mem_free(path);
     }
     if (status != STATUS_OK)
         code = client_fail(c, &reply, &err);

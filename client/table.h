@@ -6,7 +6,7 @@
 
 #include "client/terminal.h"
 
-#define TABLE_COLUMNS 10 /* at most */
+#define TABLE_COLUMNS 24 /* at most */
 
 struct table {
     size_t columns;

@@ -10,7 +10,8 @@
 #include "server/store/store.h"
 #include "server/transport/message.h"
 
-#define API_NAME_MAX_BYTES 200 /* of the name that a user gives a scene, an upload or a job */
+#define API_NAME_MAX_BYTES 200  /* of the name that a user gives a scene, an upload or a job */
+#define API_LABEL_MAX_BYTES 100 /* of the name of a label, and of its text */
 
 struct api_library {
     const char *name, *version;

@@ -43,7 +43,7 @@ static const struct route table[] = {
     {METHOD_PATCH, "/v1/uploads/{upload}", ROUTE_USER, uploads_patch, ROUTE_BODY_PATCH, PACE_SLOW, ""},
     {METHOD_DELETE, "/v1/uploads/{upload}", ROUTE_USER, uploads_delete, 0, PACE_SLOW, "dry_run"},
     {METHOD_POST, "/v1/collect", ROUTE_ADMIN, collect_now, 0, PACE_SLOW, "dry_run"},
-    {METHOD_GET, "/v1/jobs", ROUTE_VIEWER, jobs_list, 0, PACE_QUICK, "state kind source limit cursor"},
+    {METHOD_GET, "/v1/jobs", ROUTE_VIEWER, jobs_list, 0, PACE_QUICK, "state kind source label limit cursor"},
     {METHOD_POST, "/v1/jobs", ROUTE_USER, jobs_add, ROUTE_BODY_JSON, PACE_QUICK, "dry_run"},
     {METHOD_GET, "/v1/jobs/{job}", ROUTE_VIEWER, jobs_get, 0, PACE_QUICK, "wait"},
     {METHOD_PATCH, "/v1/jobs/{job}", ROUTE_USER, jobs_patch, ROUTE_BODY_JSON, PACE_QUICK, ""},

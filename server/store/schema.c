@@ -289,7 +289,25 @@ static const char step_20[] =
     "  PRIMARY KEY (job_id, name)"
     ") STRICT, WITHOUT ROWID;";
 
+/* The labels of jobs, to find jobs by. Triggers copy them from jobs.labels, which nothing else has to know. */
+static const char step_21[] =
+    "CREATE TABLE job_labels ("
+    "  label TEXT NOT NULL,"
+    "  value TEXT NOT NULL,"
+    "  job_id INTEGER NOT NULL REFERENCES jobs (id) ON DELETE CASCADE,"
+    "  PRIMARY KEY (label, value, job_id)"
+    ") STRICT, WITHOUT ROWID;"
+    "CREATE INDEX job_labels_by_job ON job_labels (job_id);"
+    "CREATE TRIGGER job_labels_of_new AFTER INSERT ON jobs WHEN new.labels <> '{}' BEGIN"
+    "  INSERT OR IGNORE INTO job_labels SELECT key, value, new.id FROM json_each(new.labels);"
+    "END;"
+    "CREATE TRIGGER job_labels_of_changed AFTER UPDATE OF labels ON jobs WHEN new.labels <> old.labels BEGIN"
+    "  DELETE FROM job_labels WHERE job_id = new.id;"
+    "  INSERT OR IGNORE INTO job_labels SELECT key, value, new.id FROM json_each(new.labels);"
+    "END;"
+    "INSERT OR IGNORE INTO job_labels SELECT key, value, jobs.id FROM jobs, json_each(jobs.labels);";
+
 const char *const schema_steps[] = {step_1,  step_2,  step_3,  step_4,  step_5,  step_6,  step_7,
                                     step_8,  step_9,  step_10, step_11, step_12, step_13, step_14,
-                                    step_15, step_16, step_17, step_18, step_19, step_20};
+                                    step_15, step_16, step_17, step_18, step_19, step_20, step_21};
 const int schema_version = (int)(sizeof schema_steps / sizeof schema_steps[0]);

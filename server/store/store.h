@@ -166,6 +166,8 @@ enum status store_source_free(struct store *store, int64_t id, const char *actio
 struct job_filter {
     int state, kind;   /* -1: all */
     int64_t source_id; /* 0: all */
+    const char *label; /* only jobs that have it; NULL: all */
+    const char *value; /* and this value of it; NULL: any */
 };
 /* Jobs that `who` (NULL: all) may read, newest first; filter NULL: all; before_id 0: from the newest. Fills
  * jobs[limit]. */

@@ -18,7 +18,6 @@
 
 #define PRIORITY_MAX 100
 #define LABELS_MAX 32
-#define LABEL_MAX_BYTES 100
 #define WEBHOOK_SECRET_LEAST 16
 #define WEBHOOK_SECRET_MOST 200
 
@@ -39,8 +38,8 @@ static void read_labels(struct job_request *w, const cJSON *member, cJSON *param
     size_t count = 0;
     bool good = cJSON_IsObject(member);
     for (const cJSON *label = good ? member->child : NULL; label; label = label->next, count++)
-        good = good && cJSON_IsString(label) && strlen(label->valuestring) <= LABEL_MAX_BYTES && *label->string &&
-               strlen(label->string) <= LABEL_MAX_BYTES && utf8_is_name(label->string) &&
+        good = good && cJSON_IsString(label) && strlen(label->valuestring) <= API_LABEL_MAX_BYTES && *label->string &&
+               strlen(label->string) <= API_LABEL_MAX_BYTES && utf8_is_name(label->string) &&
                utf8_is_name(label->valuestring);
     if (good && count <= LABELS_MAX)
         w->labels = json_text(member);
@@ -48,7 +47,7 @@ static void read_labels(struct job_request *w, const cJSON *member, cJSON *param
         problem_param(params, "labels", NULL,
                       "must be an object of at most %d texts, each name and "
                       "text of at most %d bytes without control characters",
-                      LABELS_MAX, LABEL_MAX_BYTES);
+                      LABELS_MAX, API_LABEL_MAX_BYTES);
 }
 
 static void read_priority(struct job_request *w, const cJSON *member, cJSON *params) {

@@ -27,26 +27,40 @@ struct response *jobs_get(struct api *api, struct request *r) {
     return reply;
 }
 
-struct response *jobs_list(struct api *api, struct request *r) {
-    struct response *refusal = NULL;
+/* What the query asks for; or why it cannot. *label is the caller's: the filter borrows it. */
+static struct response *read_filter(const struct request *r, struct job_filter *filter, char **label) {
     const char *state_name = target_query(&r->target, "state"), *kind_name = target_query(&r->target, "kind");
-    const char *source = target_query(&r->target, "source");
-    const char *cursor = target_query(&r->target, "cursor");
+    const char *source = target_query(&r->target, "source"), *labelled = target_query(&r->target, "label");
     enum job_state state = JOB_QUEUED;
     enum job_kind kind = JOB_RECONSTRUCT;
-    struct job_filter filter = {.state = -1, .kind = -1};
-    int64_t before = 0;
+    *filter = (struct job_filter){.state = -1, .kind = -1};
+    *label = NULL;
     if (state_name && !job_state_parse(state_name, &state))
         return problem_full(r, 400, "unknown state", "known: queued, running, paused, succeeded, failed, cancelled",
                             NULL);
     if (kind_name && !job_kind_parse(kind_name, &kind))
         return problem_full(r, 400, "unknown kind", "known: reconstruct, render, evaluate", NULL);
-    if (source && !field_number(source, 1, INT64_MAX, &filter.source_id))
+    if (source && !field_number(source, 1, INT64_MAX, &filter->source_id))
         return problem(r, 400, "source must be the number of a job");
+    if (labelled && (!*labelled || *labelled == '=' || strlen(labelled) > 2 * API_LABEL_MAX_BYTES + 1))
+        return problem(r, 400, "label must be KEY, or KEY=VALUE, of at most %d bytes each", API_LABEL_MAX_BYTES);
     if (state_name)
-        filter.state = (int)state;
+        filter->state = (int)state;
     if (kind_name)
-        filter.kind = (int)kind;
+        filter->kind = (int)kind;
+    if (labelled) {
+        size_t length = strcspn(labelled, "=");
+        filter->label = *label = mem_strndup(labelled, length);
+        filter->value = labelled[length] ? labelled + length + 1 : NULL;
+    }
+    return NULL;
+}
+
+/* One page of jobs. */
+static struct response *list_jobs(struct api *api, struct request *r, const struct job_filter *filter) {
+    struct response *refusal = NULL;
+    const char *cursor = target_query(&r->target, "cursor");
+    int64_t before = 0;
     if (cursor && !field_number(cursor, 1, INT64_MAX, &before))
         return problem(r, 400, "invalid cursor");
     size_t limit = view_limit(r, &refusal), count = 0;
@@ -55,7 +69,7 @@ struct response *jobs_list(struct api *api, struct request *r) {
     struct job *jobs = mem_calloc(limit + 1, sizeof *jobs);
     struct error err;
     /* One row more than asked for shows that there is another page. */
-    if (store_job_list(api->store, &r->caller, &filter, before, limit + 1, jobs, &count, &err) != STATUS_OK) {
+    if (store_job_list(api->store, &r->caller, filter, before, limit + 1, jobs, &count, &err) != STATUS_OK) {
         mem_free(jobs);
         return problem_from(r, &err);
     }
@@ -71,6 +85,15 @@ struct response *jobs_list(struct api *api, struct request *r) {
         job_release(&jobs[i]);
     mem_free(jobs);
     return view_page(r, items, next);
+}
+
+struct response *jobs_list(struct api *api, struct request *r) {
+    struct job_filter filter;
+    char *label;
+    struct response *refusal = read_filter(r, &filter, &label);
+    struct response *reply = refusal ? refusal : list_jobs(api, r, &filter);
+    mem_free(label);
+    return reply;
 }
 
 /* --- changing ---------------------------------------------------------------------------- */
