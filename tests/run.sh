@@ -18,7 +18,7 @@ render/test_held_out_light render/test_saturated_light render/test_short render/
 render/test_fireflies_left_out render/test_grey_card render/test_sun render/test_split api/test_resume api/test_readme
 render/test_emitters render/test_hidden_lamp render/test_changing_light render/test_sky_doubt
 unit/test_outputs_read_back unit/test_fit unit/test_check_pictures api/test_http_faults chaos/test_clock
-api/test_backup api/test_axe api/test_webhook_library
+api/test_backup api/test_axe api/test_page api/test_webhook_library
 chaos/test_start_faults chaos/test_worker_calls chaos/test_worker_kill chaos/test_node api/test_node_site chaos/test_slurm
 api/test_render api/test_retention render/test_calibrate_light unit/test_atlas unit/test_inverse_uv
 unit/test_worker_faults chaos/test_disk_faults"

@@ -4,6 +4,7 @@ import { $, bytes, duration, element, isHis, showEach, showFigures } from "./dom
 import { ask, get, post, send } from "./ask.js";
 import { go } from "./address.js";
 import { drawCurve } from "./curve.js";
+import { Mixer } from "./mixer.js";
 import { Slider, showThumbnails } from "./pictures.js";
 
 const TERMINAL = ["succeeded", "failed", "cancelled"];
@@ -16,6 +17,8 @@ const PICTURE_MOST = 8 << 20; // bytes; larger ones are opened from the list of 
 
 const isComparison = ({ name }) => /^compare\/.*\.png$/.test(name);
 const isThumbnail = ({ name, bytes: size }) => /\.png$/.test(name) && size < PICTURE_MOST && name !== "base_color.png";
+
+const goTo = (job) => go({ job: job.id });
 
 export class JobView {
   // slot: "job" or "with", the part of the address; server: {me, jobs, refresh(id)}
@@ -30,6 +33,7 @@ export class JobView {
   async choose(id) {
     if (id === this.id) return this.show();
     this.id = id;
+    this.mixer?.close();
     this.root?.remove();
     this.root = null;
     if (id === null) return;
@@ -40,7 +44,9 @@ export class JobView {
     this.report = null;
     this.reportVersion = null;
     this.room = null;
+    this.roomRender = null;
     this.slider = new Slider(this.at("compare"));
+    this.mixer = new Mixer(this.at("mixer"), this.server, () => (this.room?.mesh ? this.room.frame() : null), goTo);
     this.at("close").addEventListener("click", () => go({ [this.slot]: null }));
     this.at("log-details").addEventListener("toggle", () => this.showLog());
     this.at("beside").hidden = this.slot !== "job";
@@ -70,6 +76,8 @@ export class JobView {
     this.at("reason").textContent = [job.reason, job.hint].filter(Boolean).join(". ");
     this.showActions(job);
     this.showFigures(job);
+    this.mixer.show(job);
+    this.roomRender?.update();
     const others = [...this.server.jobs.values()].filter((other) => other.id !== job.id).sort((a, b) => b.id - a.id);
     showEach(this.at("beside"), [{ id: "" }, ...others], (o) => o.id, () => element("option", null), (option, o) => {
       option.value = o.id;
@@ -148,12 +156,13 @@ export class JobView {
   async showRoom(job, items) {
     if (!job || !items.some((o) => o.name === "scene.ply")) return;
     if (!this.room) {
-      const { Room } = await import("./room.js"), id = this.id;
-      if (id !== job.id || this.room) return;
+      const [{ Room }, { RoomRender }] = await Promise.all([import("./room.js"), import("./room_render.js")]);
+      if (this.id !== job.id || this.room) return;
       this.room = new Room(this.at("room"), (started) => {
         this.server.jobs.set(started.id, started);
-        go({ job: started.id });
+        goTo(started);
       });
+      this.roomRender = new RoomRender(this.at("room"), this.room, this.server, goTo);
     }
     this.room.up = this.report?.up;
     await this.room.show(job, items, this.report?.segments ?? []);

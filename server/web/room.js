@@ -11,6 +11,7 @@ const TEXTURES = [
   ["preview/base_color.png", "base colour"], ["preview/radiance.png", "measured light"], ["preview/roughness.png", "roughness"],
   ["preview/specular.png", "specular"], ["preview/emission.png", "emission"], ["preview/confidence.png", "confidence"],
 ];
+const WIDTH = 1280;     // pixels of a render from here
 const CLICK_PIXELS = 5; // a press that moves less picks
 const rounded = (list) => list.map((x) => Number(x.toPrecision(3))).join(" ");
 
@@ -125,6 +126,19 @@ export class Room {
     this.mesh.setTexture(output ? this.image : null);
     this.draw();
   }
+
+  // The camera as transforms.json has it, of a picture WIDTH pixels wide.
+  frame() {
+    this.camera.updateMatrixWorld(); // it is drawn later
+    const { camera } = this, h = Math.round(WIDTH / camera.aspect), e = camera.matrixWorld.elements;
+    const focal = 0.5 * h / Math.tan(camera.fov * Math.PI / 360);
+    return { file_path: "room", camera_model: "PINHOLE", w: WIDTH, h, fl_x: focal, fl_y: focal, cx: WIDTH / 2, cy: h / 2,
+      transform_matrix: [0, 1, 2, 3].map((row) => [e[row], e[row + 4], e[row + 8], e[row + 12]]) };
+  }
+
+  get isOutside() { return !this.walk.isWalking; }
+
+  hidden() { return [...Array(this.mesh.segmentCount).keys()].filter((segment) => this.mesh.get(segment, 0) !== 0); }
 
   // --- segments -------------------------------------------------------------------------------
 

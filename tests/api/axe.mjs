@@ -2,29 +2,15 @@
 // report, in a light and in a dark browser: a line for each fault, and pictures of what it looked at.
 //
 // node axe.mjs NODE_MODULES CHROMIUM URL TOKEN REPORT ROOM PICTURES: ROOM-light.tar and ROOM-dark.tar are sent
-import { createRequire } from "node:module";
+import { launch, look as lookAt, modules as loaded } from "./browser.mjs";
 
 const [modules, chromium, url, token, report, room, pictures] = process.argv.slice(2);
-const require = createRequire(`${modules}/x.js`);
-const puppeteer = require("puppeteer-core");
-const axe = require("axe-core");
+const { puppeteer, axe } = loaded(modules);
 
-const browser = await puppeteer.launch({
-  executablePath: chromium, headless: true, args: ["--no-sandbox", "--disable-dev-shm-usage", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
-});
+const browser = await launch(puppeteer, chromium);
 let faults = 0;
 
-async function look(page, name) {
-  await page.screenshot({ path: `${pictures}/${name}.png`, fullPage: true });
-  await page.evaluate(axe.source);
-  const { violations, passes } = await page.evaluate(() => window.axe.run({ resultTypes: ["violations"] }));
-  for (const { id, help, nodes } of violations)
-    for (const node of nodes) {
-      faults++;
-      console.log(`${name}: ${id}: ${help}: ${node.html.slice(0, 200)} ${node.any[0]?.message ?? ""}`);
-    }
-  console.log(`${name}: ${passes.length} rules hold`);
-}
+async function look(page, name) { faults += await lookAt(page, axe, pictures, name); }
 
 // A check that found what a check can find: the server's own finds little to say of a grey cube.
 const PIXEL = Buffer.from("iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg==", "base64");
@@ -142,8 +128,6 @@ async function lookAtAll(scheme) {
   await checkARoom(page, scheme);
   await page.setViewport({ width: 390, height: 800 });
   await look(page, `job-narrow-${scheme}`);
-  if (await page.evaluate(() => document.documentElement.scrollWidth > window.innerWidth))
-    console.log(`job-narrow-${scheme}: wider than the window`, ++faults);
   await page.goto(`file://${report}`);
   await look(page, `report-narrow-${scheme}`);
   await page.setViewport({ width: 1200, height: 900 });

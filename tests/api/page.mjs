@@ -1,0 +1,217 @@
+// page.mjs -- what people do with the web page: lights are mixed and saved, the room is rendered from where it is looked at.
+//
+// node page.mjs NODE_MODULES CHROMIUM URL PICTURES: job 1 is a room with lamps; a line for each fault
+import { launch, look, modules as loaded } from "./browser.mjs";
+
+const [modules, chromium, url, pictures] = process.argv.slice(2);
+const { puppeteer, axe } = loaded(modules), browser = await launch(puppeteer, chromium);
+let faults = 0;
+
+function check(isRight, words) {
+  if (isRight) return;
+  faults++;
+  console.log(`fault: ${words}`);
+}
+
+const get = async (path) => (await fetch(`${url}/v1/${path}`)).json();
+
+async function settled(id) {
+  for (;;) {
+    const job = await get(`jobs/${id}`);
+    if (["succeeded", "failed", "cancelled"].includes(job.state)) return job;
+    await new Promise((done) => setTimeout(done, 100));
+  }
+}
+
+async function open(hash, viewport = { width: 1200, height: 900 }) {
+  const page = await browser.newPage();
+  page.on("pageerror", (error) => check(false, `a script fails: ${error.message}`));
+  await page.setViewport(viewport);
+  await page.goto(`${url}/${hash}`);
+  return page;
+}
+
+// axe-core in a light and in a dark browser, on a wide and on a narrow screen.
+async function lookAll(page, name) {
+  for (const scheme of ["light", "dark"])
+    for (const width of [1400, 390]) {
+      await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: scheme }]);
+      await page.setViewport({ width, height: 900 });
+      faults += await look(page, axe, pictures, `${name}-${scheme}-${width}`);
+    }
+}
+
+// --- the light mixer --------------------------------------------------------------------------
+
+// In the page: the mean of the render of all lights, and of what the mixer shows, linear and as code values.
+const compare = (id) => (async () => {
+  const { readExr } = await import("/web/exr.js"), { Mix } = await import("/web/mix.js");
+  const read = async (name) => readExr(await (await fetch(`/v1/jobs/${id}/outputs/${name}`)).arrayBuffer());
+  const mean = (list) => list.reduce((sum, x) => sum + x, 0) / list.length;
+  const views = await (await fetch(`/v1/jobs/${id}/outputs/views.json`)).json(), { files, noise } = views.frames[0];
+  const whole = await read("00000_radiance.exr"), alone = files.filter(({ pass }) => pass !== "radiance");
+  const sources = await Promise.all(alone.map(({ name }) => read(name))), mix = new Mix(whole.width, whole.height, sources);
+  mix.add(sources.map(() => [1, 1, 1]));
+  const picture = await createImageBitmap(await (await fetch(`/v1/jobs/${id}/outputs/00000_radiance.png`)).blob());
+  const canvas = new OffscreenCanvas(whole.width, whole.height), paint = canvas.getContext("2d");
+  paint.drawImage(picture, 0, 0);
+  const wanted = paint.getImageData(0, 0, whole.width, whole.height).data, shown = new Uint8ClampedArray(wanted.length);
+  new Mix(whole.width, whole.height, [whole]).show([[1, 1, 1]], views.exposure, views.settings.view_transform ?? "srgb", shown);
+  return { noise, lights: alone.map(({ pass }) => pass), whole: mean(whole.rgb), sum: mean(mix.sum),
+    codes: shown.reduce((most, x, i) => Math.max(most, Math.abs(x - wanted[i])), 0) };
+})();
+
+// All lights at 1 are the render of all lights within its noise, and are shown as the server shows it.
+async function compareSum(page) {
+  for (const transform of ["srgb", "filmic"]) {
+    const settings = { per_light: true, format: "both", precision: "half", size: "64x48", spp: 64, view_transform: transform };
+    const { id } = await (await fetch(`${url}/v1/jobs`, { method: "POST", headers: { "Content-Type": "application/json" },
+      body: JSON.stringify({ kind: "render", source: 1, settings }) })).json();
+    const job = await settled(id);
+    check(job.state === "succeeded", `the render of each light: ${job.reason}`);
+    const { noise, lights, whole, sum, codes } = await page.evaluate(compare, id);
+    // The noise is a pixel's; the mean of all has less, and so have the lights that are alone. Half has 11 bits.
+    check(Math.abs(sum / whole - 1) < noise, `${lights}: their sum is ${sum}, not ${whole}`);
+    check(codes <= 1, `${transform}: code values differ by ${codes}`);
+  }
+}
+
+// The settings that lights mean.
+const applied = (before, name, factor) => (async () => {
+  const { applyFactor } = await import("/web/mix.js"), settings = structuredClone(before);
+  applyFactor(settings, name, factor);
+  return settings;
+})();
+async function saveSettings(page) {
+  const cases = [
+    [{}, "light_27", [1, 1, 1], {}],
+    [{}, "light_27", [0, 0, 0], { "light.27": "off" }],
+    [{ "light.27": "2" }, "light_27", [0.5, 1, 0], { "light.27": "1,2,0" }],
+    [{ sky: "off" }, "sky", [2, 2, 2], { sky: "off" }],
+    [{}, "sun", [2, 0.25, 1], { sun: "2,0.25,1" }],
+    [{ "lamp.1.kind": "sphere" }, "lamp_1", [0.5, 0.5, 0.5], { "lamp.1.kind": "sphere", "lamp.1.radiance": "5,5,5" }],
+    [{ "lamp.1.radiance": "1,1,1", "lamp.1.lumen": 800 }, "lamp_1", [0.5, 0.5, 0.5], { "lamp.1.radiance": "0.5,0.5,0.5", "lamp.1.lumen": 400 }],
+    [{ "insert.2.emission": [1, 2, 3] }, "insert_2", [2, 2, 2], { "insert.2.emission": "2,4,6" }],
+  ];
+  for (const [before, name, factor, wanted] of cases) {
+    const found = await page.evaluate(applied, before, name, factor);
+    check(JSON.stringify(found) === JSON.stringify(wanted), `${name} by ${factor}: ${JSON.stringify(found)}`);
+  }
+}
+
+// Eight lights at 640 x 480; a figure to read, since no clock of a shared machine decides a test.
+async function timeMix(page) {
+  const times = await page.evaluate(async () => {
+    const { Mix } = await import("/web/mix.js"), count = 3 * 640 * 480, pixels = new Uint8ClampedArray(4 * 640 * 480), times = [];
+    const mix = new Mix(640, 480, [...Array(8)].map((_, s) => ({ rgb: Float32Array.from({ length: count }, (_, i) => ((i * (s + 7)) % 101) / 200) })));
+    for (let i = 0; i < 9; i++) {
+      const began = performance.now();
+      mix.show(mix.sources.map(() => [1, 0.5, 0.1 * i]), 0.7, "filmic", pixels);
+      times.push(performance.now() - began);
+    }
+    return times.sort((a, b) => a - b);
+  });
+  console.log(`8 lights at 640 x 480 are mixed in ${times[4].toFixed(1)} ms (${times[0].toFixed(1)} to ${times[8].toFixed(1)})`);
+}
+
+const set = (page, selector, value, row = 0) => page.evaluate((selector, value, row) => {
+  const input = document.querySelectorAll(selector)[row];
+  if (input.type === "checkbox") input.checked = value;
+  else input.value = value;
+  input.dispatchEvent(new Event("input", { bubbles: true }));
+}, selector, value, row);
+const meanShown = (page) => page.$eval("#job .mixer-canvas", (canvas) => {
+  const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+  return [0, 1, 2].map((c) => data.reduce((sum, x, i) => sum + (i % 4 === c ? x : 0), 0) / (data.length / 4));
+});
+
+async function openMixer() {
+  const page = await open("#job=1");
+  await page.waitForSelector("#job .mixer:not([hidden])");
+  await page.$eval("#job .mixer", (mixer) => mixer.scrollIntoView());
+  return page;
+}
+
+// Where no light was rendered alone, the page offers it, shows how it goes on, and opens the mixer when it is done.
+async function makeLights() {
+  const page = await openMixer();
+  await page.waitForSelector("#job .mixer-view option");
+  await page.$eval("#job .mixer-small", (button) => button.click());
+  await page.waitForSelector("#job .mixer-progress:not([hidden])");
+  check(await page.$eval("#job .mixer-make", (make) => make.hidden), "what is being made is offered");
+  await page.waitForSelector("#job .mixer-desk:not([hidden])", { timeout: 90000 });
+  await page.close();
+}
+
+// Lights are mixed, and the render that is saved shows what the mixer shows.
+async function mixLights() {
+  const page = await openMixer();
+  await page.waitForSelector("#job .mixer-desk:not([hidden])");
+  const lights = await page.$$eval("#job .mixer-lights fieldset", (rows) => rows.map((row) => row.querySelector("legend").textContent));
+  check(lights.length >= 3, `lights: ${lights}`);
+  const before = await meanShown(page);
+  await set(page, "#job .mixer-lights input[type=checkbox]", false, 0);
+  await set(page, "#job .mixer-lights input[type=range]", 1, 1);
+  await set(page, "#job .mixer-lights input[type=color]", "#ff8000", 2);
+  await set(page, "#job .mixer-exposure", 0.5);
+  const mixed = await meanShown(page), size = await page.$eval("#job .mixer-canvas", (canvas) => `${canvas.width} x ${canvas.height}`);
+  check(Math.abs(mixed[0] - before[0]) > 2, `the mixture is ${mixed}, as before`);
+  console.log(`mixed ${lights.length} lights at ${size} in ${await page.$eval("#job .mixer-canvas", (canvas) => canvas.dataset.ms)} ms`);
+  await lookAll(page, "mixer");
+  await page.$eval("#job .mixer-save", (button) => button.click());
+  await page.waitForFunction(() => document.querySelector("#job .name").textContent.endsWith(", mixed"));
+  const id = Number(new URLSearchParams((await page.evaluate(() => location.hash)).slice(1)).get("job")), job = await settled(id);
+  check(job.state === "succeeded", `the mixture's render: ${job.reason}`);
+  check(Object.entries(job.settings).filter(([name]) => name.startsWith("light.")).length === 3 && job.settings.per_light === undefined,
+    `the mixture's settings: ${JSON.stringify(job.settings)}`);
+  const rendered = await page.evaluate(async (id) => {
+    const bitmap = await createImageBitmap(await (await fetch(`/v1/jobs/${id}/outputs/00000_radiance.png`)).blob());
+    const canvas = new OffscreenCanvas(bitmap.width, bitmap.height), paint = canvas.getContext("2d");
+    paint.drawImage(bitmap, 0, 0);
+    const { data } = paint.getImageData(0, 0, bitmap.width, bitmap.height);
+    return [0, 1, 2].map((c) => data.reduce((sum, x, i) => sum + (i % 4 === c ? x : 0), 0) / (data.length / 4));
+  }, id);
+  // Code values; noise moves their mean a little, since the encoding is no straight line.
+  check(rendered.every((x, c) => Math.abs(x - mixed[c]) < 3), `saved it is ${rendered}, mixed ${mixed}`);
+  await page.close();
+}
+
+// --- the room ---------------------------------------------------------------------------------
+
+// The picture from where the room is looked at shows what the room in three dimensions shows: the camera is inside.
+async function renderFromRoom() {
+  const page = await open("#job=1");
+  await page.waitForFunction(() => document.querySelectorAll("#job .room-segment option").length > 1);
+  await page.click("#job .room-walk");
+  await page.$eval("#job .view-small", (button) => button.click());
+  await page.waitForSelector("#job .view-figure:not([hidden])", { timeout: 60000 });
+  const looks = (await get("jobs?kind=render")).items.filter(({ name }) => name.endsWith(", a look"));
+  check(looks.length === 1 && looks[0].settings.cameras === "view.json", `the looks: ${JSON.stringify(looks)}`);
+  const { frames } = await get(`jobs/${looks[0].id}/outputs/views.json`), m = frames[0].transform_matrix;
+  check([0, 1, 2].every((r) => Math.abs(m[r][3]) < 0.1), `it looks from ${JSON.stringify(m)}, not from the room's middle`);
+  check(Math.abs(m[1][1] - 1) < 1e-3, `the camera is not upright: ${JSON.stringify(m)}`);
+  await page.select("#job .room-segment", "5"); // a wall is hidden, and not rendered
+  await page.click("#job .room-hide");
+  await page.$eval("#job .view-small", (button) => button.click());
+  await page.waitForFunction(() => document.querySelector("#job .view-caption").textContent.includes("without what is hidden (1)"));
+  const without = (await get("jobs?kind=render")).items.find(({ settings }) => settings.remove !== undefined);
+  check(without?.settings.remove === "5", `what is hidden: ${JSON.stringify(without)}`);
+  await page.$eval("#job .view-large", (button) => button.click());
+  await page.waitForFunction(() => document.querySelector("#job .name").textContent.endsWith(", a view"));
+  const id = new URLSearchParams((await page.evaluate(() => location.hash)).slice(1)).get("job"), job = await get(`jobs/${id}`);
+  check(job.settings.size.startsWith("1280x"), `large: ${JSON.stringify(job.settings)}`);
+  await fetch(`${url}/v1/jobs/${id}/cancel`, { method: "POST" });
+  await page.close();
+}
+
+const page = await open("");
+await page.waitForSelector("#jobs button");
+await saveSettings(page);
+await timeMix(page);
+await makeLights();
+await compareSum(page);
+await page.close();
+await mixLights();
+await renderFromRoom();
+await browser.close();
+process.exit(faults > 0 ? 1 : 0);
