@@ -9,6 +9,8 @@
 #include "server/ingest/path.h"
 #include "server/ingest/source/photo_folder.h"
 
+#define GAUSSIANS "this is a model of 3D Gaussians, not a mesh"
+#define GAUSSIANS_HINT "send the data set that it was trained on (images/ and sparse/), with a mesh of it"
 #define COLMAP_FIRST "colmap automatic_reconstructor --workspace_path . --image_path IMAGES --dense 1"
 
 /* Patterns are of paths below some folder (fnmatch), any of those between "|"; all of has[] must match there. What the
@@ -35,13 +37,38 @@ static const struct {
     {{"habitat/*|*semantic.json|preseg.json", "*mesh.ply"},
      "no cameras: this is Replica as shipped, which has no photographs",
      "take the rendered set of NICE-SLAM (download_replica.sh), or render views with ReplicaRenderer and add a transforms.json"},
-    {{"point_cloud/iteration_*/*.ply|point_cloud.ply|*.splat|*.spz"},
-     "no cameras: this is a model of 3D Gaussians, not a mesh",
-     "send the data set that it was trained on (images/ and sparse/), with a mesh of it"},
+    {{"point_cloud/iteration_*/*.ply|point_cloud.ply|*.splat|*.spz"}, "no cameras: " GAUSSIANS, GAUSSIANS_HINT},
+    {{"*.psx|*.psz"},
+     "no cameras: this is a project of Metashape's, which only it reads",
+     "in Metashape: File, Export, Export Cameras (Agisoft XML), and Export Model in the same coordinates (PLY or OBJ)"},
+    {{"*.rcproj|*.rsproj"},
+     "no cameras: this is a project of RealityCapture's, which only it reads",
+     "in RealityCapture (RealityScan) export the registration as \"Internal/External camera parameters\" (CSV) or as XMP, "
+     "and the mesh (PLY or OBJ)"},
+    {{"*.mg"},
+     "no cameras: this is Meshroom's project, which has none itself",
+     "its folder MeshroomCache has them: StructureFromMotion/*/cameras.sfm, and the mesh Texturing/*/texturedMesh.obj"},
+    {{"*.nvm"},
+     "no cameras that are read: VisualSFM's .nvm is not",
+     "VisualSFM writes bundle.rd.out and list.txt, too, which are read"},
+    {{"database.db"},
+     "no cameras: this is COLMAP's database, without the model that is made of it",
+     "colmap mapper --database_path database.db --image_path images --output_path sparse"},
     {{"*.xyz|*.e57|*.pts|*.ptx|*.las|*.laz", "*.obj|*.ply|*.glb"},
      "no cameras: this is a MatterPak or a scanner's export: a mesh and a point cloud without the photographs' poses",
      "photographs with poses are needed: of a Matterport scan only the raw data has them; or photograph the room and run " COLMAP_FIRST},
+    {{"*.e57|*.pts|*.ptx|*.las|*.laz"},
+     "no cameras: this is a laser scanner's point cloud, without photographs' poses",
+     "photograph the room and run " COLMAP_FIRST},
 };
+
+/* A PLY of 3D Gaussians, which looks like a point cloud's by its name: its path, the caller's. NULL: none. */
+static char *find_gaussians(const struct listing *l) {
+    char *path = NULL;
+    for (size_t i = 0; i < l->folder_count && !path; i++)
+        path = listing_first_with(l, l->folder[i], "*.ply", "f_dc_0", "opacity");
+    return path;
+}
 
 /* Whether any of the patterns between "|" matches a file below the base; its path. */
 static const char *any_match(const struct listing *l, const char *base, const char *patterns) {
@@ -120,6 +147,14 @@ static bool tell_renamed_transforms(const struct listing *l, struct findings *f)
     return true;
 }
 
+static bool tell_gaussians(const struct listing *l, struct findings *f) {
+    char *path = find_gaussians(l);
+    if (path)
+        tell(f, path, "no cameras: " GAUSSIANS, GAUSSIANS_HINT);
+    mem_free(path);
+    return path != NULL;
+}
+
 void missing_tell_cameras(const struct listing *l, const char *chosen, struct findings *f) {
     struct bundle_contents c = look(l);
     char reason[300];
@@ -135,7 +170,7 @@ void missing_tell_cameras(const struct listing *l, const char *chosen, struct fi
             return;
         }
     }
-    if (tell_renamed_transforms(l, f))
+    if (tell_renamed_transforms(l, f) || tell_gaussians(l, f))
         return;
     if (c.video && c.photographs <= 2) {
         tell(f, c.video, "no cameras: this is a video",
@@ -183,12 +218,13 @@ void missing_tell_mesh(const struct listing *l, const struct source *source, con
             "folder";
     bool is_colmap = source && strstr(source->name, "COLMAP"),
          is_nerfstudio = source && strstr(source->name, "nerfstudio");
-    char reason[400], hint[256];
+    char reason[400], hint[256], *gaussians = unread ? NULL : find_gaussians(l);
     snprintf(reason, sizeof reason,
              unread       ? "no mesh: the format of %.250s is not read; a mesh must be PLY, OBJ or glTF"
+             : gaussians  ? "no mesh: %.250s is a model of 3D Gaussians"
              : has_clouds ? "no mesh: the PLY files of the bundle are point clouds"
                           : "no mesh: the bundle has no PLY, OBJ or glTF file",
-             unread);
+             unread ? unread : gaussians);
     snprintf(hint, sizeof hint, "%s%s", is_nerfstudio && listing_has_folder(l, "", "colmap") ? "in colmap/, " : "",
              is_colmap || is_nerfstudio ? mvs : own);
     if (is_nerfstudio && !listing_has_folder(l, "", "colmap"))
@@ -198,4 +234,5 @@ void missing_tell_mesh(const struct listing *l, const struct source *source, con
     if (unread)
         snprintf(hint, sizeof hint, "convert it with Blender or MeshLab, keeping its coordinates");
     tell(f, unread ? unread : "mesh.ply", reason, hint);
+    mem_free(gaussians);
 }

@@ -155,16 +155,16 @@ const struct source source_realitycapture = {"RealityCapture", recognise_table, 
 
 /* --- XMP -------------------------------------------------------------------------------------- */
 
+/* By the name space: other programs leave XMP files beside photographs, too. */
 static char *recognise_xmp(const struct listing *l, const char *base) {
     static const char *const folders[] = {"", "images/", "photos/"};
-    for (int i = 0; i < 3; i++) {
+    char *found = NULL;
+    for (int i = 0; i < 3 && !found; i++) {
         char *pattern = mem_printf("%s*.xmp", folders[i]);
-        const struct listed_file *file = listing_first(l, base, pattern);
+        found = listing_first_with(l, base, pattern, "rdf:", "xcr:");
         mem_free(pattern);
-        if (file)
-            return mem_strdup(file->path);
     }
-    return NULL;
+    return found;
 }
 
 /* The text of an attribute of rdf:Description or an element in it; NULL: neither. */
