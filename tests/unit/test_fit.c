@@ -167,7 +167,7 @@ static const struct {
     {"a mesh before applied_transform", apply_transform, FIT_NO, "{\"coordinates\":\"capture\"}", true,
      "applied_transform"},
     {"another origin", move_a_little, FIT_DOUBTFUL, NULL, false, NULL},
-    {"another place", move_away, FIT_NO, NULL, false, ""},
+    {"another place", move_away, FIT_NO, NULL, false, NULL},
 };
 
 static void check_remedy(const char *name, const struct fit_result *fit, const char *wanted, const char *told) {
