@@ -14,7 +14,7 @@
 #include "server/evaluate/seen.h"
 #include "server/ingest/bundle.h"
 #include "server/ingest/pixels.h"
-#include "server/reconstruct/metrics.h"
+#include "server/reconstruct/held_render.h"
 #include "server/render/film.h"
 #include "server/scene/scene.h"
 
@@ -124,33 +124,48 @@ static double training_median(const struct scene *scene) {
     return median;
 }
 
-/* The photograph's radiance and the re-render, clipped alike. Masked pixels are NaN, which metrics_msre leaves out. */
-static void make_pair(struct evaluator *e, const struct photograph *p, uint32_t view, struct image *photograph,
-                      struct image *render) {
-    struct path_settings path = {
-        .max_depth = (int)e->settings->max_depth, .roulette_depth = ROULETTE_DEPTH, .seed = e->settings->seed};
-    struct image film; /* has standard errors too */
+/* The photograph's radiance and two re-renders (metrics.h), clipped alike. Masked pixels are NaN, which metrics leave
+ * out. The photograph is made anew each time. */
+static void make_pair(const struct photograph *p, const struct held_render *render, struct image *photograph,
+                      struct image *halves) {
     uint32_t width = p->camera.width, height = p->camera.height;
-    film_render(&e->recovered.world, &p->camera, e->settings->spp, &path, view, e->pool, &film);
+    image_copy(&render->halves, halves);
     image_init_rgb(photograph, width, height);
-    image_init_rgb(render, width, height);
     for (uint32_t y = 0; y < height; y++) {
         for (uint32_t x = 0; x < width; x++) {
             size_t pixel = (size_t)y * width + x;
-            const float *lit = film.pixel + pixel * film.channel_count;
-            float *a = photograph->pixel + 3 * pixel, *b = render->pixel + 3 * pixel;
+            float *a = photograph->pixel + 3 * pixel, *b = halves->pixel + 6 * pixel;
             struct photograph_sample s;
             if (!pixel_radiance(p, x, y, &s)) {
                 a[0] = a[1] = a[2] = NAN;
                 continue;
             }
-            a[0] = s.radiance.r, a[1] = s.radiance.g, a[2] = s.radiance.b;
-            b[0] = fminf(lit[0], s.clip_radiance.r);
-            b[1] = fminf(lit[1], s.clip_radiance.g);
-            b[2] = fminf(lit[2], s.clip_radiance.b);
+            memcpy(a, &s.radiance, 3 * sizeof *a);
+            const float clip[3] = {s.clip_radiance.r, s.clip_radiance.g, s.clip_radiance.b};
+            for (int c = 0; c < 6; c++)
+                b[c] = fminf(b[c], clip[c % 3]);
         }
     }
-    image_release(&film);
+}
+
+/* Renders a view until its MSRE is known well enough. */
+static struct metric render_pair(struct evaluator *e, const struct photograph *p, uint32_t view,
+                                 struct image *photograph, struct image *halves) {
+    const struct path_settings path = {
+        .max_depth = (int)e->settings->max_depth, .roulette_depth = ROULETTE_DEPTH, .seed = e->settings->seed};
+    struct held_render render = {0};
+    struct metric msre;
+    *photograph = *halves = (struct image){0};
+    do {
+        image_release(photograph);
+        image_release(halves);
+        uint32_t iteration = view + render.rounds * (uint32_t)e->scene.photograph_count;
+        held_render_add(&render, &e->recovered.world, &p->camera, e->settings->spp, &path, iteration, e->pool);
+        make_pair(p, &render, photograph, halves);
+        msre = metrics_msre(photograph, halves, e->median);
+    } while (!held_render_is_done(&render, msre));
+    held_render_release(&render);
+    return msre;
 }
 
 /* --- one test view ------------------------------------------------------------------------ */
@@ -200,24 +215,28 @@ static enum status write_pair(const struct evaluator *e, const char *what, const
 }
 
 static enum status score_photograph(struct evaluator *e, const struct photograph *p, uint32_t view, const char *stem,
-                                    const struct image *truth, struct evaluation *v, double *msre, struct error *err) {
-    struct image photograph, render;
-    make_pair(e, p, view, &photograph, &render);
-    *msre = metrics_msre(&photograph, &render, e->median);
-    smooth_areas_add(&v->smooth, &photograph, &render, truth, e->median);
+                                    const struct image *truth, struct evaluation *v, struct metric *msre,
+                                    struct error *err) {
+    struct image photograph, halves;
+    *msre = render_pair(e, p, view, &photograph, &halves);
+    smooth_areas_add(&v->smooth, &photograph, &halves, truth, e->median);
     char *path = mem_printf("%s/truth/flat_%s.exr", e->room, stem);
-    enum status status = noise_floor_add(&v->floor, path, &photograph, *msre, e->median, err);
+    enum status status = noise_floor_add(&v->floor, path, &photograph, msre->value, e->median, err);
     mem_free(path);
-    if (status == STATUS_OK && e->settings->pictures_dir)
+    if (status == STATUS_OK && e->settings->pictures_dir) {
+        struct image render;
+        held_render_mean(&halves, &render);
         status = write_pair(e, "view", stem, &photograph, &render, "",
                             e->median > 0.0 ? (float)(DISPLAY_MEDIAN / e->median) : 1.0f, err);
+        image_release(&render);
+    }
     image_release(&photograph);
-    image_release(&render);
+    image_release(&halves);
     return status;
 }
 
 static enum status score_view(struct evaluator *e, const struct photograph *p, uint32_t view, struct evaluation *v,
-                              double *msre, struct error *err) {
+                              struct metric *msre, struct error *err) {
     struct image truth = {0}, found = {0};
     char *stem = stem_of(p->name);
     uint8_t *flags = mem_array((size_t)p->camera.width * p->camera.height, 1);
@@ -242,21 +261,23 @@ out:
 
 static enum status score_views(struct evaluator *e, struct evaluation *v, struct error *err) {
     enum status status = STATUS_OK;
-    double sum = 0.0, squares = 0.0, measured = 0.0;
+    double sum = 0.0, squares = 0.0, noise = 0.0, measured = 0.0;
     for (size_t i = 0; i < e->scene.photograph_count && status == STATUS_OK; i++) {
         const struct photograph *p = &e->scene.photograph[i];
-        double msre = NAN;
+        struct metric msre = {NAN, NAN};
         if (!p->is_test)
             continue;
         status = score_view(e, p, (uint32_t)i, v, &msre, err);
         v->view_count++;
-        if (!isfinite(msre)) /* no re-render, or no usable pixel */
+        if (!isfinite(msre.value)) /* no re-render, or no usable pixel */
             continue;
-        sum += msre;
-        squares += msre * msre;
+        sum += msre.value;
+        squares += msre.value * msre.value;
+        noise += msre.noise * msre.noise;
         measured += 1.0;
     }
     v->msre = sum / measured;
+    v->msre_noise_left = sqrt(noise) / measured;
     v->msre_deviation = sqrt(fmax(0.0, squares / measured - v->msre * v->msre));
     if (status == STATUS_OK && v->view_count == 0)
         status = error_set(err, STATUS_INPUT, "%s: no photograph is held out (split test)", e->room);
@@ -337,6 +358,7 @@ cJSON *evaluate_to_json(const struct evaluation *v) {
     json_add_int(root, "emitters_false", (int64_t)v->emitters_false);
     json_add_number(root, "msre", v->msre);
     json_add_number(root, "msre_deviation", v->msre_deviation);
+    json_add_number(root, "msre_noise_left", v->msre_noise_left);
     if (v->smooth.count > 0) {
         json_add_number(root, "even_share", (double)v->smooth.count / (double)s->pixels);
         json_add_number(root, "msre_even", v->smooth.render / (double)v->smooth.count);

@@ -3,7 +3,8 @@
  * The room is a bundle with truth/ beside its photographs: objects.json, and a picture of the parameters of each test
  * view (see demo/generate.h). Parameters are compared as the test cameras see them (score.h), emitters by object, and
  * the test views are re-rendered from the recovered room and compared with their photographs: MSRE = mean of (I -
- * R)^2 / (R^2 + 0.01 m^2), with m the median radiance of the training pixels. */
+ * R)^2 / (R^2 + 0.01 m^2), with m the median radiance of the training pixels, free of the re-renders' noise (metrics.h):
+ * what the photographs' noise adds is in it. */
 #ifndef UNBAKE_EVALUATE_EVALUATE_H
 #define UNBAKE_EVALUATE_EVALUATE_H
 
@@ -21,7 +22,7 @@ struct reading; /* common/reading.h */
 
 struct evaluate_settings {
     uint32_t samples;   /* first hits per pixel, at least 16 */
-    uint32_t spp;       /* paths per pixel of the re-renders, at least 64; 0: none, no MSRE */
+    uint32_t spp;       /* paths per pixel of the re-renders, more where their noise asks for it; 0: none, no MSRE */
     uint32_t max_depth; /* segments of a path */
     uint64_t seed;
     const char *pictures_dir;      /* where side-by-sides go; NULL: none */
@@ -37,6 +38,7 @@ struct evaluation {
      * of which emits is a false emitter. */
     size_t emitters, emitters_found, emitters_missed, emitters_false;
     double msre, msre_deviation; /* mean over views and standard deviation; NaN without re-renders */
+    double msre_noise_left;      /* standard error of the mean by the re-renders' noise */
     struct smooth_areas smooth;  /* needs re-renders */
     struct noise_floor floor;    /* views with a flat render in the truth; needs re-renders */
 };

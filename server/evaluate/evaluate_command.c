@@ -9,7 +9,8 @@
 #include "server/evaluate/evaluate.h"
 
 const struct flag evaluate_flags[] = {
-    {"--spp", "N", "paths per pixel of the re-rendered views; 0: none, no MSRE (64)"},
+    {"--spp", "N",
+     "paths per pixel of the re-rendered views, up to four times where noise asks for it; 0: none, no MSRE (64)"},
     {"--samples", "N", "first hits per pixel of the parameters (16)"},
     {"--max-depth", "N", "segments of a path (16)"},
     {"--pictures", "DIR", "write side-by-sides there: truth | recovered, photograph | re-render"},
@@ -34,7 +35,8 @@ static void print_table(const struct evaluation *v) {
     printf("  %-22s %6.3f of 1, log error %.2g\n", "emission, overlap", score_emission_iou(s),
            score_mean(s->emission_log));
     if (isfinite(v->msre))
-        printf("  %-22s %6.4f +- %.4f\n", "MSRE of re-renders", v->msre, v->msre_deviation);
+        printf("  %-22s %6.4f +- %.4f   (free of the re-renders' noise but for %.4f)\n", "MSRE of re-renders", v->msre,
+               v->msre_deviation, v->msre_noise_left);
     if (v->smooth.count > 0)
         printf("  %-22s %6.4f of which the photographs' own noise is %.4f (%.1f %% of the pixels)\n",
                "  in smooth areas", v->smooth.render / (double)v->smooth.count,

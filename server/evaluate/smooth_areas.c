@@ -52,7 +52,7 @@ static bool smoothed_pixel(const struct image *photograph, const struct image *t
     return isfinite(sum[0]) && isfinite(sum[1]) && isfinite(sum[2]);
 }
 
-/* Makes a picture of expected values, NaN where the scene is not smooth, which metrics leave out. Returns the number
+/* Makes two equal pictures of expected values (halves, metrics.h), NaN where the scene is not smooth, which metrics leave out. Returns the number
  * of smooth pixels. */
 static size_t smooth_picture(const struct image *photograph, const struct image *truth, struct image *smoothed) {
     const struct truth_channels at = {{image_channel(truth, "base_color.R"), image_channel(truth, "base_color.G"),
@@ -60,30 +60,33 @@ static size_t smooth_picture(const struct image *photograph, const struct image 
                                       image_channel(truth, "roughness"),
                                       image_channel(truth, "object_id")};
     size_t count = 0;
-    image_init_rgb(smoothed, truth->width, truth->height);
-    for (size_t i = 0; i < 3 * (size_t)truth->width * truth->height; i++)
+    image_init(smoothed, truth->width, truth->height, 6,
+               (const char *const[]){"a.R", "a.G", "a.B", "b.R", "b.G", "b.B"});
+    for (size_t i = 0; i < 6 * (size_t)truth->width * truth->height; i++)
         smoothed->pixel[i] = NAN;
     for (uint32_t y = RADIUS; y + RADIUS < truth->height; y++) {
         for (uint32_t x = RADIUS; x + RADIUS < truth->width; x++) {
             float value[3];
             if (!smoothed_pixel(photograph, truth, &at, x, y, value))
                 continue;
-            memcpy(smoothed->pixel + 3 * ((size_t)y * truth->width + x), value, sizeof value);
+            for (size_t half = 0; half < 2; half++)
+                memcpy(smoothed->pixel + 6 * ((size_t)y * truth->width + x) + 3 * half, value, sizeof value);
             count++;
         }
     }
     return count;
 }
 
-void smooth_areas_add(struct smooth_areas *areas, const struct image *photograph, const struct image *render,
+void smooth_areas_add(struct smooth_areas *areas, const struct image *photograph, const struct image *halves,
                       const struct image *truth, double median_radiance) {
     struct image expected;
     size_t count = smooth_picture(photograph, truth, &expected);
     if (count > 0) {
-        areas->noise += (double)count * metrics_msre(photograph, &expected, median_radiance) / (1.0 - WEIGHT(0, 0));
-        for (size_t i = 0; i < 3 * (size_t)truth->width * truth->height; i++)
-            expected.pixel[i] = isfinite(expected.pixel[i]) ? render->pixel[i] : NAN;
-        areas->render += (double)count * metrics_msre(photograph, &expected, median_radiance);
+        areas->noise +=
+            (double)count * metrics_msre(photograph, &expected, median_radiance).value / (1.0 - WEIGHT(0, 0));
+        for (size_t i = 0; i < 6 * (size_t)truth->width * truth->height; i++)
+            expected.pixel[i] = isfinite(expected.pixel[i]) ? halves->pixel[i] : NAN;
+        areas->render += (double)count * metrics_msre(photograph, &expected, median_radiance).value;
         areas->count += count;
     }
     image_release(&expected);

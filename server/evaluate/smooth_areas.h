@@ -11,13 +11,14 @@
 #include "common/image.h"
 
 struct smooth_areas {
-    double render, noise; /* sums over pixels: MSRE of the re-render, and of the photograph's noise */
-    size_t count;         /* pixels */
+    double render,
+        noise;    /* sums over pixels: MSRE of the re-renders, free of their noise, and of the photograph's noise */
+    size_t count; /* pixels */
 };
 
-/* Adds the smooth areas of a view. All pictures are of one size: photograph and render as in metrics.h, truth with
+/* Adds the smooth areas of a view. All pictures are of one size: photograph and halves as in metrics.h, truth with
  * the channels base_color.R G B, roughness and object_id. */
-void smooth_areas_add(struct smooth_areas *areas, const struct image *photograph, const struct image *render,
+void smooth_areas_add(struct smooth_areas *areas, const struct image *photograph, const struct image *halves,
                       const struct image *truth, double median_radiance);
 
 #endif

@@ -74,9 +74,11 @@ static void put_figure(struct buf *out, const cJSON *figure) {
         const char *key, *name, *good;
     } known[] = {
         {"msre", "mean squared relative error", ", 0 is best"},
-        {"msre_render_noise", "of it noise of the re-render", ""},
-        {"msre_photograph_noise", "of it noise of the photograph", ""},
+        {"msre_noise_left", "give or take, by noise of the re-render", ""},
+        {"msre_render_noise", "that noise, which is not in the error", ""},
+        {"msre_photograph_noise", "noise of the photograph, which is", ""},
         {"psnr_db", "PSNR in dB", ", 25 and more is good"},
+        {"psnr_noise_left_db", "give or take", " dB"},
         {"ssim", "SSIM", ", 1 is best"},
         {"samples", "samples a pixel", ""},
     };

@@ -15,7 +15,7 @@
 #define FEW_PHOTOGRAPHS 20  /* of the training; fewer is said */
 #define UNSEEN_LIGHT 0.05   /* of the rays that leave the room where no photograph shows what is there */
 #define UNCERTAIN_LIGHT 0.3 /* relative deviation of a source's radiance */
-#define NOISE_DOMINATES 0.5 /* of the error of held-out views */
+#define NOISE_DISTURBS 0.2  /* standard error of the error of held-out views, by the re-renders' noise */
 
 /* A number by its path of two names; NAN where it is not there. */
 static double number_at(const cJSON *report, const char *first, const char *second) {
@@ -45,7 +45,7 @@ static void put_found(struct buf *out, const cJSON *report) {
 
 static void put_views(struct buf *out, const cJSON *report) {
     double views = number_at(report, "metrics", "held_out_views"), psnr = number_at(report, "metrics", "psnr_db");
-    double error = number_at(report, "metrics", "msre"), noise = number_at(report, "metrics", "msre_render_noise");
+    double error = number_at(report, "metrics", "msre"), noise = number_at(report, "metrics", "msre_noise_left");
     if (!(views > 0.0) || !isfinite(psnr)) {
         buf_puts(out, "<p>No photograph was held out, so that nothing here says how far the result is off.</p>");
         return;
@@ -56,11 +56,11 @@ static void put_views(struct buf *out, const cJSON *report) {
                                            : "is far from the photograph";
     buf_printf(out, "<p>A re-render of the %.0f held-out view%s %s: %.1f dB PSNR in the mean (%.0f and more is good).",
                views, views == 1.0 ? "" : "s", word, psnr, PSNR_GOOD);
-    if (noise > NOISE_DOMINATES * error)
+    if (noise > NOISE_DISTURBS * error)
         buf_printf(out,
-                   " %.0f %% of the squared relative error is noise of the re-render itself, not of the result: "
-                   "report_samples makes it less.",
-                   100.0 * fmin(noise / error, 1.0));
+                   " The noise of the re-render leaves the squared relative error uncertain: %.3g, give or take %.2g. "
+                   "report_samples makes that less.",
+                   error, noise);
     buf_puts(out, "</p>");
 }
 

@@ -6,8 +6,8 @@
 
 #include "common/mem.h"
 #include "common/quantile.h"
+#include "server/reconstruct/held_render.h"
 #include "server/reconstruct/metrics.h"
-#include "server/render/film.h"
 #include "server/render/path.h"
 #include "server/state/evidence.h"
 #include "server/state/pace.h"
@@ -68,14 +68,15 @@ static void fit_light(const struct reconstruction *r, struct photograph *photo, 
     }
 }
 
-/* Clips a render as its photograph is clipped. */
+/* Clips renders, of three channels each, as their photograph is clipped. */
 static void clip_image(struct image *image, const struct photograph *photo) {
     const float gain[3] = {photo->gain.r, photo->gain.g, photo->gain.b};
     for (size_t i = 0; i < (size_t)image->width * image->height; i++) {
         float x = (float)(i % image->width) + 0.5f, y = (float)(i / image->width) + 0.5f;
         float clip = photo->clip / (photo->exposure * photograph_falloff(photo, x, y));
-        for (size_t c = 0; c < 3; c++)
-            image->pixel[3 * i + c] = fminf(image->pixel[3 * i + c], clip / gain[c]);
+        float *pixel = image->pixel + image->channel_count * i;
+        for (size_t c = 0; c < image->channel_count; c++)
+            pixel[c] = fminf(pixel[c], clip / gain[c % 3]);
     }
 }
 
@@ -86,18 +87,6 @@ static uint32_t samples_of(const struct reconstruction *r, double pixels_left) {
     if (plan_is_cut(&r->plan, PLAN_REPORT))
         samples = fmin(fmax(floor((work->now - work->done) / pixels_left), 1.0), samples);
     return (uint32_t)samples;
-}
-
-/* Renders the reconstruction from a camera: R G B radiance, and its standard errors. */
-static void render_radiance(struct reconstruction *r, const struct camera *camera, uint32_t samples,
-                            const struct path_settings *path, struct image *image, struct image *error) {
-    struct image film;
-    film_render(&r->world, camera, samples, path, 0, r->pool, &film);
-    image_take_rgb(&film, image);
-    image_init_rgb(error, film.width, film.height);
-    for (size_t i = 0; i < (size_t)film.width * film.height; i++)
-        memcpy(error->pixel + 3 * i, film.pixel + film.channel_count * i + 3, 3 * sizeof *error->pixel);
-    image_release(&film);
 }
 
 /* Standard deviation of a photograph's noise, given its radiance `image`; NaN where that is. */
@@ -124,31 +113,66 @@ static void move_pixels(struct image *image, struct spill *spill) {
     image->pixel = moved;
 }
 
-static void render_view(struct reconstruction *r, struct photograph *photo, struct held_out *view, uint32_t samples,
-                        double median) {
-    const struct settings *set = r->settings;
-    struct path_settings path = {
+static struct path_settings paths_of(const struct settings *set) {
+    return (struct path_settings){
         .max_depth = (int)settings_number(set, "max_depth"),
         .roulette_depth = (int)settings_number(set, "roulette_depth"),
         .seed = (uint64_t)settings_number(set, "seed") ^ REPORT_SEED,
     };
+}
+
+/* The figures of a view from its two renders, which are clipped as the photograph is. */
+static void measure_view(const struct reconstruction *r, const struct photograph *photo, struct held_out *view,
+                         const struct image *halves, double median) {
+    struct image noise;
+    double exposure = photo->is_hdr ? DISPLAY_MEDIAN / median : (double)photo->exposure;
+    struct metric psnr = metrics_psnr_db(&view->photograph, halves, exposure);
+    photograph_noise(r, photo, &view->photograph, &noise);
+    view->msre_render_noise = metrics_msre_of_renders(&view->photograph, halves, median);
+    view->msre_photograph_noise = metrics_msre_of_photograph(&view->photograph, &noise, median);
+    view->psnr_db = psnr.value;
+    view->psnr_noise_left_db = psnr.noise;
+    view->ssim = metrics_ssim(&view->photograph, halves, exposure);
+    image_release(&noise);
+}
+
+/* Both renders as they are compared: clipped as the photograph is. *halves is the caller's. */
+static struct metric compare(const struct photograph *photo, const struct held_out *view,
+                             const struct held_render *render, double median, struct image *halves) {
+    image_copy(&render->halves, halves);
+    if (!photo->is_hdr)
+        clip_image(halves, photo);
+    return metrics_msre(&view->photograph, halves, median);
+}
+
+/* Renders a view, again where its error is not known well, unless a time limit says how much is done. */
+static void render_view(struct reconstruction *r, struct photograph *photo, struct held_out *view, uint32_t samples,
+                        double median, const struct reconstruct_hooks *hooks) {
+    const struct path_settings path = paths_of(r->settings);
+    struct held_render render = {0};
+    struct image halves;
     view->name = photo->name;
     view->camera = &photo->camera;
     photograph_radiance(photo, &view->photograph);
-    struct image error, noise;
-    render_radiance(r, &photo->camera, samples, &path, &view->render, &error);
+    held_render_add(&render, &r->world, &photo->camera, samples, &path, 0, r->pool);
+    held_render_mean(&render.halves, &view->render);
     fit_light(r, photo, view);
+    struct metric msre = compare(photo, view, &render, median, &halves);
+    while (!held_render_is_done(&render, msre) && isinf(r->plan.limit_sec) && !hooks->stop_requested(hooks->user)) {
+        image_release(&halves);
+        image_release(&view->render);
+        held_render_add(&render, &r->world, &photo->camera, samples, &path, render.rounds, r->pool);
+        held_render_mean(&render.halves, &view->render);
+        msre = compare(photo, view, &render, median, &halves);
+    }
     if (!photo->is_hdr)
         clip_image(&view->render, photo);
-    double exposure = photo->is_hdr ? DISPLAY_MEDIAN / median : (double)photo->exposure;
-    photograph_noise(r, photo, &view->photograph, &noise);
-    view->msre = metrics_msre(&view->photograph, &view->render, median);
-    view->msre_render_noise = metrics_msre_noise(&view->photograph, &error, median);
-    view->msre_photograph_noise = metrics_msre_noise(&view->photograph, &noise, median);
-    view->psnr_db = metrics_psnr_db(&view->photograph, &view->render, exposure);
-    view->ssim = metrics_ssim(&view->photograph, &view->render, exposure);
-    image_release(&noise);
-    image_release(&error);
+    view->msre = msre.value;
+    view->msre_noise_left = msre.noise;
+    view->samples = render.spp;
+    measure_view(r, photo, view, &halves, median);
+    image_release(&halves);
+    held_render_release(&render);
     move_pixels(&view->photograph, r->scene->spill);
     move_pixels(&view->render, r->scene->spill);
 }
@@ -180,25 +204,28 @@ static void mean_add(struct metric_mean *mean, double value) {
 }
 
 struct held_out_means {
-    struct metric_mean msre, render_noise, photograph_noise, psnr_db, ssim;
+    struct metric_mean msre, noise_left, render_noise, photograph_noise, psnr_db, ssim; /* noise_left: of squares */
 };
 
 static void means_add(struct held_out_means *means, const struct held_out *view) {
     mean_add(&means->msre, view->msre);
+    mean_add(&means->noise_left, view->msre_noise_left * view->msre_noise_left);
     mean_add(&means->render_noise, view->msre_render_noise);
     mean_add(&means->photograph_noise, view->msre_photograph_noise);
     mean_add(&means->psnr_db, view->psnr_db);
     mean_add(&means->ssim, view->ssim);
 }
 
-static cJSON *view_entry(const struct held_out *view, uint32_t samples) {
+static cJSON *view_entry(const struct held_out *view) {
     cJSON *entry = cJSON_CreateObject();
     json_add_string(entry, "name", view->name);
-    json_add_int(entry, "samples", samples);
+    json_add_int(entry, "samples", view->samples);
     json_add_number(entry, "msre", view->msre);
+    json_add_number(entry, "msre_noise_left", view->msre_noise_left);
     json_add_number(entry, "msre_render_noise", view->msre_render_noise);
     json_add_number(entry, "msre_photograph_noise", view->msre_photograph_noise);
     json_add_number(entry, "psnr_db", view->psnr_db);
+    json_add_number(entry, "psnr_noise_left_db", view->psnr_noise_left_db);
     json_add_number(entry, "ssim", view->ssim);
     return entry;
 }
@@ -211,6 +238,7 @@ static void report_means(const struct held_out_means *means, size_t view_count, 
     if (count == 0.0)
         return;
     json_add_number(metrics, "msre", means->msre.sum / count);
+    json_add_number(metrics, "msre_noise_left", sqrt(means->noise_left.sum) / means->noise_left.count);
     json_add_number(metrics, "msre_render_noise", means->render_noise.sum / means->render_noise.count);
     json_add_number(metrics, "msre_photograph_noise", means->photograph_noise.sum / means->photograph_noise.count);
     json_add_number(metrics, "psnr_db", means->psnr_db.sum / means->psnr_db.count);
@@ -248,11 +276,11 @@ enum status report_held_out(struct reconstruction *r, const struct views *views,
         struct held_out *view = &r->held_out[r->held_out_count++];
         double pixels = pixels_of(&scene->photograph[i]);
         uint32_t samples = samples_of(r, pixels_left);
-        render_view(r, &scene->photograph[i], view, samples, (double)views->median_radiance);
+        render_view(r, &scene->photograph[i], view, samples, (double)views->median_radiance, hooks);
         pixels_left -= pixels;
         means_add(&means, view);
-        cJSON_AddItemToArray(list, view_entry(view, samples));
-        pace_advance(pace, "report", PLAN_REPORT, pixels * (double)samples);
+        cJSON_AddItemToArray(list, view_entry(view));
+        pace_advance(pace, "report", PLAN_REPORT, pixels * (double)view->samples);
         if (hooks->stop_requested(hooks->user))
             return error_set(err, STATUS_CANCELLED, "stopped while rendering the held-out views");
     }

@@ -10,12 +10,19 @@
 
 #define BATCH 1024
 
+/* Channels of the picture. */
+enum film_kind {
+    FILM_ERRORS, /* mean, standard error */
+    FILM_DIRECT, /* the same, direct light */
+    FILM_HALVES  /* means of the first half of the groups and of the second */
+};
+
 struct film {
     const struct world *world;
     const struct camera *camera;
     const struct path_settings *settings;
     uint32_t spp, iteration; /* spp per group */
-    bool has_direct;
+    enum film_kind kind;
     struct image *image;
     struct film_slot *slot;
 };
@@ -38,25 +45,38 @@ static void trace(struct film *f, struct film_slot *s, size_t count) {
         *sum = rgb_add(*sum, s->radiance[i]);
     }
     const rgb *direct = path_batch_direct(s->batch);
-    for (size_t i = 0; i < count && f->has_direct; i++)
+    for (size_t i = 0; i < count && f->kind == FILM_DIRECT; i++)
         s->direct[s->pixel[i]] = rgb_add(s->direct[s->pixel[i]], direct[i]);
+}
+
+/* Mean of a channel over groups first to end, and of its square. */
+static double group_mean(const struct film *f, const rgb sum[FILM_GROUPS], int channel, int first, int end,
+                         double *square) {
+    double mean = 0.0;
+    *square = 0.0;
+    for (int g = first; g < end; g++) {
+        double value = (double)(channel == 0 ? sum[g].r : channel == 1 ? sum[g].g : sum[g].b) / f->spp;
+        mean += value / (end - first);
+        *square += value * value / (end - first);
+    }
+    return mean;
 }
 
 static void finish_row(const struct film *f, const struct film_slot *s, uint32_t y) {
     for (uint32_t x = 0; x < f->image->width; x++) {
         float *out = f->image->pixel + ((size_t)y * f->image->width + x) * f->image->channel_count;
-        for (int c = 0; c < 3; c++) {
-            double mean = 0.0, square = 0.0;
-            for (int g = 0; g < FILM_GROUPS; g++) {
-                rgb sum = s->sum[x * FILM_GROUPS + (uint32_t)g];
-                double value = (double)(c == 0 ? sum.r : c == 1 ? sum.g : sum.b) / f->spp;
-                mean += value / FILM_GROUPS;
-                square += value * value / FILM_GROUPS;
-            }
+        const rgb *sum = s->sum + (size_t)x * FILM_GROUPS;
+        double square;
+        for (int c = 0; c < 3 && f->kind == FILM_HALVES; c++) {
+            out[c] = (float)group_mean(f, sum, c, 0, FILM_GROUPS / 2, &square);
+            out[3 + c] = (float)group_mean(f, sum, c, FILM_GROUPS / 2, FILM_GROUPS, &square);
+        }
+        for (int c = 0; c < 3 && f->kind != FILM_HALVES; c++) {
+            double mean = group_mean(f, sum, c, 0, FILM_GROUPS, &square);
             out[c] = (float)mean;
             out[3 + c] = (float)sqrt(fmax(0.0, square - mean * mean) / (FILM_GROUPS - 1));
         }
-        if (f->has_direct) {
+        if (f->kind == FILM_DIRECT) {
             rgb direct = rgb_scale(s->direct[x], 1.0f / (float)(f->spp * FILM_GROUPS));
             memcpy(out + 6, &direct, sizeof direct);
         }
@@ -93,10 +113,11 @@ static void render_row(void *user, size_t row, int thread) {
 }
 
 static uint64_t render(const struct world *world, const struct camera *camera, uint32_t spp,
-                       const struct path_settings *settings, uint32_t iteration, bool has_direct, struct parallel *pool,
-                       struct image *image) {
+                       const struct path_settings *settings, uint32_t iteration, enum film_kind kind,
+                       struct parallel *pool, struct image *image) {
     static const char *const names[] = {"R", "G", "B", "err.R", "err.G", "err.B", "direct.R", "direct.G", "direct.B"};
-    image_init(image, camera->width, camera->height, has_direct ? 9 : 6, names);
+    static const char *const halves[] = {"a.R", "a.G", "a.B", "b.R", "b.G", "b.B"};
+    image_init(image, camera->width, camera->height, kind == FILM_DIRECT ? 9 : 6, kind == FILM_HALVES ? halves : names);
     int thread_count = parallel_thread_count(pool);
     struct film_slot *slot = mem_calloc((size_t)thread_count, sizeof *slot);
     for (int i = 0; i < thread_count; i++) {
@@ -109,7 +130,7 @@ static uint64_t render(const struct world *world, const struct camera *camera, u
         slot[i].direct = mem_array(camera->width, sizeof *slot[i].direct);
     }
     uint32_t group_spp = (spp + FILM_GROUPS - 1) / FILM_GROUPS;
-    struct film film = {world, camera, settings, group_spp, iteration, has_direct, image, slot};
+    struct film film = {world, camera, settings, group_spp, iteration, kind, image, slot};
     parallel_for(pool, camera->height, render_row, &film);
     uint64_t dropped = 0;
     for (int i = 0; i < thread_count; i++) {
@@ -131,13 +152,19 @@ static uint64_t render(const struct world *world, const struct camera *camera, u
 uint64_t film_render(const struct world *world, const struct camera *camera, uint32_t spp,
                      const struct path_settings *settings, uint32_t iteration, struct parallel *pool,
                      struct image *image) {
-    return render(world, camera, spp, settings, iteration, false, pool, image);
+    return render(world, camera, spp, settings, iteration, FILM_ERRORS, pool, image);
 }
 
 uint64_t film_render_direct(const struct world *world, const struct camera *camera, uint32_t spp,
                             const struct path_settings *settings, uint32_t iteration, struct parallel *pool,
                             struct image *image) {
-    return render(world, camera, spp, settings, iteration, true, pool, image);
+    return render(world, camera, spp, settings, iteration, FILM_DIRECT, pool, image);
+}
+
+uint64_t film_render_halves(const struct world *world, const struct camera *camera, uint32_t spp,
+                            const struct path_settings *settings, uint32_t iteration, struct parallel *pool,
+                            struct image *image) {
+    return render(world, camera, spp, settings, iteration, FILM_HALVES, pool, image);
 }
 
 enum {
@@ -232,6 +259,6 @@ void film_render_first_hits(const struct world *world, const struct camera *came
         "position.Y",   "position.Z",   "segment",      "depth",     "coverage"};
     image_init(image, camera->width, camera->height, CHANNELS, names);
     struct path_settings settings = {.max_depth = 1, .roulette_depth = 1, .seed = seed};
-    struct film film = {world, camera, &settings, spp, 0, false, image, NULL};
+    struct film film = {world, camera, &settings, spp, 0, FILM_ERRORS, image, NULL};
     parallel_for(pool, camera->height, first_hit_row, &film);
 }

@@ -25,6 +25,12 @@ uint64_t film_render_direct(const struct world *world, const struct camera *came
                             const struct path_settings *settings, uint32_t iteration, struct parallel *pool,
                             struct image *image);
 
+/* The same paths as two independent renders of half of them each: channels a.R a.G a.B b.R b.G b.B. Their mean is
+ * film_render's. What is a product of both, or of their differences from something, is free of noise in the mean. */
+uint64_t film_render_halves(const struct world *world, const struct camera *camera, uint32_t spp,
+                            const struct path_settings *settings, uint32_t iteration, struct parallel *pool,
+                            struct image *image);
+
 /* First-hit attributes, averaged over `spp` jittered rays per pixel: channels base_color.R G B, roughness, specular,
  * emission.R G B, segment (of the pixel's first sample, -1 for a miss), coverage (share of samples that hit), and over
  * hits: depth (along the optical axis; of a panorama the distance), normal.X Y Z (shading normal, on the viewer's side,

@@ -26,9 +26,12 @@
 struct held_out {
     const char *name; /* borrowed from the scene, both */
     const struct camera *camera;
-    struct image photograph, render; /* linear radiance, R G B, of one size; owned */
-    double msre, psnr_db, ssim;
-    double msre_render_noise, msre_photograph_noise; /* expected contributions of noise to msre */
+    struct image photograph, render;            /* linear radiance, R G B, of one size; owned */
+    uint32_t samples;                           /* paths for each pixel */
+    double msre, psnr_db, ssim;                 /* free of the re-render's noise */
+    double msre_noise_left, psnr_noise_left_db; /* standard errors by it */
+    double msre_render_noise;                   /* what it would add to msre, in the mean */
+    double msre_photograph_noise;               /* what the photograph's noise adds */
 };
 
 struct reconstruction {

@@ -97,11 +97,11 @@ static void test_noise_floor(const char *dir) {
  * a shiny and a striped one tell nothing. */
 static void test_even(void) {
     enum { WIDTH = 96, HEIGHT = 64, OTHER = 80 }; /* from that column on it is the other object */
-    struct image truth, photograph, render;
+    struct image truth, photograph, halves;
     struct smooth_areas even = {0}, shiny = {0}, striped = {0};
     image_init(&truth, WIDTH, HEIGHT, CHANNELS, channels);
     image_init_rgb(&photograph, WIDTH, HEIGHT);
-    image_init_rgb(&render, WIDTH, HEIGHT);
+    image_init(&halves, WIDTH, HEIGHT, 6, (const char *const[]){"a.R", "a.G", "a.B", "b.R", "b.G", "b.B"});
     for (uint32_t i = 0; i < WIDTH * HEIGHT; i++) {
         float x = (float)(i % WIDTH), *t = truth.pixel + (size_t)i * CHANNELS;
         float right = 1.0f + 0.01f * x + 0.0005f * x * x;
@@ -110,26 +110,26 @@ static void test_even(void) {
         for (uint32_t c = 0; c < 3; c++) {
             t[BASE + c] = 0.5f;
             photograph.pixel[3 * i + c] = right * (rng_mix32(3 * i + c) % 2 ? 1.1f : 0.9f);
-            render.pixel[3 * i + c] = right * 1.2f;
+            halves.pixel[6 * i + c] = halves.pixel[6 * i + 3 + c] = right * 1.2f;
         }
     }
-    smooth_areas_add(&even, &photograph, &render, &truth, 0.0);
+    smooth_areas_add(&even, &photograph, &halves, &truth, 0.0);
     CHECK_THAT(even.count == (OTHER - 6 + WIDTH - OTHER - 6) * (HEIGHT - 6), "%zu", even.count);
     /* (.1 / 1.1)^2 or (.1 / .9)^2; and .1 or .3 of these */
     CHECK_NEAR(even.noise / (double)even.count, 0.5 * (0.01 / 1.21 + 0.01 / 0.81), 0.0003);
     CHECK_NEAR(even.render / (double)even.count, 0.5 * (0.01 / 1.21 + 0.09 / 0.81), 0.002);
     for (size_t i = 0; i < WIDTH * HEIGHT; i++)
         truth.pixel[i * CHANNELS + ROUGHNESS] = 0.2f;
-    smooth_areas_add(&shiny, &photograph, &render, &truth, 0.0);
+    smooth_areas_add(&shiny, &photograph, &halves, &truth, 0.0);
     for (size_t i = 0; i < WIDTH * HEIGHT; i++) {
         truth.pixel[i * CHANNELS + ROUGHNESS] = 1.0f;
         truth.pixel[i * CHANNELS + BASE + 1] = i % WIDTH % 7 == 0 ? 0.3f : 0.5f;
     }
-    smooth_areas_add(&striped, &photograph, &render, &truth, 0.0);
+    smooth_areas_add(&striped, &photograph, &halves, &truth, 0.0);
     CHECK(shiny.count == 0 && striped.count == 0);
     image_release(&truth);
     image_release(&photograph);
-    image_release(&render);
+    image_release(&halves);
 }
 
 /* Writes a room's own materials as if a job had found them. */

@@ -52,6 +52,37 @@ static void test_dropped(void) {
     plane_rig_release(&rig);
 }
 
+/* Two halves of the same paths: their mean is the whole, and they are as far apart as its standard error says. */
+static void test_halves(void) {
+    struct plane_rig rig;
+    struct image sky, whole, halves;
+    rgb grey = {0.5f, 0.5f, 0.5f};
+    plane_rig_init(&rig, 1, 1);
+    make_sky(&sky);
+    sky.pixel[3 * (2 * MAP_WIDTH + 3)] = 300.0f; /* makes noise */
+    world_set_environment(&rig.r.world, &sky, rig.pool);
+    const struct camera *camera =
+        &plane_rig_add(&rig, (vec3){0, 0, 3}, (vec3){0, 0, 0}, 0.2f, plane_paint_one, &grey)->camera;
+    struct path_settings path = {.max_depth = 3, .roulette_depth = 3, .seed = 1};
+    film_render(&rig.r.world, camera, 16, &path, 5, rig.pool, &whole);
+    film_render_halves(&rig.r.world, camera, 16, &path, 5, rig.pool, &halves);
+    double apart = 0.0, error = 0.0;
+    for (size_t i = 0; i < PLANE_PIXELS * PLANE_PIXELS; i++)
+        for (size_t c = 0; c < 3; c++) {
+            double a = (double)halves.pixel[6 * i + c], b = (double)halves.pixel[6 * i + 3 + c];
+            CHECK_NEAR(0.5 * (a + b), whole.pixel[6 * i + c], 1e-5 * fabs(a + b));
+            apart += 0.25 * (a - b) * (a - b);
+            error += (double)whole.pixel[6 * i + 3 + c] * (double)whole.pixel[6 * i + 3 + c];
+        }
+    CHECK(image_channel(&halves, "b.B") == 5 && halves.channel_count == 6);
+    CHECK_THAT(apart > 0.0 && fabs(apart / error - 1.0) < 0.3, "%g, standard error %g", apart, error);
+    image_release(&whole);
+    image_release(&halves);
+    image_release(&sky);
+    views_init(&rig.views, &rig.scene, &rig.r.segments, rig.r.world.accel, rig.pool);
+    plane_rig_release(&rig);
+}
+
 static void test_environment(void) {
     static const float wrong[] = {NAN, INFINITY, -INFINITY, -3.0f};
     struct image sky;
@@ -82,6 +113,7 @@ static void test_environment(void) {
 
 int main(void) {
     test_dropped();
+    test_halves();
     test_environment();
     return check_result();
 }
