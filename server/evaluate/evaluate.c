@@ -148,6 +148,13 @@ static void make_pair(const struct photograph *p, const struct held_render *rend
     }
 }
 
+static size_t test_views(const struct scene *scene) {
+    size_t count = 0;
+    for (size_t i = 0; i < scene->photograph_count; i++)
+        count += scene->photograph[i].is_test;
+    return count;
+}
+
 /* Renders a view until its MSRE is known well enough. */
 static struct metric render_pair(struct evaluator *e, const struct photograph *p, uint32_t view,
                                  struct image *photograph, struct image *halves) {
@@ -163,7 +170,7 @@ static struct metric render_pair(struct evaluator *e, const struct photograph *p
         held_render_add(&render, &e->recovered.world, &p->camera, e->settings->spp, &path, iteration, e->pool);
         make_pair(p, &render, photograph, halves);
         msre = metrics_msre(photograph, halves, e->median);
-    } while (!held_render_is_done(&render, msre));
+    } while (!held_render_is_done(&render, msre, test_views(&e->scene)));
     held_render_release(&render);
     return msre;
 }

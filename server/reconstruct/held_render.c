@@ -22,8 +22,9 @@ void held_render_add(struct held_render *h, const struct world *world, const str
 
 void held_render_release(struct held_render *h) { image_release(&h->halves); }
 
-bool held_render_is_done(const struct held_render *h, struct metric msre) {
-    return isnan(msre.value) || msre.noise <= HELD_RENDER_GOAL * msre.value || h->rounds >= HELD_RENDER_ROUNDS;
+bool held_render_is_done(const struct held_render *h, struct metric msre, size_t views) {
+    double goal = HELD_RENDER_GOAL * sqrt((double)views) * msre.value;
+    return isnan(msre.value) || msre.noise <= goal || h->rounds >= HELD_RENDER_ROUNDS;
 }
 
 void held_render_mean(const struct image *halves, struct image *mean) {

@@ -147,7 +147,7 @@ static struct metric compare(const struct photograph *photo, const struct held_o
 
 /* Renders a view, again where its error is not known well, unless a time limit says how much is done. */
 static void render_view(struct reconstruction *r, struct photograph *photo, struct held_out *view, uint32_t samples,
-                        double median, const struct reconstruct_hooks *hooks) {
+                        double median, size_t views, const struct reconstruct_hooks *hooks) {
     const struct path_settings path = paths_of(r->settings);
     struct held_render render = {0};
     struct image halves;
@@ -158,7 +158,8 @@ static void render_view(struct reconstruction *r, struct photograph *photo, stru
     held_render_mean(&render.halves, &view->render);
     fit_light(r, photo, view);
     struct metric msre = compare(photo, view, &render, median, &halves);
-    while (!held_render_is_done(&render, msre) && isinf(r->plan.limit_sec) && !hooks->stop_requested(hooks->user)) {
+    while (!held_render_is_done(&render, msre, views) && isinf(r->plan.limit_sec) &&
+           !hooks->stop_requested(hooks->user)) {
         image_release(&halves);
         image_release(&view->render);
         held_render_add(&render, &r->world, &photo->camera, samples, &path, render.rounds, r->pool);
@@ -276,7 +277,7 @@ enum status report_held_out(struct reconstruction *r, const struct views *views,
         struct held_out *view = &r->held_out[r->held_out_count++];
         double pixels = pixels_of(&scene->photograph[i]);
         uint32_t samples = samples_of(r, pixels_left);
-        render_view(r, &scene->photograph[i], view, samples, (double)views->median_radiance, hooks);
+        render_view(r, &scene->photograph[i], view, samples, (double)views->median_radiance, total, hooks);
         pixels_left -= pixels;
         means_add(&means, view);
         cJSON_AddItemToArray(list, view_entry(view));
