@@ -18,6 +18,7 @@ const struct flag demo_flags[] = {
     {"--wall-radiance", "V", "of the emitter on the wall; 0: off (15)"},
     {"--ceiling-radiance", "V", "of the emitter at the ceiling (15)"},
     {"--sdr", NULL, "8-bit photographs, exposures cycling over three values"},
+    {"--opening", NULL, "the wall emitter is a window: behind it the wall is open, which shows where it is removed"},
     {"--texture-size", "N", "texels a side of the room's own textures (1024)"},
     {"--seed", "N", "of random numbers and viewpoints (1)"},
     {"--threads", "N", "0: one per processor (0)"},
@@ -54,6 +55,7 @@ int demo_command(int argc, char **argv) {
     if (code >= 0)
         return code;
     s.sdr = arguments_have(&a, "--sdr");
+    s.has_opening = arguments_have(&a, "--opening");
     struct parallel *pool = parallel_new((int)threads);
     enum status status = demo_generate(a.words[0], &s, pool, show_progress, NULL, &err);
     parallel_free(pool);

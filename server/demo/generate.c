@@ -210,10 +210,11 @@ enum status demo_generate(const char *dir, const struct demo_settings *settings,
                           void (*progress)(void *user, uint32_t done, uint32_t total), void *user, struct error *err) {
     struct generator g = {
         .dir = dir, .settings = settings, .pool = pool, .frame_count = settings->train_count + settings->test_count};
+    const struct room_look look = {settings->texture_size, settings->wall_radiance, settings->ceiling_radiance,
+                                   settings->has_opening};
     enum status status = make_folders(dir, err);
     if (status == STATUS_OK)
-        status =
-            room_init(&g.room, settings->texture_size, settings->wall_radiance, settings->ceiling_radiance, pool, err);
+        status = room_init(&g.room, &look, pool, err);
     if (status != STATUS_OK)
         return status;
     g.camera = mem_calloc(g.frame_count, sizeof *g.camera);

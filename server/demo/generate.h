@@ -23,6 +23,7 @@ struct demo_settings {
     uint32_t max_depth;     /* segments of a path */
     float wall_radiance, ceiling_radiance;
     bool sdr;
+    bool has_opening; /* struct room_look */
     uint64_t seed;
     uint32_t texture_size; /* texels, of the room's own textures */
 };

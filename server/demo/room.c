@@ -58,7 +58,17 @@ static void box(struct shapes *s, enum room_object o, float x0, float y0, float 
     shapes_box(s, o, vec3_make(x0, y0, z0), vec3_make(x1, y1, z1), without);
 }
 
-static void add_shell(struct shapes *s) {
+/* The emitter on the west wall. */
+#define PANEL_BOTTOM 1.1f
+#define PANEL_TOP 2.0f
+#define PANEL_BACK 1.4f
+#define PANEL_FRONT 2.6f
+
+static void add_wall(struct shapes *s, enum room_object o, int face, float y0, float z0, float y1, float z1) {
+    box(s, o, 0.0f, y0, z0, ROOM_WIDTH, y1, z1, (63 & ~face) | SHAPE_INWARD);
+}
+
+static void add_shell(struct shapes *s, bool has_opening) {
     static const struct {
         enum room_object o;
         int face;
@@ -66,8 +76,14 @@ static void add_shell(struct shapes *s) {
         {ROOM_WALL_WEST, SHAPE_LEFT}, {ROOM_WALL_EAST, SHAPE_RIGHT}, {ROOM_FLOOR, SHAPE_BOTTOM},
         {ROOM_CEILING, SHAPE_TOP},    {ROOM_WALL_NORTH, SHAPE_BACK}, {ROOM_WALL_SOUTH, SHAPE_FRONT},
     };
-    for (int i = 0; i < 6; i++)
-        box(s, side[i].o, 0.0f, 0.0f, 0.0f, ROOM_WIDTH, ROOM_HEIGHT, ROOM_DEPTH, (63 & ~side[i].face) | SHAPE_INWARD);
+    for (int i = has_opening; i < 6; i++)
+        add_wall(s, side[i].o, side[i].face, 0.0f, 0.0f, ROOM_HEIGHT, ROOM_DEPTH);
+    if (!has_opening)
+        return;
+    add_wall(s, ROOM_WALL_WEST, SHAPE_LEFT, 0.0f, 0.0f, PANEL_BOTTOM, ROOM_DEPTH);
+    add_wall(s, ROOM_WALL_WEST, SHAPE_LEFT, PANEL_TOP, 0.0f, ROOM_HEIGHT, ROOM_DEPTH);
+    add_wall(s, ROOM_WALL_WEST, SHAPE_LEFT, PANEL_BOTTOM, 0.0f, PANEL_TOP, PANEL_BACK);
+    add_wall(s, ROOM_WALL_WEST, SHAPE_LEFT, PANEL_BOTTOM, PANEL_FRONT, PANEL_TOP, ROOM_DEPTH);
 }
 
 static void add_table(struct shapes *s) {
@@ -162,8 +178,9 @@ static void add_sofa(struct shapes *s) {
 
 static void add_lamps(struct shapes *s) {
     const vec3 x = {1.0f, 0.0f, 0.0f}, y = {0.0f, 1.0f, 0.0f}, z = {0.0f, 0.0f, 1.0f};
-    box(s, ROOM_WALL_EMITTER, 0.0f, 1.1f, 1.4f, 0.03f, 2.0f, 2.6f, 63 & ~SHAPE_RIGHT);
-    add_frame(s, ROOM_LAMP_FRAMES, vec3_make(0.0f, 1.1f, 1.4f), vec3_make(0.06f, 2.0f, 2.6f), z, y, 0.06f, SHAPE_LEFT);
+    box(s, ROOM_WALL_EMITTER, 0.0f, PANEL_BOTTOM, PANEL_BACK, 0.03f, PANEL_TOP, PANEL_FRONT, 63 & ~SHAPE_RIGHT);
+    add_frame(s, ROOM_LAMP_FRAMES, vec3_make(0.0f, PANEL_BOTTOM, PANEL_BACK), vec3_make(0.06f, PANEL_TOP, PANEL_FRONT),
+              z, y, 0.06f, SHAPE_LEFT);
     box(s, ROOM_CEILING_EMITTER, 2.1f, 2.76f, 1.6f, 2.9f, ROOM_HEIGHT, 2.4f, 63 & ~SHAPE_BOTTOM);
     add_frame(s, ROOM_LAMP_FRAMES, vec3_make(2.1f, 2.73f, 1.6f), vec3_make(2.9f, ROOM_HEIGHT, 2.4f), x, z, 0.05f,
               SHAPE_TOP);
@@ -206,26 +223,25 @@ static void paint_row(void *user, size_t y, int thread) {
     }
 }
 
-static void make_materials(struct room *room, float wall_radiance, float ceiling_radiance, struct parallel *pool) {
+static void make_materials(struct room *room, const struct room_look *look, struct parallel *pool) {
     materials_init(&room->materials, &room->inverse, room->segments.count, rgb_gray(0.5f), 0.5f, 0.5f);
     for (size_t i = 0; i < ROOM_OBJECT_COUNT; i++) {
         room->materials.roughness[i] = object[i].roughness;
         room->materials.specular[i] = object[i].specular;
     }
     /* The ceiling lamp is warm, the wall emitter daylight. */
-    room->materials.emission[ROOM_WALL_EMITTER] = rgb_scale(rgb_make(0.92f, 1.0f, 1.08f), wall_radiance);
-    room->materials.emission[ROOM_CEILING_EMITTER] = rgb_scale(rgb_make(1.1f, 1.0f, 0.85f), ceiling_radiance);
+    room->materials.emission[ROOM_WALL_EMITTER] = rgb_scale(rgb_make(0.92f, 1.0f, 1.08f), look->wall_radiance);
+    room->materials.emission[ROOM_CEILING_EMITTER] = rgb_scale(rgb_make(1.1f, 1.0f, 0.85f), look->ceiling_radiance);
     struct painting painting = {room};
     parallel_for(pool, room->atlas.height, paint_row, &painting);
 }
 
-enum status room_init(struct room *room, uint32_t texture_size, float wall_radiance, float ceiling_radiance,
-                      struct parallel *pool, struct error *err) {
+enum status room_init(struct room *room, const struct room_look *look, struct parallel *pool, struct error *err) {
     struct shapes s;
     struct mesh_report report;
     memset(room, 0, sizeof *room);
     shapes_init(&s);
-    add_shell(&s);
+    add_shell(&s, look->has_opening);
     add_table(&s);
     add_door(&s);
     add_shelves(&s);
@@ -239,11 +255,11 @@ enum status room_init(struct room *room, uint32_t texture_size, float wall_radia
     assert(report.degenerate_count == 0 && report.duplicate_count == 0);
     segments_from_object_id(&room->segments, &room->mesh);
     assert(room->segments.count == ROOM_OBJECT_COUNT);
-    status = atlas_make(&room->atlas, &room->mesh, &room->segments, texture_size, 0.0f, ATLAS_PADDING, err);
+    status = atlas_make(&room->atlas, &room->mesh, &room->segments, look->texture_size, 0.0f, ATLAS_PADDING, err);
     if (status != STATUS_OK)
         goto out;
     inverse_uv_make(&room->inverse, &room->atlas, room->mesh.triangle_count, pool);
-    make_materials(room, wall_radiance, ceiling_radiance, pool);
+    make_materials(room, look, pool);
     status = world_init(&room->world, &room->mesh, &room->segments, &room->atlas, &room->materials, NULL, pool, err);
 out:
     if (status != STATUS_OK)

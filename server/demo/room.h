@@ -6,6 +6,7 @@
 #ifndef UNBAKE_DEMO_ROOM_H
 #define UNBAKE_DEMO_ROOM_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -34,9 +35,15 @@ const char *room_object_name(enum room_object object);
 /* Bounding boxes of the furniture, which cameras avoid; [*count], static storage. */
 const vec3 (*room_obstacles(size_t *count))[2];
 
-/* Builds geometry, textures of texture_size texels a side, and the acceleration structure. */
-enum status room_init(struct room *room, uint32_t texture_size, float wall_radiance, float ceiling_radiance,
-                      struct parallel *pool, struct error *err);
+/* What of a room can be chosen. */
+struct room_look {
+    uint32_t texture_size; /* texels a side */
+    float wall_radiance, ceiling_radiance;
+    bool has_opening; /* behind the emitter on the wall, which then is a window: without it one looks out of the room */
+};
+
+/* Builds geometry, textures, and the acceleration structure. */
+enum status room_init(struct room *room, const struct room_look *look, struct parallel *pool, struct error *err);
 void room_release(struct room *room);
 
 #endif

@@ -14,11 +14,20 @@ static float pixel(const struct image *image, const char *channel, size_t i) {
     return image->pixel[i * image->channel_count + (size_t)(c < 0 ? 0 : c)];
 }
 
-/* The room is closed, its normals look inwards, its colours are reflectances. */
-static void test_room(struct parallel *pool) {
+/* What a ray from outside meets first that comes in where the emitter on the wall is. */
+static void test_behind_panel(const struct room *room, enum room_object wanted) {
+    struct accel_hit hit;
+    vec3 outside = {-1.0f, 1.5f, 2.1f}, in = {1.0f, 0.0f, 0.0f};
+    CHECK(accel_intersect(room->world.accel, outside, in, 0.0f, 10.0f, &hit));
+    CHECK_THAT(room->mesh.object_id[hit.triangle] == wanted, "object %d", (int)room->mesh.object_id[hit.triangle]);
+}
+
+/* The room is closed, its normals look inwards, its colours are reflectances. The panel of a window closes it, too. */
+static void test_room(bool has_opening, struct parallel *pool) {
     struct room room;
     struct error err;
-    CHECK(room_init(&room, 256, 15.0f, 10.0f, pool, &err) == STATUS_OK);
+    CHECK(room_init(&room, &(struct room_look){256, 15.0f, 10.0f, has_opening}, pool, &err) == STATUS_OK);
+    test_behind_panel(&room, has_opening ? ROOM_WALL_EMITTER : ROOM_WALL_WEST);
     vec3 centre = {2.5f, 1.4f, 3.0f};
     for (int i = 0; i < 2000; i++) {
         float y = 1.0f - 2.0f * ((float)i + 0.5f) / 2000.0f, r = sqrtf(1.0f - y * y);
@@ -104,7 +113,8 @@ int main(void) {
     char dir[] = "/tmp/unbake-demo-XXXXXX";
     struct parallel *pool = parallel_new(2);
     CHECK(mkdtemp(dir) != NULL);
-    test_room(pool);
+    test_room(false, pool);
+    test_room(true, pool);
     test_bundle(dir, false, pool);
     test_bundle(dir, true, pool);
     CHECK(file_remove_tree(dir, NULL) == STATUS_OK);
