@@ -9,6 +9,7 @@
 
 #include "common/file.h"
 #include "common/mem.h"
+#include "common/utf8.h"
 #include "server/ingest/path.h"
 
 #define HEAD_BYTES 4096 /* of a file that is recognised by what it begins with */
@@ -228,8 +229,11 @@ enum status listing_text(const struct listing *l, const char *path, size_t limit
     *text = NULL;
     if (status == STATUS_OK && file.size > limit)
         status = error_set(err, STATUS_LIMIT, "%s is larger than %zu bytes", path, limit);
+    size_t length, mark = file.size >= 3 && memcmp(file.data, "\xef\xbb\xbf", 3) == 0 ? 3 : 0;
     if (status == STATUS_OK)
-        *text = mem_strndup(file.data, file.size);
+        *text = utf8_from_utf16(file.data, file.size, &length);
+    if (status == STATUS_OK && !*text)
+        *text = mem_strndup((const char *)file.data + mark, file.size - mark);
     mapping_close(&file);
     return status;
 }

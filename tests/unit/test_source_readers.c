@@ -259,6 +259,7 @@ static void test_opensfm(void) {
 static void test_realitycapture(void) {
     source_rig_start(&rig, "RealityCapture");
     put("images/b.jpg", "");
+    put("images/c.jpg", "");
     put("export.csv", "#cameras 1\n" RC_HEADER "b.jpg," RC_POSE ",23.4,0.225,0.45,0.1,0,0,0,0.01,0.02\n");
     const struct frame *frame = check(0, 1, "images/b.jpg");
     struct camera camera;
@@ -268,6 +269,7 @@ static void test_realitycapture(void) {
     CHECK_NEAR(camera.cx, 81, 1e-4);
     CHECK_NEAR(camera.cy, 62, 1e-4);
     CHECK_NEAR(camera.p[1], 0.02, 1e-7);
+    CHECK(source_rig_warned(&rig, "1 photographs in images/ have no pose"));
     CHECK(frame_camera(frame, 120, 160, (double[3]){0}, &camera, &err) == STATUS_OK && fabsf(camera.cx - 61) < 1e-4f);
     put("export.csv", RC_HEADER "b.jpg,1,2,3,0,0,x,23.4,0,0,0,0,0,0,0,0\n");
     source_rig_refused(&rig, "line 2: column 7 is no number");
@@ -415,7 +417,15 @@ static void test_tum(void) {
     check_lens(&check(0, 2, "rgb/1.00.png")->lens, 520.9, 325.6, 250.2, 0.2312, -0.0033, -0.0001);
     CHECK_NEAR(t->frame[1].world_from_camera.translation[0], 2.0, 1e-9); /* half way */
     CHECK(source_rig_warned(&rig, "1 photographs have no pose at their time"));
-    put("calibration.txt", "500 501 320 240");
+    /* as Windows' editors save it, and PowerShell */
+    source_rig_put_bytes(&rig, "calibration.txt",
+                         "\xff\xfe"
+                         "5\0000\0000\0 \0005\0000\0001\0 \0003\0002\0000\0 \0002\0004\0000\0",
+                         32);
+    CHECK(source_rig_read(&rig) && t->frame_count == 2 && t->frame[0].lens.fl_y == 501.0);
+    put("groundtruth.txt", "\xef\xbb\xbf# ground truth\n1.09 3 1 1 0 0 0 1\n1.00 " TUM_LINE "\n1.01 1 1 1 0 0 0 1\n");
+    put("calibration.txt", "\xef\xbb\xbf"
+                           "500 501 320 240");
     CHECK(source_rig_read(&rig) && t->frame_count == 2 && t->frame[0].lens.fl_y == 501.0 &&
           t->frame[0].lens.cx == 320.5);
     put("calibration.txt", "500");
@@ -454,7 +464,8 @@ static void test_colmap_models(void) {
     source_rig_start(&rig, "COLMAP");
     put("a/sparse/0/cameras.txt", cameras);
     put("a/sparse/0/images.txt", "1 1 0 0 0 0 0 0 1 x.jpg\n\n");
-    put("a/sparse/1/cameras.txt", cameras);
+    put("a/sparse/1/cameras.txt", "\xef\xbb\xbf"
+                                  "1 PINHOLE 64 48 50 51 32 24\r\n");
     put("a/sparse/1/images.txt", "1 1 0 0 0 0 0 0 1 y.jpg\n\n2 1 0 0 0 1 0 0 1 z.jpg\n\n");
     put("a/photos/x.jpg", "");
     put("a/photos/y.jpg", "");

@@ -14,6 +14,7 @@
 #include "server/ingest/source/values.h"
 
 #define MAX_LIST_BYTES ((size_t)16 << 20)
+#define MAX_OUT_BYTES ((size_t)1 << 30) /* with its points */
 
 static char *recognise(const struct listing *l, const char *base) {
     static const char *const names[] = {"bundle.out", "bundle/bundle.out", "bundle.rd.out"};
@@ -95,18 +96,14 @@ static enum status read_cameras(const char *text, const char *names, struct fram
 
 static enum status read(const struct source_place *place, struct frames *t, struct findings *f, struct error *err) {
     struct frame_list list = frame_list_make(t, place->found, AXES_OPENGL_INVERSE, f);
-    struct mapping file;
     struct error own;
-    char *names = NULL;
-    enum status status = listing_open(place->listing, place->found, "a list of cameras", &file, &own);
+    char *names = NULL, *text;
+    enum status status = listing_text(place->listing, place->found, MAX_OUT_BYTES, &text, &own);
     if (status == STATUS_OK)
         status = read_list(place, &names, &own);
-    if (status == STATUS_OK) {
-        char *text = mem_strndup(file.data, file.size);
+    if (status == STATUS_OK)
         status = read_cameras(text, names, &list, &own);
-        mem_free(text);
-    }
-    mapping_close(&file);
+    mem_free(text);
     photo_folder_settle(place->listing, place->base, false, t, f);
     mem_free(names);
     return findings_settle(f, place->found, status, &own, err);

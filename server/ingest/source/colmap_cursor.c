@@ -42,7 +42,8 @@ enum status colmap_cut_off(const struct colmap_cursor *r) {
 /* --- lines ---------------------------------------------------------------------------------- */
 
 bool colmap_next_line(struct colmap_cursor *r) {
-    size_t from = r->line == 0 ? 0 : r->line_end + 1;
+    bool has_mark = r->size >= 3 && memcmp(r->data, "\xef\xbb\xbf", 3) == 0; /* editors of Windows */
+    size_t from = r->line > 0 ? r->line_end + 1 : has_mark ? 3 : 0;
     if (from >= r->size)
         return false;
     const uint8_t *newline = memchr(r->data + from, '\n', r->size - from);

@@ -147,7 +147,7 @@ static enum status read_table(const struct source_place *place, struct frames *t
                          "%s: %zu lenses have k1 alone and are taken for RealityCapture's division model, since its "
                          "Brown models have three coefficients; the XMP files say which it is",
                          place->found, division_count);
-    photo_folder_settle(place->listing, place->base, false, t, f);
+    photo_folder_settle(place->listing, place->base, true, t, f);
     return findings_settle(f, place->found, status, &own, err);
 }
 
