@@ -132,6 +132,9 @@ static void test_bundler(void) {
     const struct frame *frame = check(0, 1, "images/b.jpg");
     CHECK(isnan(frame->lens.cx) && frame->lens.fl_x == 100.0 && frame->lens.k[0] == -0.1 && frame->lens.k[1] == 0.02);
     CHECK(source_rig_warned(&rig, "2 photographs have no pose"));
+    put("list.txt", "./x y.jpg\n./images/b c.JPG 0 541.2\n./y.jpg\n");
+    put("images/b c.jpg", "");
+    check(0, 1, "images/b c.jpg");
     put("list.txt", "./x.jpg\n");
     source_rig_refused(&rig, "names only 1 photographs");
     put("bundle.out", "# Bundle file v0.3\n1 0\n100 0 0\n1 0 0\n");
@@ -396,7 +399,9 @@ static void test_arkitscenes(void) {
     put("lowres_wide.traj", "10.0 0 0 0 1 2 3\n10.5 " ARKIT_LINE "\n10.6 " ARKIT_LINE "\n");
     put("lowres_wide/40753679_10.550.png", "");
     put("lowres_wide/40753679_99.0.png", "");
-    put("lowres_wide_intrinsics/40753679_10.550.pincam", "256 192 212 213 127 95\n");
+    put("lowres_wide_intrinsics/40753679_10.200.pincam", "256 192 200 200 128 96\n");
+    put("lowres_wide_intrinsics/40753679_10.551.pincam", "256 192 212 213 127 95\n"); /* rounded differently */
+    put("lowres_wide_intrinsics/40753679_10.900.pincam", "256 192 200 200 128 96\n");
     check_lens(&check(0, 1, "lowres_wide/40753679_10.550.png")->lens, 212, 127, 95, 0, 0, 0);
     CHECK(source_rig_warned(&rig, "1 photographs have no pose at their time"));
     put("lowres_wide.traj", "10.0 0 0 0 1 2\n");

@@ -47,14 +47,32 @@ static enum status read_track(const struct source_place *place, struct pose_trac
     return status;
 }
 
-/* The lens of the photograph whose name without extension is `stem`, or else the first one. */
+/* The lens file that is nearest in time; NULL: there is none. */
+static const struct listed_file *nearest_lens(const struct source_place *place, double time_sec) {
+    const struct listed_file *file, *best = NULL;
+    double least = INFINITY;
+    for (size_t at = 0;
+         (file = listing_match(place->listing, place->base, "lowres_wide_intrinsics/*.pincam", &at)) != NULL;) {
+        const char *time = strrchr(file->path, '_');
+        double off = time ? fabs(strtod(time + 1, NULL) - time_sec) : INFINITY;
+        if (!best || off < least) {
+            least = off;
+            best = file;
+        }
+    }
+    return best;
+}
+
+/* The lens of the photograph whose name without extension is `stem`: its times are rounded differently now and then, so
+ * that it may be found by the time only. */
 static enum status read_lens(const struct source_place *place, const char *stem, struct lens *lens, struct error *err) {
     double v[6];
     char *own = mem_printf("lowres_wide_intrinsics/%s.pincam", stem);
     const struct listed_file *file = listing_find(place->listing, place->base, own);
     mem_free(own);
+    const char *time = strrchr(stem, '_');
     if (!file)
-        file = listing_first(place->listing, place->base, "lowres_wide_intrinsics/*.pincam");
+        file = nearest_lens(place, time ? strtod(time + 1, NULL) : 0.0);
     if (!file)
         return error_set(err, STATUS_INPUT, "no lens: there is no lowres_wide_intrinsics/*.pincam");
     enum status status = numbers_read(place->listing, file->path, 6, "a lens (w h fx fy cx cy)", v, err);

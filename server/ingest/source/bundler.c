@@ -52,6 +52,20 @@ static enum status read_list(const struct source_place *place, char **text, stru
     return error_hint(err, "list.txt holds the name of a photograph a line, in the order of the cameras");
 }
 
+/* Cuts what follows a photograph's name, its flag and focal length ("a b.jpg 0 541.2"): at the first blank behind a
+ * picture's extension or, where there is none, the first of all. */
+static void cut_name(char *line) {
+    for (char *blank = line; (blank += strcspn(blank, " \t"))[0] != '\0'; blank++) {
+        char kept = *blank;
+        *blank = '\0';
+        if (photo_is_picture(line))
+            return;
+        *blank = kept;
+    }
+    if (!photo_is_picture(line))
+        line[strcspn(line, " \t")] = '\0';
+}
+
 /* A camera's 15 numbers; `name` is that of its photograph. */
 static enum status add_camera(struct frame_list *list, const double v[15], const char *name, size_t number,
                               struct error *err) {
@@ -79,7 +93,7 @@ static enum status read_cameras(const char *text, const char *names, struct fram
         if (!line)
             return error_set(err, STATUS_INPUT, "%s has %.0f cameras, but the list names only %zu photographs",
                              list->name, counts[0], i);
-        line[strcspn(line, " \t")] = '\0'; /* its focal length may follow */
+        cut_name(line);
         if (!take(&text, 15, v))
             status = error_set(err, STATUS_INPUT, "%s: camera %zu has not its 15 numbers", list->name, i);
         else if (v[0] == 0.0)
