@@ -449,6 +449,34 @@ static void test_sevenscenes(void) {
     source_rig_stop(&rig);
 }
 
+#define NERF(model, file)                                                                                              \
+    "{\"camera_model\":\"" model                                                                                       \
+    "\",\"w\":160,\"h\":120,\"fl_x\":104,\"fl_y\":104,\"cx\":80,\"cy\":60,\"k1\":0.1,\"frames\":["                     \
+    "{\"file_path\":\"" file "\",\"mask_path\":\"DSC1.png\",\"is_bad\":false,\"transform_matrix\":"                    \
+    "[[0,0,1,2],[0,1,0,1],[-1,0,0,3],[0,0,0,1]]}]}"
+
+/* As downloaded, and with the photographs without distortion only: the lens follows the photographs. */
+static void test_scannetpp(void) {
+    source_rig_start(&rig, "ScanNet++");
+    put("scans/mesh_aligned_0.05.ply", "");
+    put("dslr/nerfstudio/transforms.json", NERF("OPENCV_FISHEYE", "DSC1.JPG"));
+    put("dslr/nerfstudio/transforms_undistorted.json", NERF("PINHOLE", "DSC1.JPG"));
+    put("dslr/resized_images/DSC1.JPG", "");
+    put("dslr/resized_undistorted_images/DSC1.JPG", "");
+    put("dslr/resized_anon_masks/DSC1.png", "");
+    put("dslr/resized_undistorted_masks/DSC1.png", "");
+    CHECK(source_rig_read(&rig) && rig.t.frame_count == 1 && rig.t.frame[0].lens.model == CAMERA_OPENCV_FISHEYE);
+    CHECK_STRING(rig.t.frame[0].file, "dslr/resized_images/DSC1.JPG");
+    CHECK_STRING(rig.t.frame[0].mask, "dslr/resized_anon_masks/DSC1.png");
+    CHECK_NEAR(rig.t.frame[0].world_from_camera.translation[0], 1, 1e-12); /* axes as the mesh has them */
+    CHECK_NEAR(rig.t.frame[0].world_from_camera.translation[2], -3, 1e-12);
+    source_rig_drop(&rig, "dslr/resized_images/DSC1.JPG");
+    CHECK(source_rig_read(&rig) && rig.t.frame_count == 1 && rig.t.frame[0].lens.model == CAMERA_OPENCV);
+    CHECK_STRING(rig.t.frame[0].file, "dslr/resized_undistorted_images/DSC1.JPG");
+    CHECK_STRING(rig.t.frame[0].mask, "dslr/resized_undistorted_masks/DSC1.png");
+    source_rig_stop(&rig);
+}
+
 static void test_matterport(void) {
     source_rig_start(&rig, "Matterport3D");
     put("v1/scans/17D/matterport_camera_poses/ab12_pose_1_4.txt", CV_MATRIX);
@@ -497,6 +525,7 @@ int main(void) {
     test_arkitscenes();
     test_tum();
     test_sevenscenes();
+    test_scannetpp();
     test_matterport();
     test_colmap_models();
     return check_result();

@@ -4,7 +4,8 @@
  *
  * The poses are those of ns-process-data, whose x and y are the mesh's y and x, and z its -z, which the file does not
  * say; they are turned back. Photographs marked is_bad are left out, test_frames held out. The same file put flat beside
- * the mesh is known by the mesh's name. */
+ * the mesh is known by the mesh's name. Where only the photographs without distortion are there, which the data set's
+ * toolkit makes, their own file is read: names are the same, lenses are not. */
 #include <string.h>
 
 #include "common/mem.h"
@@ -15,16 +16,29 @@
 
 static const double applied[3][4] = {{0, 1, 0, 0}, {1, 0, 0, 0}, {0, 0, -1, 0}};
 
+#define UNDISTORTED "dslr/resized_undistorted_images"
+#define UNDISTORTED_FILE "dslr/nerfstudio/transforms_undistorted.json"
+
 static char *recognise(const struct listing *l, const char *base) {
-    const struct listed_file *file = listing_find(l, base, "dslr/nerfstudio/transforms.json");
+    bool is_undistorted =
+        listing_has_folder(l, base, UNDISTORTED) && !listing_has_folder(l, base, "dslr/resized_images");
+    const struct listed_file *file = is_undistorted ? listing_find(l, base, UNDISTORTED_FILE) : NULL;
+    if (!file)
+        file = listing_find(l, base, "dslr/nerfstudio/transforms.json");
     if (!file && listing_first(l, base, "mesh_aligned_0.05*.ply"))
         file = listing_find(l, base, "transforms.json");
     return file ? mem_strdup(file->path) : NULL;
 }
 
+static bool reads_undistorted(const struct source_place *place) {
+    return strcmp(place->found + strlen(place->base), UNDISTORTED_FILE) == 0;
+}
+
 /* Masks are in a folder of their own. Those that were not downloaded are done without. */
 static void settle_masks(const struct source_place *place, struct frames *t, struct findings *f) {
-    static const char *const folders[] = {"dslr/resized_anon_masks/", "resized_anon_masks/", "masks/", ""};
+    bool is_undistorted = reads_undistorted(place);
+    const char *const folders[] = {is_undistorted ? "dslr/resized_undistorted_masks/" : "dslr/resized_anon_masks/",
+                                   "resized_anon_masks/", "masks/", ""};
     size_t absent_count = 0;
     for (size_t i = 0; i < t->frame_count; i++) {
         char **mask = &t->frame[i].mask, *old = *mask;
@@ -43,7 +57,9 @@ static void settle_masks(const struct source_place *place, struct frames *t, str
 }
 
 static enum status read(const struct source_place *place, struct frames *t, struct findings *f, struct error *err) {
-    char *folder = mem_strndup(place->found, (size_t)(path_base(place->found) - place->found));
+    bool is_undistorted = reads_undistorted(place);
+    char *folder = is_undistorted ? mem_printf("%s" UNDISTORTED "/", place->base)
+                                  : mem_strndup(place->found, (size_t)(path_base(place->found) - place->found));
     enum status status = transforms_file_read(place, place->found, t, f, err);
     settle_masks(place, t, f);
     photo_folder_settle(place->listing, folder, false, t, f);
