@@ -57,16 +57,20 @@ struct executor_use *executors_for(struct executors *p, const char *wish) {
     return NULL;
 }
 
-char *executors_free(const struct executors *p) {
+static char *list_names(const struct executors *p, bool all) {
     struct buf names;
     buf_init(&names, NAMES_MAX);
     for (size_t i = 0; i < p->count; i++)
-        if (is_free(&p->use[i]))
+        if (all || is_free(&p->use[i]))
             buf_printf(&names, "%s%s ", names.length ? "" : " ", p->use[i].executor->name);
     char *text = names.length ? mem_strdup(buf_text(&names)) : NULL;
     buf_release(&names);
     return text;
 }
+
+char *executors_names(const struct executors *p) { return list_names(p, true); }
+
+char *executors_free(const struct executors *p) { return list_names(p, false); }
 
 void executors_add(struct executors *p, const struct executor *executor) {
     for (size_t i = 0; i < p->count; i++)

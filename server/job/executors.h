@@ -6,6 +6,8 @@
 
 #include "server/job/attempt.h"
 
+#define EXECUTOR_REASON "its executor is not configured" /* the beginning of the reason of a job that waits for one */
+
 struct executor_use {
     const struct executor *executor; /* borrowed */
     size_t limit, running;           /* jobs */
@@ -20,6 +22,8 @@ struct executors {
 
 void executors_init(struct executors *p, const struct scheduler_config *config);
 void executors_release(struct executors *p);
+/* The names of all, as store_job_next takes them; the caller's. */
+char *executors_names(const struct executors *p);
 /* Counts the attempts that are alive or still to be settled, and opens all places. */
 void executors_count(struct executors *p, const struct attempt *slots, size_t count);
 struct executor_use *executors_find(struct executors *p, const char *name); /* NULL: there is none of that name */

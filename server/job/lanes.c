@@ -20,11 +20,15 @@ void lanes_init(struct lanes *l, const struct scheduler_config *config, struct s
     admission_init(&l->admission, config->jobs_memory_bytes, config->worker_memory_bytes);
     admission_init(&l->small_admission, config->jobs_memory_bytes, config->worker_memory_bytes);
     executors_init(&l->places, config);
+    l->executors = executors_names(&l->places);
     l->main_slots = l->places.slots + count_elsewhere(store);
     l->job_slots = l->main_slots + (size_t)config->small_renders;
 }
 
-void lanes_release(struct lanes *l) { executors_release(&l->places); }
+void lanes_release(struct lanes *l) {
+    executors_release(&l->places);
+    mem_free(l->executors);
+}
 
 void lanes_forget_reasons(struct lanes *l) { l->admission.told_id = l->small_admission.told_id = -1; }
 
@@ -132,9 +136,35 @@ static enum status start_lane(struct lanes *l, bool is_small, struct error *err)
     return STATUS_OK;
 }
 
+/* Queued jobs that must run where nothing is any more say so; those whose executor is there again forget it. */
+static enum status explain_executors(struct lanes *l, struct error *err) {
+    enum status status = STATUS_OK;
+    if (!l->knows_executors)
+        status = store_job_explain(l->store, 0, "", EXECUTOR_REASON, "", err);
+    l->knows_executors |= status == STATUS_OK;
+    while (status == STATUS_OK) {
+        char *name, *reason;
+        int64_t id;
+        status = store_job_unplaced(l->store, l->executors, EXECUTOR_REASON, &id, &name, err);
+        if (status != STATUS_OK)
+            break;
+        reason = mem_printf(EXECUTOR_REASON ": %.31s", name);
+        status = store_job_explain(l->store, id, reason, "",
+                                   "An administrator can configure it again (option executors). Or cancel the job, and "
+                                   "submit it without executor.",
+                                   err);
+        mem_free(reason);
+        mem_free(name);
+    }
+    return status == STATUS_NOT_FOUND ? STATUS_OK : status;
+}
+
 enum status lanes_start(struct lanes *l, struct error *err) {
-    enum status status = start_lane(l, true, err);
-    struct error other;
+    struct error other, unexplained;
+    enum status explained = explain_executors(l, &unexplained), status = start_lane(l, true, err);
     enum status main_status = start_lane(l, false, status == STATUS_OK ? err : &other);
-    return status == STATUS_OK ? main_status : status;
+    status = status == STATUS_OK ? main_status : status;
+    if (status == STATUS_OK && explained != STATUS_OK)
+        *err = unexplained;
+    return status == STATUS_OK ? explained : status;
 }

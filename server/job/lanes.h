@@ -16,6 +16,8 @@ struct lanes {
     struct counters *counters;
     struct executors places;
     size_t main_slots, job_slots; /* slots of the main lane; of both, the small renders' last */
+    bool knows_executors;         /* what an earlier daemon has said of them is forgotten */
+    char *executors;              /* names of all, as store_job_next takes them; owned */
     struct attempt *slot;         /* [job_slots]; borrowed, set by the owner */
     struct admission admission, small_admission;
 };

@@ -88,6 +88,10 @@ enum status store_job_executor(struct store *store, int64_t id, char **executor,
 /* Running jobs and the requests to them, for the scheduler. Fills ids[limit], wanted[limit]. */
 enum status store_job_running(struct store *store, size_t limit, int64_t *ids, enum job_wanted *wanted, size_t *count,
                               struct error *err);
+/* A queued job that must run on another executor than those (names with a blank before and after each), and whose reason
+ * does not begin with `prefix`. STATUS_NOT_FOUND if none. *executor is the caller's. */
+enum status store_job_unplaced(struct store *store, const char *executors, const char *prefix, int64_t *id,
+                               char **executor, struct error *err);
 /* Says why queued jobs wait. Sets the reason of the job `only` (0: of every queued job that has another one).
  * `reason` "": clears reasons that begin with `prefix`. Each change is a state event. */
 enum status store_job_explain(struct store *store, int64_t only, const char *reason, const char *prefix,

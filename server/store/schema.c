@@ -307,7 +307,10 @@ static const char step_21[] =
     "END;"
     "INSERT OR IGNORE INTO job_labels SELECT key, value, jobs.id FROM jobs, json_each(jobs.labels);";
 
-const char *const schema_steps[] = {step_1,  step_2,  step_3,  step_4,  step_5,  step_6,  step_7,
-                                    step_8,  step_9,  step_10, step_11, step_12, step_13, step_14,
-                                    step_15, step_16, step_17, step_18, step_19, step_20, step_21};
+/* Queued jobs that must run on a certain executor: a round of the scheduler looks for those whose executor is gone. */
+static const char step_22[] = "CREATE INDEX jobs_by_executor ON jobs (executor) WHERE state = 0 AND executor <> '';";
+
+const char *const schema_steps[] = {step_1,  step_2,  step_3,  step_4,  step_5,  step_6,  step_7,  step_8,
+                                    step_9,  step_10, step_11, step_12, step_13, step_14, step_15, step_16,
+                                    step_17, step_18, step_19, step_20, step_21, step_22};
 const int schema_version = (int)(sizeof schema_steps / sizeof schema_steps[0]);

@@ -46,6 +46,27 @@ enum status store_job_executor(struct store *store, int64_t id, char **executor,
                                          : status;
 }
 
+enum status store_job_unplaced(struct store *store, const char *executors, const char *prefix, int64_t *id,
+                               char **executor, struct error *err) {
+    sqlite3_stmt *stmt;
+    bool found = false;
+    *executor = NULL;
+    store_lock(store);
+    enum status status = sql_first(&store->sql, &stmt, &found, err,
+                                   "SELECT id, executor FROM jobs WHERE state = 0 AND executor <> '' AND kind = 0"
+                                   " AND instr(?1, ' ' || executor || ' ') = 0"
+                                   " AND substr(reason, 1, length(?2)) <> ?2 LIMIT 1",
+                                   "tt", executors, prefix);
+    if (found) {
+        *id = sqlite3_column_int64(stmt, 0);
+        *executor = sql_dup(stmt, 1);
+        sqlite3_reset(stmt);
+    }
+    store_unlock(store);
+    return status == STATUS_OK && !found ? error_set(err, STATUS_NOT_FOUND, "every queued job has its executor")
+                                         : status;
+}
+
 enum status store_queue_check(struct store *store, int64_t owner_id, const struct count_limits *limits,
                               struct error *err) {
     int64_t queued;

@@ -22,7 +22,8 @@ for job in 1 2; do
     rm -r "$folder/attempt-1"
 done
 sqlite3 "$data/state.db" "DROP TABLE attempts; DROP TABLE usage_months; DROP TABLE remote; DROP TABLE attempt_lines;
-    DROP TRIGGER job_labels_of_new; DROP TRIGGER job_labels_of_changed; DROP TABLE job_labels; DROP TABLE job_files; DROP INDEX jobs_by_source; ALTER TABLE jobs DROP COLUMN executor;
+    DROP INDEX jobs_by_executor; DROP TRIGGER job_labels_of_new; DROP TRIGGER job_labels_of_changed;
+    DROP TABLE job_labels; DROP TABLE job_files; DROP INDEX jobs_by_source; ALTER TABLE jobs DROP COLUMN executor;
     ALTER TABLE jobs DROP COLUMN kind; ALTER TABLE jobs DROP COLUMN source_id; ALTER TABLE jobs DROP COLUMN cost;
     UPDATE outputs SET attempt = 7; PRAGMA user_version = 16" || fail "sqlite3"
 

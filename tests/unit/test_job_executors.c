@@ -1,7 +1,7 @@
 /* test_job_executors.c -- where jobs run: whose turn it is when some places are full, and which place a job gets. */
 #include <string.h>
 
-#include "server/job/executors.h"
+#include "server/job/lanes.h"
 #include "server/store/remote.h"
 #include "tests/unit/store_rig.h"
 
@@ -105,6 +105,45 @@ static void test_rename(struct store *store) {
     IS(store_remote_may_read(store, &key, &err), STATUS_CONFLICT);
 }
 
+static void check_reason(struct store *store, int64_t id, const char *wanted) {
+    struct job job;
+    OK(store_job_get(store, id, &job, &err));
+    CHECK_STRING(job.reason, wanted);
+    job_release(&job);
+}
+
+/* A round of a scheduler that has the executors `process` and, if `has_slurm`, `slurm`, of which none has a place. */
+static void play_round(struct store *store, bool has_slurm) {
+    const struct executor here = {.name = "process"}, slurm = {.name = "slurm", .max_running = 1};
+    const struct executor *places[] = {&here, &slurm};
+    const struct scheduler_config config = {
+        .executor = &here, .max_running = 1, .places = places, .place_count = has_slurm ? 2 : 1};
+    struct counters counters = {0};
+    struct lanes lanes;
+    lanes_init(&lanes, &config, store, &counters);
+    lanes.slot = mem_calloc(lanes.job_slots, sizeof *lanes.slot);
+    for (size_t i = 0; i < lanes.job_slots; i++)
+        lanes.slot[i] = (struct attempt){.phase = ATTEMPT_ENDED, .executor = places[i % 2]};
+    OK(lanes_start(&lanes, &err));
+    OK(lanes_start(&lanes, &err));
+    mem_free(lanes.slot);
+    lanes_release(&lanes);
+}
+
+/* A job whose executor was removed from the configuration says why it waits, until it is there again. */
+static void test_removed(struct store *store) {
+    int64_t gone = add_on(store, "{\"executor\":\"slurm\"}"), other = add_on(store, "{\"executor\":\"process\"}");
+    play_round(store, true);
+    check_reason(store, gone, "");
+    play_round(store, false);
+    check_reason(store, gone, "its executor is not configured: slurm");
+    check_reason(store, other, "");
+    play_round(store, true);
+    check_reason(store, gone, "");
+    OK(store_job_cancel(store, gone, &err));
+    OK(store_job_cancel(store, other, &err));
+}
+
 int main(void) {
     struct store *store;
     char *dir = fresh_dir();
@@ -113,6 +152,7 @@ int main(void) {
     test_turns(store);
     test_places();
     test_rename(store);
+    test_removed(store);
     store_close(store);
     drop_dir(dir);
     return check_result();
