@@ -98,33 +98,32 @@ static void turn(struct remote *m) {
 
 /* --- the run ------------------------------------------------------------------------------- */
 
-static void hear(const char *lines, run_hear *each, void *user) {
+struct listener {
+    run_hear *each;
+    void *user;
+};
+
+static void hear(void *user, const char *lines) {
+    const struct listener *l = user;
     while (*lines) {
         size_t length = strcspn(lines, "\n");
-        each(user, lines, length);
+        l->each(l->user, lines, length);
         lines += length + (lines[length] == '\n');
     }
 }
 
 static void read_lines(struct remote_run *r, size_t limit, run_hear *each, void *user) {
-    struct store *store = r->remote->parts.store;
+    struct listener listener = {each, user};
     struct error err;
     for (size_t i = 0; i < limit && r->has_unread; i++) {
-        int64_t seq;
-        char *lines;
-        enum status status = store_remote_next(store, r->row.job_id, r->row.number, &seq, &lines, &err);
+        enum status status =
+            store_remote_read(r->remote->parts.store, r->row.job_id, r->row.number, hear, &listener, &err);
         if (status == STATUS_NOT_FOUND)
             r->has_unread = false;
-        if (status != STATUS_OK && status != STATUS_NOT_FOUND)
+        else if (status != STATUS_OK)
             r->remote->retry_at = now_sec(r->remote) + RETRY_SEC;
         if (status != STATUS_OK)
             return;
-        hear(lines, each, user);
-        mem_free(lines);
-        if (store_remote_read(store, r->row.job_id, r->row.number, seq, &err) != STATUS_OK) {
-            r->remote->retry_at = now_sec(r->remote) + RETRY_SEC;
-            return;
-        }
     }
 }
 

@@ -20,7 +20,6 @@ void lanes_init(struct lanes *l, const struct scheduler_config *config, struct s
     admission_init(&l->admission, config->jobs_memory_bytes, config->worker_memory_bytes);
     admission_init(&l->small_admission, config->jobs_memory_bytes, config->worker_memory_bytes);
     executors_init(&l->places, config);
-    l->executors = executors_names(&l->places);
     l->main_slots = l->places.slots + count_elsewhere(store);
     l->job_slots = l->main_slots + (size_t)config->small_renders;
 }
@@ -139,6 +138,8 @@ static enum status start_lane(struct lanes *l, bool is_small, struct error *err)
 /* Queued jobs that must run where nothing is any more say so; those whose executor is there again forget it. */
 static enum status explain_executors(struct lanes *l, struct error *err) {
     enum status status = STATUS_OK;
+    if (!l->executors)
+        l->executors = executors_names(&l->places);
     if (!l->knows_executors)
         status = store_job_explain(l->store, 0, "", EXECUTOR_REASON, "", err);
     l->knows_executors |= status == STATUS_OK;

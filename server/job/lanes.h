@@ -17,7 +17,7 @@ struct lanes {
     struct executors places;
     size_t main_slots, job_slots; /* slots of the main lane; of both, the small renders' last */
     bool knows_executors;         /* what an earlier daemon has said of them is forgotten */
-    char *executors;              /* names of all, as store_job_next takes them; owned */
+    char *executors;              /* names of all, as store_job_next takes them; owned; NULL before the first round */
     struct attempt *slot;         /* [job_slots]; borrowed, set by the owner */
     struct admission admission, small_admission;
 };

@@ -22,13 +22,17 @@ struct reserve {
 };
 
 struct store {
-    pthread_mutex_t mutex; /* held for every use of sql */
+    pthread_mutex_t mutex; /* held for every use of sql; recursive */
     struct sql sql;
     struct reserve reserve;
     void (*changed)(void *user, int64_t job_id);
     void *changed_user;
     void (*digest_wanted)(void *user);
     void *digest_wanted_user;
+    struct group { /* transactions that are one; transaction.c */
+        bool is_open;
+        int64_t changed; /* the job that the last of them has changed */
+    } group;
     size_t events_per_job; /* kept for each job */
     struct unpaid {        /* CPU time that could not be entered; see turns.c */
         int64_t owner_id;
@@ -63,6 +67,11 @@ enum status store_begin(struct store *store, struct error *err);
 /* A transaction that frees space or stops work, and therefore works on a full disk; see reserve.c. Where it fails
  * with STATUS_NO_SPACE, the caller repeats it after store_reserve_spend, as long as that returns true. */
 enum status store_begin_freeing(struct store *store, struct error *err);
+/* From here on, until store_group_end, all transactions of this thread are one: each of them is still undone alone where it
+ * fails, but nothing of any is kept unless the whole is. Other threads wait. Subscribers are told after the whole of the
+ * job that the last one has changed. It is one that frees space, as above. */
+enum status store_group_begin(struct store *store, struct error *err);
+enum status store_group_end(struct store *store, enum status status, struct error *err);
 bool store_reserve_spend(struct store *store); /* gives DATA/reserve up; false if that was done already */
 enum status store_end(struct store *store, enum status status, int64_t changed_job, struct error *err);
 

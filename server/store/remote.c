@@ -182,27 +182,45 @@ enum status store_remote_explain(struct store *store, int64_t job_id, int number
     return store_end(store, status, job_id, err);
 }
 
-enum status store_remote_wish(struct store *store, int64_t job_id, int number, enum remote_wish wish,
-                              struct error *err) {
+/* Runs the change in a transaction that works on a full disk. */
+static enum status change_freeing(struct store *store,
+                                  enum status (*change)(struct store *store, void *what, struct error *err), void *what,
+                                  struct error *err) {
     enum status status;
     do {
         status = store_begin_freeing(store, err);
         if (status != STATUS_OK)
             return status;
-        status = sql_run(&store->sql, err,
-                         "UPDATE remote SET wanted = ?1, told_seq = 0"
-                         " WHERE job_id = ?2 AND part = 0 AND number = ?3 AND wanted < ?1 AND phase < 3",
-                         "nin", (int)wish, job_id, number);
-        status = store_end(store, status, STORE_NOTHING_CHANGED, err);
+        status = store_end(store, change(store, what, err), STORE_NOTHING_CHANGED, err);
     } while (status == STATUS_NO_SPACE && store_reserve_spend(store));
     return status;
 }
 
-enum status store_remote_next(struct store *store, int64_t job_id, int number, int64_t *seq, char **lines,
+struct wished {
+    int64_t job_id;
+    int number;
+    enum remote_wish wish;
+};
+
+static enum status enter_wish(struct store *store, void *what, struct error *err) {
+    const struct wished *w = what;
+    return sql_run(&store->sql, err,
+                   "UPDATE remote SET wanted = ?1, told_seq = 0"
+                   " WHERE job_id = ?2 AND part = 0 AND number = ?3 AND wanted < ?1 AND phase < 3",
+                   "nin", (int)w->wish, w->job_id, w->number);
+}
+
+enum status store_remote_wish(struct store *store, int64_t job_id, int number, enum remote_wish wish,
                               struct error *err) {
+    struct wished wished = {job_id, number, wish};
+    return change_freeing(store, enter_wish, &wished, err);
+}
+
+/* Under the mutex: the oldest report. */
+static enum status next_report(struct store *store, int64_t job_id, int number, int64_t *seq, char **lines,
+                               struct error *err) {
     sqlite3_stmt *stmt;
     bool found = false;
-    store_lock(store);
     enum status status = sql_first(&store->sql, &stmt, &found, err,
                                    "SELECT seq, lines FROM attempt_lines"
                                    " WHERE job_id = ? AND part = 0 AND number = ? ORDER BY seq LIMIT 1",
@@ -212,35 +230,53 @@ enum status store_remote_next(struct store *store, int64_t job_id, int number, i
         *lines = sql_dup(stmt, 1);
         sqlite3_reset(stmt);
     }
-    store_unlock(store);
     return status == STATUS_OK && !found ? error_set(err, STATUS_NOT_FOUND, "every report has been read") : status;
 }
 
-enum status store_remote_read(struct store *store, int64_t job_id, int number, int64_t seq, struct error *err) {
-    enum status status;
-    do {
-        status = store_begin_freeing(store, err);
-        if (status != STATUS_OK)
-            return status;
+static enum status read_once(struct store *store, int64_t job_id, int number, remote_hear *hear, void *user,
+                             struct error *err) {
+    int64_t seq = 0;
+    char *lines = NULL;
+    enum status status = store_group_begin(store, err);
+    if (status != STATUS_OK)
+        return status;
+    status = next_report(store, job_id, number, &seq, &lines, err);
+    if (status == STATUS_OK) {
+        hear(user, lines);
         status = sql_run(&store->sql, err,
                          "DELETE FROM attempt_lines WHERE job_id = ? AND part = 0 AND number = ? AND seq = ?", "ini",
                          job_id, number, seq);
-        status = store_end(store, status, STORE_NOTHING_CHANGED, err);
-    } while (status == STATUS_NO_SPACE && store_reserve_spend(store));
+    }
+    mem_free(lines);
+    return store_group_end(store, status, err);
+}
+
+enum status store_remote_read(struct store *store, int64_t job_id, int number, remote_hear *hear, void *user,
+                              struct error *err) {
+    enum status status;
+    do
+        status = read_once(store, job_id, number, hear, user, err);
+    while (status == STATUS_NO_SPACE && store_reserve_spend(store));
     return status;
 }
 
+struct closed {
+    int64_t job_id;
+    int number;
+    size_t writers;
+};
+
+static enum status enter_closed(struct store *store, void *what, struct error *err) {
+    struct closed *c = what;
+    c->writers = remote_writer_count(store, c->job_id, c->number);
+    return sql_run(&store->sql, err,
+                   "UPDATE remote SET phase = 3 WHERE job_id = ? AND part = 0 AND number = ? AND phase < 3", "in",
+                   c->job_id, c->number);
+}
+
 enum status store_remote_close(struct store *store, int64_t job_id, int number, size_t *writers, struct error *err) {
-    enum status status;
-    do {
-        status = store_begin_freeing(store, err);
-        if (status != STATUS_OK)
-            return status;
-        status = sql_run(&store->sql, err,
-                         "UPDATE remote SET phase = 3 WHERE job_id = ? AND part = 0 AND number = ? AND phase < 3", "in",
-                         job_id, number);
-        *writers = remote_writer_count(store, job_id, number);
-        status = store_end(store, status, STORE_NOTHING_CHANGED, err);
-    } while (status == STATUS_NO_SPACE && store_reserve_spend(store));
+    struct closed closed = {.job_id = job_id, .number = number};
+    enum status status = change_freeing(store, enter_closed, &closed, err);
+    *writers = closed.writers;
     return status;
 }

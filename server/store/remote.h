@@ -92,10 +92,12 @@ enum status store_remote_list(struct store *store, const char *executor, struct 
                               struct error *err);
 /* Grows whenever a node has said something: while it stands still there is nothing to read. */
 uint64_t store_remote_changes(struct store *store);
-/* The oldest report that is not read yet; STATUS_NOT_FOUND when there is none. *lines is the caller's (mem_free). */
-enum status store_remote_next(struct store *store, int64_t job_id, int number, int64_t *seq, char **lines,
+/* Reads the oldest report: passes its lines, each with its newline, to `hear`, and removes it. What `hear` enters into the
+ * store is one transaction with that: a report is entered whole, once, or not at all and read again. STATUS_NOT_FOUND
+ * when there is none. */
+typedef void remote_hear(void *user, const char *lines);
+enum status store_remote_read(struct store *store, int64_t job_id, int number, remote_hear *hear, void *user,
                               struct error *err);
-enum status store_remote_read(struct store *store, int64_t job_id, int number, int64_t seq, struct error *err);
 /* Nothing more is accepted; works on a full disk. *writers: how many are still at it. */
 enum status store_remote_close(struct store *store, int64_t job_id, int number, size_t *writers, struct error *err);
 

@@ -59,7 +59,11 @@ static enum status check_tables(struct store *store, struct error *err) {
 enum status store_open(struct store **out, const char *dir, struct error *err) {
     *out = NULL;
     struct store *store = mem_calloc(1, sizeof *store);
-    pthread_mutex_init(&store->mutex, NULL);
+    pthread_mutexattr_t recursive;
+    pthread_mutexattr_init(&recursive);
+    pthread_mutexattr_settype(&recursive, PTHREAD_MUTEX_RECURSIVE);
+    pthread_mutex_init(&store->mutex, &recursive);
+    pthread_mutexattr_destroy(&recursive);
     store->reserve.wal_fd = -1;
     store->events_per_job = EVENTS_PER_JOB;
     char *path = layout_state(dir);

@@ -111,17 +111,16 @@ static void check_line(struct remote_attempt *a, const char *text, size_t length
     cJSON_Delete(line);
 }
 
+static void check_lines(void *user, const char *lines) {
+    for (const char *at = lines, *end; (end = strchr(at, '\n')) != NULL; at = end + 1)
+        check_line(user, at, (size_t)(end - at));
+}
+
 /* Reads what has been reported; returns the attempt's phase. */
 static enum remote_phase listen_to(struct remote_attempt *a) {
-    int64_t seq;
-    char *lines;
     OK(store_remote_get(rig.store, a->job, a->number, &a->row, &err));
-    while (store_remote_next(rig.store, a->job, a->number, &seq, &lines, &err) == STATUS_OK) {
-        for (char *at = lines, *end; (end = strchr(at, '\n')) != NULL; at = end + 1)
-            check_line(a, at, (size_t)(end - at));
-        mem_free(lines);
-        OK(store_remote_read(rig.store, a->job, a->number, seq, &err));
-    }
+    while (store_remote_read(rig.store, a->job, a->number, check_lines, a, &err) == STATUS_OK)
+        ;
     return a->row.phase;
 }
 

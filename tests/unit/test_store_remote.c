@@ -1,6 +1,8 @@
 /* test_store_remote.c -- attempts on other machines, as the store sees them: the fence, what is repeated, who comes second,
  * and that there is one end. */
 #include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "server/store/remote.h"
 #include "tests/unit/store_rig.h"
@@ -22,19 +24,23 @@ static struct remote_key begin_attempt(struct store *store) {
     return key;
 }
 
+struct heard {
+    const char *wanted; /* NULL: anything */
+    int count;
+};
+
+static void hear(void *user, const char *lines) {
+    struct heard *heard = user;
+    for (const char *c = lines; *c; c++)
+        heard->count += *c == '\n';
+    CHECK_THAT(!heard->wanted || strstr(heard->wanted, lines) != NULL, "%s", lines);
+}
+
 static int count_lines(struct store *store, const struct remote_key *key, const char *wanted) {
-    int64_t seq;
-    char *lines;
-    int count = 0;
-    while (store_remote_next(store, key->job_id, key->number, &seq, &lines, &err) == STATUS_OK) {
-        for (const char *c = lines; *c; c++)
-            count += *c == '\n';
-        if (wanted)
-            CHECK_THAT(strstr(wanted, lines) != NULL, "%s", lines);
-        mem_free(lines);
-        OK(store_remote_read(store, key->job_id, key->number, seq, &err));
-    }
-    return count;
+    struct heard heard = {.wanted = wanted};
+    while (store_remote_read(store, key->job_id, key->number, hear, &heard, &err) == STATUS_OK)
+        ;
+    return heard.count;
 }
 
 static void check_life(struct store *store) {
@@ -211,6 +217,62 @@ static void check_limit_and_list(struct store *store) {
     IS(store_remote_report(store, &key, seq + 1, "late\n", 0.0, &reply, &err), STATUS_NOT_FOUND);
 }
 
+/* --- each line once, whenever the daemon dies ------------------------------------------------ */
+
+struct entering {
+    struct store *store;
+    struct remote_key key;
+    int left; /* lines until this process dies; negative: it does not */
+};
+
+/* Enters each line as an event. One that is not entered does not undo the others. */
+static void enter(void *user, const char *lines) {
+    struct entering *e = user;
+    for (const char *at = lines, *end; (end = strchr(at, '\n')) != NULL; at = end + 1) {
+        char *data = mem_strndup(at, (size_t)(end - at));
+        if (e->left-- == 0)
+            _exit(0);
+        IS(store_event_add(e->store, e->key.job_id, e->key.number + 1, EVENT_LOG, data, &err), STATUS_CONFLICT);
+        OK(store_event_add(e->store, e->key.job_id, e->key.number, EVENT_LOG, data, &err));
+        mem_free(data);
+    }
+}
+
+static void join_line(void *user, const struct event_row *event) {
+    if (strcmp(event->type, EVENT_LOG) == 0)
+        buf_printf(user, "%s", event->data);
+}
+
+static void check_killed(struct store **store, const char *dir) {
+    for (int left = 0; left < 7; left++) {
+        struct entering e = {.key = begin_attempt(*store), .left = left};
+        OK(store_remote_claim(*store, &e.key, "node7", &row, &err));
+        OK(store_remote_report(*store, &e.key, 1, "1\n2\n3\n", 0.0, &reply, &err));
+        OK(store_remote_report(*store, &e.key, 2, "4\n5\n6\n", 0.0, &reply, &err));
+        store_close(*store);
+        pid_t child = fork();
+        if (child == 0) {
+            OK(store_open(&e.store, dir, &err));
+            while (store_remote_read(e.store, e.key.job_id, e.key.number, enter, &e, &err) == STATUS_OK)
+                ;
+            _exit(check_failed_count > 0);
+        }
+        int code = 1;
+        CHECK(waitpid(child, &code, 0) == child && code == 0);
+        OK(store_open(store, dir, &err));
+        e.store = *store;
+        e.left = -1;
+        while (store_remote_read(*store, e.key.job_id, e.key.number, enter, &e, &err) == STATUS_OK)
+            ;
+        struct buf lines;
+        struct event_page page;
+        buf_init(&lines, 4096);
+        OK(store_event_page(*store, NULL, e.key.job_id, 0, 100, 1 << 20, join_line, &lines, &page, &err));
+        CHECK_THAT(strcmp(buf_text(&lines), "123456") == 0, "killed at line %d: %s", left, buf_text(&lines));
+        buf_release(&lines);
+    }
+}
+
 int main(void) {
     struct store *store;
     char *dir = fresh_dir();
@@ -222,6 +284,7 @@ int main(void) {
     check_wishes(store);
     check_refused(store);
     check_limit_and_list(store);
+    check_killed(&store, dir);
     store_close(store);
     drop_dir(dir);
     return check_result();
