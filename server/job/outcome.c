@@ -68,7 +68,7 @@ static void judge_exit(const struct attempt *a, struct verdict *v) {
     case PROGRESS_EXIT_INPUT: say(v, OUTCOME_INPUT, message[0] ? message : "the input is at fault", hint); return;
     case PROGRESS_EXIT_MEMORY: say(v, OUTCOME_MEMORY, "out of memory", HINT_MEMORY); return;
     case PROGRESS_EXIT_NO_SPACE:
-        snprintf(text, sizeof text, "disk full: %.900s", message);
+        snprintf(text, sizeof text, "disk full: %.900s", message[0] ? message : a->end.reason);
         say(v, OUTCOME_BLOCKED, text, "Free some space, then resume the job.");
         return;
     case PROGRESS_EXIT_STOPPED:

@@ -9,6 +9,7 @@
 #include <sys/random.h>
 
 #include "common/clock.h"
+#include "common/log.h"
 #include "common/mem.h"
 #include "common/protocol.h"
 #include "common/utf8.h"
@@ -144,7 +145,7 @@ enum status link_claim(struct attempt_link *l, const char *host, int threads, cJ
     reply_init(&reply);
     *order = NULL;
     enum status status = post(l, "claim", body, "order", &reply, &sent, err);
-    for (int tries = 0; status == STATUS_UNAVAILABLE && link_pause(l, tries); tries++)
+    for (int tries = 0; (status == STATUS_UNAVAILABLE || status == STATUS_NO_SPACE) && link_pause(l, tries); tries++)
         status = post(l, "claim", body, "order", &reply, &sent, err);
     if (status == STATUS_OK) {
         *order = cJSON_DetachItemFromObjectCaseSensitive(reply.json, "order");
@@ -218,12 +219,29 @@ static void answered(struct attempt_link *l) {
     l->seq++;
 }
 
+/* Whether the daemon has taken no more of it than that the node lives. */
+static void put_off(struct attempt_link *l, const cJSON *reply) {
+    double last = (double)l->seq;
+    (void)json_number(reply, "last_seq", "the reply", last, &last, NULL);
+    l->is_put_off = last < (double)l->seq;
+    l->failures = 0;
+}
+
+void link_drop(struct attempt_link *l) {
+    if (l->line_count > 0)
+        log_warning("%zu lines are dropped: the daemon's disk is full", l->line_count);
+    for (size_t i = 0; i < l->line_count; i++)
+        mem_free(l->line[i]);
+    l->line_count = l->pending = 0;
+    l->is_pending = l->is_put_off = false;
+}
+
 void link_report(struct attempt_link *l, double cpu_sec, bool now) {
     struct reply reply;
     struct error err;
     double sent;
     if (!l->is_claimed || link_state(l) != LINK_OPEN ||
-        (l->failures ? clock_sec() < l->next_report : !now && clock_sec() < link_next_report(l)))
+        (l->failures || l->is_put_off ? clock_sec() < l->next_report : !now && clock_sec() < link_next_report(l)))
         return;
     cJSON *body = make_report(l, cpu_sec);
     reply_init(&reply);
@@ -231,7 +249,9 @@ void link_report(struct attempt_link *l, double cpu_sec, bool now) {
     if (post(l, "report", body, "do", &reply, &sent, &err) == STATUS_OK) {
         take_lease(l, reply.json, sent);
         take_wish(l, reply.json);
-        answered(l);
+        put_off(l, reply.json);
+        if (!l->is_put_off)
+            answered(l);
         l->next_report = clock_sec() + interval(l, REPORT_SEC);
     } else {
         l->next_report = clock_sec() + pause_sec(l->failures++);

@@ -50,6 +50,7 @@ struct attempt_link {
     size_t line_count, line_room;
     size_t pending;     /* of them in report `seq`, which may have arrived already; 0: it was not sent yet */
     bool is_pending;    /* report `seq` was sent and not answered */
+    bool is_put_off;    /* it was answered, but not entered: the daemon's disk is full. It is sent again */
     double next_report; /* clock_sec */
     int failures;       /* reports in a row that were not answered */
     uint64_t sent_bytes, fetched_bytes; /* of files */
@@ -69,6 +70,8 @@ void link_say(struct attempt_link *l, const char *line, size_t length);
 bool link_has_said_all(const struct attempt_link *l);
 /* Reports where that is due: when there are lines every 2 s, otherwise every 5 s; at once if `now`. */
 void link_report(struct attempt_link *l, double cpu_sec, bool now);
+/* Forgets what has not been entered: the daemon has no room for it, and the next attempt says it again. */
+void link_drop(struct attempt_link *l);
 /* When the next report is due (clock_sec). */
 double link_next_report(const struct attempt_link *l);
 

@@ -183,6 +183,7 @@ static struct link_end judge(struct relay *r, enum status status, const struct e
     if (status == STATUS_NO_SPACE) {
         say_no_space(r, why);
         end.code = PROGRESS_EXIT_NO_SPACE;
+        end.reason = why->message;
     } else if (was_taken_back(r, has_run)) {
         end.way = "preempted";
         end.reason = "its machine was taken back";
@@ -222,6 +223,7 @@ static int finish(struct node *n, enum status status, const struct error *why) {
     if (link_state(&r->link) != LINK_OPEN) /* nothing more may be written */
         return EXIT_FAILURE;
     struct link_end end = judge(r, status, why);
+    r->gives_up = status != STATUS_OK;
     char *words = run_last_words(r->run, WORDS_MAX_BYTES);
     end.last_words = words;
     bool is_told = relay_flush(r) && link_end(&r->link, &end, run_cpu_sec(r->run), &err) == STATUS_OK;

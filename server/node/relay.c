@@ -261,11 +261,22 @@ enum status relay_follow(struct relay *r, struct error *err) {
     return status;
 }
 
+/* Whether nobody waits for what has not been said: the attempt ends early, and the next one says it again. */
+static bool is_given_up(const struct relay *r) {
+    return r->gives_up || r->has_stopped || r->is_taken_back || r->link.wish == LINK_STOP ||
+           r->link.wish == LINK_CANCEL;
+}
+
 bool relay_flush(struct relay *r) {
     while (!link_has_said_all(&r->link) && link_state(&r->link) == LINK_OPEN) {
         double wait = link_next_report(&r->link) - clock_sec();
-        if (r->link.failures > 0 && wait > 0.0)
+        if (r->link.is_put_off && is_given_up(r)) {
+            link_drop(&r->link);
+            break;
+        }
+        if ((r->link.failures > 0 || r->link.is_put_off) && wait > 0.0)
             poll(NULL, 0, (int)(1e3 * wait) + 1);
+        obey_signals(r);
         link_report(&r->link, run_cpu_sec(r->run), true);
     }
     return link_state(&r->link) == LINK_OPEN;

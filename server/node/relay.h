@@ -28,6 +28,7 @@ struct relay {
     char **heard; /* [heard_count] lines that have not been passed on; owned */
     size_t heard_count, heard_room;
     bool has_stopped, has_killed; /* asked it to */
+    bool gives_up;                /* it ends without a result: what is not said yet need not be */
     bool is_taken_back;           /* by the machine's scheduler */
     double kill_at;               /* clock_sec; 0: never */
     size_t part_count;            /* sent */

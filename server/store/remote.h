@@ -123,7 +123,8 @@ struct remote_reply {
     int64_t last_seq;
 };
 /* `lines`: complete lines, at most REMOTE_LINES_MAX bytes. STATUS_INPUT where seq leaves a gap; STATUS_LIMIT while
- * REMOTE_REPORTS_MAX reports are unread. */
+ * REMOTE_REPORTS_MAX reports are unread. On a full disk the report is not entered, which reply->last_seq shows, but the
+ * lease is kept and the reply says what is wanted. */
 enum status store_remote_report(struct store *store, const struct remote_key *key, int64_t seq, const char *lines,
                                 double cpu_sec, struct remote_reply *reply, struct error *err);
 /* The last report; works on a full disk. */

@@ -189,18 +189,23 @@ static enum status answer(struct store *store, const struct remote_key *key, str
                    (int)row->wanted, row->wanted == REMOTE_GO_ON ? 0 : seq, key->job_id, key->number);
 }
 
-enum status store_remote_report(struct store *store, const struct remote_key *key, int64_t seq, const char *lines,
-                                double cpu_sec, struct remote_reply *reply, struct error *err) {
+/* What reports and the end have in common, inside a transaction: who says it, what there is, where it belongs. */
+static enum status look_at_report(struct store *store, const struct remote_key *key, int64_t seq,
+                                  struct remote_row *row, bool *is_next, struct error *err) {
+    enum status status = check_claim(store, key, err);
+    if (status == STATUS_OK)
+        status = remote_row_read(store, key->job_id, key->number, row, err);
+    return status == STATUS_OK ? place(key, row, seq, is_next, err) : status;
+}
+
+static enum status report_once(struct store *store, const struct remote_key *key, int64_t seq, const char *lines,
+                               double cpu_sec, struct remote_reply *reply, struct error *err) {
     struct remote_row row = {0};
     bool is_next = false;
     enum status status = store_begin(store, err);
     if (status != STATUS_OK)
         return status;
-    status = check_claim(store, key, err);
-    if (status == STATUS_OK)
-        status = remote_row_read(store, key->job_id, key->number, &row, err);
-    if (status == STATUS_OK)
-        status = place(key, &row, seq, &is_next, err);
+    status = look_at_report(store, key, seq, &row, &is_next, err);
     if (status == STATUS_OK && is_next)
         status = enter_lines(store, key, seq, lines, err);
     if (status == STATUS_OK && is_next)
@@ -212,6 +217,30 @@ enum status store_remote_report(struct store *store, const struct remote_key *ke
     return heard(store, key, status, STORE_NOTHING_CHANGED, err);
 }
 
+/* Keeps the lease and passes on what is wanted, and no more. */
+static enum status keep_alive(struct store *store, const struct remote_key *key, int64_t seq,
+                              struct remote_reply *reply, struct error *err) {
+    struct remote_row row = {0};
+    bool is_next;
+    enum status status = store_begin_freeing(store, err);
+    if (status != STATUS_OK)
+        return status;
+    status = look_at_report(store, key, seq, &row, &is_next, err);
+    *reply = (struct remote_reply){.wanted = row.wanted, .lease_sec = row.lease_sec, .last_seq = row.last_seq};
+    return heard(store, key, status, STORE_NOTHING_CHANGED, err);
+}
+
+enum status store_remote_report(struct store *store, const struct remote_key *key, int64_t seq, const char *lines,
+                                double cpu_sec, struct remote_reply *reply, struct error *err) {
+    enum status status = report_once(store, key, seq, lines, cpu_sec, reply, err);
+    if (status != STATUS_NO_SPACE)
+        return status;
+    do
+        status = keep_alive(store, key, seq, reply, err);
+    while (status == STATUS_NO_SPACE && store_reserve_spend(store));
+    return status;
+}
+
 static enum status end_once(struct store *store, const struct remote_key *key, int64_t seq,
                             const struct remote_end *end, double cpu_sec, struct error *err) {
     struct remote_row row = {0};
@@ -219,11 +248,7 @@ static enum status end_once(struct store *store, const struct remote_key *key, i
     enum status status = store_begin_freeing(store, err);
     if (status != STATUS_OK)
         return status;
-    status = check_claim(store, key, err);
-    if (status == STATUS_OK)
-        status = remote_row_read(store, key->job_id, key->number, &row, err);
-    if (status == STATUS_OK)
-        status = place(key, &row, seq, &is_next, err);
+    status = look_at_report(store, key, seq, &row, &is_next, err);
     if (status == STATUS_OK && !is_next)
         status = error_set(err, STATUS_INPUT, "report %lld was entered already, and was not the end", (long long)seq);
     if (status == STATUS_OK)

@@ -4,6 +4,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "server/store/internal.h"
 #include "server/store/remote.h"
 #include "tests/unit/store_rig.h"
 
@@ -217,6 +218,46 @@ static void check_limit_and_list(struct store *store) {
     IS(store_remote_report(store, &key, seq + 1, "late\n", 0.0, &reply, &err), STATUS_NOT_FOUND);
 }
 
+/* Makes the disk full for the store, or gives it room again. */
+static void fill_disk(struct store *store, bool is_full) {
+    static int64_t cushion;
+    cushion = is_full ? store->reserve.cushion_bytes : cushion;
+    store->reserve.cushion_bytes = is_full ? INT64_C(1) << 60 : cushion; /* no disk has that */
+    reserve_keep(store);
+    CHECK(store->reserve.is_tight == is_full);
+}
+
+/* On a full disk a node lives on, hears what is wanted, and may end. */
+static void check_full(struct store *store) {
+    struct remote_key key = begin_attempt(store);
+    OK(store_remote_claim(store, &key, "node7", &row, &err));
+    OK(store_remote_report(store, &key, 1, "one\n", 0.0, &reply, &err));
+    fill_disk(store, true);
+    OK(store_remote_get(store, key.job_id, key.number, &row, &err));
+    int64_t heard = row.heard_count;
+    OK(store_remote_wish(store, key.job_id, key.number, REMOTE_STOP, &err));
+    OK(store_remote_report(store, &key, 2, "two\n", 0.0, &reply, &err));
+    CHECK(reply.last_seq == 1 && reply.wanted == REMOTE_STOP && reply.lease_sec == 60);
+    OK(store_remote_get(store, key.job_id, key.number, &row, &err));
+    CHECK(row.heard_count == heard + 1);
+    IS(store_remote_report(store, &key, 3, "gap\n", 0.0, &reply, &err), STATUS_INPUT);
+    struct remote_end end = {.way = "exit", .code = 85};
+    OK(store_remote_end(store, &key, 2, &end, 0.0, &err)); /* the number has not been taken */
+    CHECK(count_lines(store, &key, "one\n") == 1);
+    fill_disk(store, false);
+    OK(store_job_stop(store, key.job_id, key.number, "", &err));
+
+    key = begin_attempt(store);
+    OK(store_remote_claim(store, &key, "node7", &row, &err));
+    fill_disk(store, true);
+    OK(store_remote_report(store, &key, 1, "one\n", 0.0, &reply, &err));
+    CHECK(reply.last_seq == 0);
+    fill_disk(store, false);
+    OK(store_remote_report(store, &key, 1, "one\n", 0.0, &reply, &err));
+    CHECK(reply.last_seq == 1 && count_lines(store, &key, "one\n") == 1);
+    OK(store_job_stop(store, key.job_id, key.number, "", &err));
+}
+
 /* --- each line once, whenever the daemon dies ------------------------------------------------ */
 
 struct entering {
@@ -284,6 +325,7 @@ int main(void) {
     check_wishes(store);
     check_refused(store);
     check_limit_and_list(store);
+    check_full(store);
     check_killed(&store, dir);
     store_close(store);
     drop_dir(dir);
