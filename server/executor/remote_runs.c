@@ -98,13 +98,13 @@ static void turn(struct remote *m) {
 
 /* --- the run ------------------------------------------------------------------------------- */
 
-struct listener {
+struct line_listener {
     run_hear *each;
     void *user;
 };
 
 static void hear(void *user, const char *lines) {
-    const struct listener *l = user;
+    const struct line_listener *l = user;
     while (*lines) {
         size_t length = strcspn(lines, "\n");
         l->each(l->user, lines, length);
@@ -113,7 +113,7 @@ static void hear(void *user, const char *lines) {
 }
 
 static void read_lines(struct remote_run *r, size_t limit, run_hear *each, void *user) {
-    struct listener listener = {each, user};
+    struct line_listener listener = {each, user};
     struct error err;
     for (size_t i = 0; i < limit && r->has_unread; i++) {
         enum status status =
