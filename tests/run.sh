@@ -14,7 +14,7 @@ shift
 # `make tsan` run them all the same.
 slow_asan="gradient/test_path render/test_conformance render/test_rooms render/test_listing1 api/test_demo_room
 render/test_calibrate_poses render/test_emission_pattern render/test_environment render/test_specular
-render/test_held_out_light render/test_saturated_light render/test_short render/test_sky_room
+render/test_held_out_light render/test_large_held_out render/test_saturated_light render/test_short render/test_sky_room
 render/test_fireflies_left_out render/test_grey_card render/test_sun render/test_split api/test_resume api/test_readme
 render/test_emitters render/test_hidden_lamp render/test_changing_light render/test_sky_doubt
 unit/test_outputs_read_back unit/test_fit unit/test_check_pictures api/test_http_faults chaos/test_clock

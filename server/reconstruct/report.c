@@ -9,7 +9,9 @@
 #include "server/reconstruct/held_render.h"
 #include "server/reconstruct/metrics.h"
 #include "server/render/path.h"
+#include "server/scene/photograph_reduce.h"
 #include "server/state/evidence.h"
+#include "server/state/held_out_size.h"
 #include "server/state/pace.h"
 
 /* Display value of the median of HDR photographs, for PSNR and SSIM; white is 1. By convention. */
@@ -89,15 +91,16 @@ static uint32_t samples_of(const struct reconstruction *r, double pixels_left) {
     return (uint32_t)samples;
 }
 
-/* Standard deviation of a photograph's noise, given its radiance `image`; NaN where that is. */
-static void photograph_noise(const struct reconstruction *r, const struct photograph *photo, const struct image *image,
-                             struct image *noise) {
+/* Standard deviation of the noise of a photograph, each of whose pixels is the mean of `step` x `step`, given its radiance
+ * `image`; NaN where that is. */
+static void photograph_noise(const struct reconstruction *r, const struct photograph *photo, uint32_t step,
+                             const struct image *image, struct image *noise) {
     image_init_rgb(noise, image->width, image->height);
     for (size_t i = 0; i < (size_t)image->width * image->height; i++) {
         const float *p = image->pixel + 3 * i;
         rgb radiance = {p[0], p[1], p[2]};
         bool usable = rgb_is_finite(radiance);
-        float share = usable ? 1.0f / sqrtf(noise_weight_of_brightness(&r->noise, photo, radiance)) : NAN;
+        float share = usable ? 1.0f / (float)step / sqrtf(noise_weight_of_brightness(&r->noise, photo, radiance)) : NAN;
         for (size_t c = 0; c < 3; c++)
             noise->pixel[3 * i + c] = share * p[c];
     }
@@ -127,7 +130,7 @@ static void measure_view(const struct reconstruction *r, const struct photograph
     struct image noise;
     double exposure = photo->is_hdr ? DISPLAY_MEDIAN / median : (double)photo->exposure;
     struct metric psnr = metrics_psnr_db(&view->photograph, halves, exposure);
-    photograph_noise(r, photo, &view->photograph, &noise);
+    photograph_noise(r, photo, view->step, &view->photograph, &noise);
     view->msre_render_noise = metrics_msre_of_renders(&view->photograph, halves, median);
     view->msre_photograph_noise = metrics_msre_of_photograph(&view->photograph, &noise, median);
     view->psnr_db = psnr.value;
@@ -145,14 +148,12 @@ static struct metric compare(const struct photograph *photo, const struct held_o
     return metrics_msre(&view->photograph, halves, median);
 }
 
-/* Renders a view, again where its error is not known well, unless a time limit says how much is done. */
+/* Renders the view of a photograph, again where its error is not known well, unless a time limit says how much is done. */
 static void render_view(struct reconstruction *r, struct photograph *photo, struct held_out *view, uint32_t samples,
                         double median, size_t views, const struct reconstruct_hooks *hooks) {
     const struct path_settings path = paths_of(r->settings);
     struct held_render render = {0};
     struct image halves;
-    view->name = photo->name;
-    view->camera = &photo->camera;
     photograph_radiance(photo, &view->photograph);
     held_render_add(&render, &r->world, &photo->camera, samples, &path, 0, r->pool);
     held_render_mean(&render.halves, &view->render);
@@ -176,6 +177,25 @@ static void render_view(struct reconstruction *r, struct photograph *photo, stru
     held_render_release(&render);
     move_pixels(&view->photograph, r->scene->spill);
     move_pixels(&view->render, r->scene->spill);
+}
+
+/* Compares a photograph with its view, at the size of held_out_size.h; its exposure and gain are set where they are fitted. */
+static void compare_view(struct reconstruction *r, struct photograph *photo, struct held_out *view, uint32_t samples,
+                         double median, size_t views, const struct reconstruct_hooks *hooks) {
+    uint32_t step = held_out_step(&photo->camera);
+    struct photograph smaller;
+    view->name = photo->name;
+    view->step = step;
+    view->camera = camera_reduced(&photo->camera, step);
+    if (step == 1) {
+        render_view(r, photo, view, samples, median, views, hooks);
+        return;
+    }
+    photograph_reduce(photo, step, &smaller);
+    render_view(r, &smaller, view, samples, median, views, hooks);
+    photo->exposure = smaller.exposure;
+    photo->gain = smaller.gain;
+    photograph_release(&smaller);
 }
 
 void report_release_held_out(struct reconstruction *r) {
@@ -220,6 +240,8 @@ static void means_add(struct held_out_means *means, const struct held_out *view)
 static cJSON *view_entry(const struct held_out *view) {
     cJSON *entry = cJSON_CreateObject();
     json_add_string(entry, "name", view->name);
+    json_add_int(entry, "width", view->camera.width);
+    json_add_int(entry, "height", view->camera.height);
     json_add_int(entry, "samples", view->samples);
     json_add_number(entry, "msre", view->msre);
     json_add_number(entry, "msre_noise_left", view->msre_noise_left);
@@ -247,17 +269,6 @@ static void report_means(const struct held_out_means *means, size_t view_count, 
     hooks->metric(hooks->user, "msre", 0, means->msre.sum / count);
 }
 
-static double pixels_of(const struct photograph *photo) {
-    return (double)photo->camera.width * (double)photo->camera.height;
-}
-
-static double held_out_pixels(const struct scene *scene) {
-    double pixels = 0.0;
-    for (size_t i = 0; i < scene->photograph_count; i++)
-        pixels += scene->photograph[i].is_test ? pixels_of(&scene->photograph[i]) : 0.0;
-    return pixels;
-}
-
 enum status report_held_out(struct reconstruction *r, const struct views *views, const struct pace *pace,
                             struct error *err) {
     const struct reconstruct_hooks *hooks = pace->hooks;
@@ -275,9 +286,9 @@ enum status report_held_out(struct reconstruction *r, const struct views *views,
         if (!scene->photograph[i].is_test)
             continue;
         struct held_out *view = &r->held_out[r->held_out_count++];
-        double pixels = pixels_of(&scene->photograph[i]);
         uint32_t samples = samples_of(r, pixels_left);
-        render_view(r, &scene->photograph[i], view, samples, (double)views->median_radiance, total, hooks);
+        compare_view(r, &scene->photograph[i], view, samples, (double)views->median_radiance, total, hooks);
+        double pixels = (double)view->camera.width * (double)view->camera.height;
         pixels_left -= pixels;
         means_add(&means, view);
         cJSON_AddItemToArray(list, view_entry(view));

@@ -69,6 +69,12 @@ static inline bool tap_saturates(const struct photograph *photo, size_t at, int 
     return is_saturated;
 }
 
+float photograph_value(const struct photograph *photo, size_t at, int channel, bool *is_saturated) {
+    float value = read_tap(photo, photo->pixel[at][channel]);
+    *is_saturated = tap_saturates(photo, at, channel, &value);
+    return value;
+}
+
 /* The two pixels around coordinate x in a row of `count` pixels, and the weight of the second. */
 static inline void taps(float x, uint32_t count, size_t index[2], float *weight) {
     float centred = clampf(x - 0.5f, 0.0f, (float)(count - 1));

@@ -66,6 +66,10 @@ static inline bool photograph_clips(const struct photograph *photo, size_t at, i
     return photo->clipped ? photo->clipped[at] >> channel & 1 : value >= photo->clip;
 }
 
+/* A channel's stored value of pixel number `at`: slightly negative for a stored 0, no less than the clip where it is
+ * saturated, which *is_saturated says. */
+float photograph_value(const struct photograph *photo, size_t at, int channel, bool *is_saturated);
+
 /* s of the falloff at pixel coordinates (x, y): 1 in the corners. */
 static inline float photograph_radius(const struct photograph *photo, float x, float y) {
     const struct camera *c = &photo->camera;

@@ -11,6 +11,7 @@
 
 #include "common/parallel.h"
 #include "server/gather/probes.h"
+#include "server/state/held_out_size.h"
 
 #define PREPARE_SEC 3.0          /* of any room */
 #define PREPARE_PIXEL_SEC 4.5e-6 /* a pixel of photographs */
@@ -92,15 +93,14 @@ static void plan_texels(const struct pace *p, double valid) {
 }
 
 static void plan_all(const struct pace *p, const struct scene *scene) {
-    double pixels = 0.0, held_out = 0.0, every = settings_number(p->settings, "hold_out_every");
+    double pixels = 0.0, held_out = held_out_pixels(scene), every = settings_number(p->settings, "hold_out_every");
     plan_init(p->plan, settings_number(p->settings, "time_limit_sec"));
     for (size_t i = 0; i < scene->photograph_count; i++) {
         const struct camera *c = &scene->photograph[i].camera;
         pixels += (double)c->width * (double)c->height;
-        held_out += scene->photograph[i].is_test ? (double)c->width * (double)c->height : 0.0;
     }
     if (held_out == 0.0 && every > 0.0)
-        held_out = pixels / every;
+        held_out = held_out_pixels_of_all(scene) / every;
     double valid = USUAL_COVER * side(p) * side(p);
     plan_set_fixed(p->plan, PLAN_PREPARE, 1.0,
                    (PREPARE_SEC + PREPARE_PIXEL_SEC * pixels + PREPARE_TEXEL_SEC * side(p) * side(p)) /
@@ -124,16 +124,12 @@ double pace_forecast_sec(const struct scene *scene, const struct settings *setti
 }
 
 void pace_measure_room(const struct pace *p, const struct scene *scene, const struct inverse_uv *inverse) {
-    double held_out = 0.0, wanted = pace_observations_wanted(p, inverse);
+    double wanted = pace_observations_wanted(p, inverse);
     const char *name = observations_setting(p);
-    for (size_t i = 0; i < scene->photograph_count; i++) {
-        const struct camera *c = &scene->photograph[i].camera;
-        held_out += scene->photograph[i].is_test ? (double)c->width * (double)c->height : 0.0;
-    }
     plan_texels(p, (double)inverse->valid_count);
     double usual = isinf(wanted) ? settings_of_quality(p->settings, name) * WINDOWS_ACROSS * WINDOWS_ACROSS : wanted;
     plan_refine(p, wanted, usual);
-    plan_report(p, held_out);
+    plan_report(p, held_out_pixels(scene));
 }
 
 void pace_begin_stage(const struct pace *p, const char *stage) {

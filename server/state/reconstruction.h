@@ -24,8 +24,9 @@
 
 /* A held-out photograph and its re-render. */
 struct held_out {
-    const char *name; /* borrowed from the scene, both */
-    const struct camera *camera;
+    const char *name;                           /* borrowed from the scene */
+    uint32_t step;                              /* see held_out_size.h */
+    struct camera camera;                       /* of the view: the photograph's, or a smaller one */
     struct image photograph, render;            /* linear radiance, R G B, of one size; owned */
     uint32_t samples;                           /* paths for each pixel */
     double msre, psnr_db, ssim;                 /* free of the re-render's noise */

@@ -30,7 +30,7 @@ void results_make(struct export_input *input, const struct reconstruction *r, co
     struct export_comparison *comparison = mem_array(r->held_out_count, sizeof *comparison);
     for (size_t i = 0; i < r->held_out_count; i++) {
         const struct held_out *view = &r->held_out[i];
-        comparison[i] = (struct export_comparison){view->name, &view->photograph, &view->render, view->camera};
+        comparison[i] = (struct export_comparison){view->name, &view->photograph, &view->render, &view->camera};
     }
     struct export_camera *camera = mem_array(r->scene->photograph_count, sizeof *camera);
     for (size_t i = 0; i < r->scene->photograph_count; i++) {

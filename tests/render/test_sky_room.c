@@ -31,7 +31,7 @@ static void write_outputs(const char *dir, const struct reconstruction *r) {
     struct error err;
     for (size_t i = 0; i < r->held_out_count; i++)
         comparison[i] = (struct export_comparison){r->held_out[i].name, &r->held_out[i].photograph,
-                                                   &r->held_out[i].render, r->held_out[i].camera};
+                                                   &r->held_out[i].render, &r->held_out[i].camera};
     struct export_input in = {"room",
                               &r->scene->mesh,
                               &r->segments,
