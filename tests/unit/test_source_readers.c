@@ -404,6 +404,9 @@ static void test_arkitscenes(void) {
     put("lowres_wide_intrinsics/40753679_10.900.pincam", "256 192 200 200 128 96\n");
     check_lens(&check(0, 1, "lowres_wide/40753679_10.550.png")->lens, 212, 127, 95, 0, 0, 0);
     CHECK(source_rig_warned(&rig, "1 photographs have no pose at their time"));
+    put("wide/40753679_10.560.png", "");
+    put("wide_intrinsics/40753679_10.560.pincam", "1920 1440 1600 1600 954 714\n");
+    check_lens(&check(0, 1, "wide/40753679_10.560.png")->lens, 1600, 954, 714, 0, 0, 0);
     put("lowres_wide.traj", "10.0 0 0 0 1 2\n");
     source_rig_refused(&rig, "line 1");
     source_rig_stop(&rig);
