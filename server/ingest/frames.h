@@ -21,6 +21,7 @@ struct lens {
     /* NAN if absent. */
     double width, height, fl_x, fl_y, cx, cy, angle_x, angle_y;
     double k[6], k8, p[2], s[2]; /* as in struct camera */
+    double crop_radius;          /* pixels from the picture's centre beyond which nothing is used; 0: none */
     double rescale;              /* of focal lengths and principal point in pixels, at last; 0: none */
     bool is_relative; /* fl_x, fl_y are shares of the picture's longer side; cx, cy, too, from the picture's centre */
 };

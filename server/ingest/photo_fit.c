@@ -37,6 +37,7 @@ static void scale_lens(struct lens *lens, double x, double y) {
     lens->cx *= x;
     lens->fl_y *= y;
     lens->cy *= y;
+    lens->crop_radius *= x;
 }
 
 /* Whether the principal point is at the centre of such a picture. */

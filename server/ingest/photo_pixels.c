@@ -59,6 +59,25 @@ void photo_pixels_mask_by_alpha(const struct image *image, struct photograph *ph
 
 /* --- masks ------------------------------------------------------------------------------- */
 
+/* Makes a mask that lets everything through, if there is none. */
+static void begin_mask(struct photograph *photo) {
+    size_t count = (size_t)photo->camera.width * photo->camera.height;
+    if (photo->mask)
+        return;
+    photo->mask = spill_take(photo->spill, count, sizeof *photo->mask);
+    photograph_use(photo, 0, count);
+    memset(photo->mask, 255, count);
+}
+
+void photo_pixels_mask_by_circle(double radius, struct photograph *photo) {
+    size_t width = photo->camera.width, height = photo->camera.height;
+    begin_mask(photo);
+    for (size_t y = 0; y < height; y++)
+        for (size_t x = 0; x < width; x++)
+            if (hypot((double)x + 0.5 - 0.5 * (double)width, (double)y + 0.5 - 0.5 * (double)height) > radius)
+                photo->mask[y * width + x] = 0;
+}
+
 static bool is_of_aspect(uint32_t width, uint32_t height, const struct camera *camera) {
     uint64_t a = (uint64_t)width * camera->height, b = (uint64_t)height * camera->width;
     return (a > b ? a - b : b - a) <= (width > height ? width : height); /* a pixel of rounding */
@@ -76,11 +95,7 @@ static bool fits(const struct image *mask, const struct camera *camera, int *tur
 /* Excludes the pixels whose centre lies in a black one of the mask. */
 static void exclude(const struct image *mask, struct photograph *photo) {
     size_t width = photo->camera.width, height = photo->camera.height;
-    if (!photo->mask) {
-        photo->mask = spill_take(photo->spill, width * height, sizeof *photo->mask);
-        photograph_use(photo, 0, width * height);
-        memset(photo->mask, 255, width * height);
-    }
+    begin_mask(photo);
     for (size_t y = 0; y < height; y++) {
         size_t row = (2 * y + 1) * mask->height / (2 * height) * mask->width;
         for (size_t x = 0; x < width; x++) {

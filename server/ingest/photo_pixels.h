@@ -25,6 +25,9 @@ void photo_pixels_from_linear(const struct image *image, struct photograph *phot
  * it is real. */
 void photo_pixels_mask_by_alpha(const struct image *image, struct photograph *photo);
 
+/* Excludes what lies farther from the picture's centre, pixels: the black around a fisheye's circle. */
+void photo_pixels_mask_by_circle(double radius, struct photograph *photo);
+
 /* Excludes what is black in the mask dir/name (nerfstudio's convention), of the photograph's size or a multiple of it.
  * `turn` is the orientation by which the photograph was turned. *is_broken: the file cannot be decoded. */
 enum status photo_pixels_load_mask(const char *dir, const char *name, int turn, struct photograph *photo,

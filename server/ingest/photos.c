@@ -100,9 +100,10 @@ static void set_clip(const struct loading *l, const struct image_info *info, str
 
 /* The arrays of a decoded picture. Only now is known whether it has others than its pixels. */
 static enum status keep_pixels(const struct loading *l, const struct image *image, const struct image_info *info,
-                               bool has_mask, struct photograph *photo, struct photo_outcome *outcome) {
+                               bool has_mask, double crop_radius, struct photograph *photo,
+                               struct photo_outcome *outcome) {
     size_t count = (size_t)image->width * image->height;
-    bool is_masked = has_mask || image_channel(image, "A") >= 0;
+    bool is_masked = has_mask || crop_radius > 0.0 || image_channel(image, "A") >= 0;
     size_t others = (size_t)(image->clipped != NULL) + (size_t)is_masked;
     enum status status =
         spill_reserve(photo->spill, ALL, others, others * count, l->options->later_bytes * l->pixels, &outcome->err);
@@ -119,6 +120,8 @@ static enum status keep_pixels(const struct loading *l, const struct image *imag
         photo_pixels_from_linear(image, photo, &outcome->counts);
     if (!photo->is_hdr)
         photo_pixels_mask_by_alpha(image, photo);
+    if (crop_radius > 0.0)
+        photo_pixels_mask_by_circle(crop_radius, photo);
     return STATUS_OK;
 }
 
@@ -147,7 +150,7 @@ static enum status load_photograph(const struct loading *l, size_t index) {
     if (image_channel(&image, "B") != 2)
         status = error_set(&outcome->err, STATUS_INPUT, "the picture has no red, green and blue");
     else
-        status = keep_pixels(l, &image, &info, frame->mask, photo, outcome);
+        status = keep_pixels(l, &image, &info, frame->mask, l->fit[index].lens.crop_radius, photo, outcome);
     image_release(&image);
     if (status == STATUS_OK && frame->mask) {
         status =

@@ -221,11 +221,6 @@ static void warn(const struct frame_context *c) {
                          "%s: %zu frames are in none of train_filenames, val_filenames and "
                          "test_filenames and were left out",
                          c->name, c->unlisted_count);
-    if (cJSON_IsNumber(cJSON_GetObjectItemCaseSensitive(c->root, "fisheye_crop_radius")))
-        findings_warning(c->findings,
-                         "%s: fisheye_crop_radius is not read: what lies outside of it is used, unless mask_path "
-                         "excludes it",
-                         c->name);
 }
 
 void transforms_read(const cJSON *root, const char *name, struct frames *t, struct findings *f) {

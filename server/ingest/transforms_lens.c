@@ -139,4 +139,6 @@ void transforms_lens_read(struct frame_context *c, struct lens *lens) {
     lens->cy = frame_context_number(c, "cy", NAN);
     lens->angle_x = angle(c, "camera_angle_x");
     lens->angle_y = angle(c, "camera_angle_y");
+    double radius = frame_context_positive(c, "fisheye_crop_radius"); /* as nerfstudio's pixel sampler takes it */
+    lens->crop_radius = isnan(radius) ? 0.0 : radius;
 }

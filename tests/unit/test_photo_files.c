@@ -153,6 +153,21 @@ static void scaled(void) {
     CHECK(!load_copies(PLAIN, "\"w\":\"0x18\",\"h\":16,\"fl_x\":20") && strstr(told, "\"w\" must be a number"));
 }
 
+/* nerfstudio's circle of a fisheye, in the pixels of the stated size: what is outside is masked. */
+static void cropped(void) {
+    CHECK(load_copies(PLAIN,
+                      "\"w\":48,\"h\":32,\"fl_x\":40,\"camera_model\":\"OPENCV_FISHEYE\",\"fisheye_crop_radius\":14"));
+    const uint8_t *mask = scene.photograph[4].mask;
+    CHECK(mask != NULL);
+    for (size_t y = 0; y < 16 && mask; y++)
+        for (size_t x = 0; x < 24; x++) {
+            bool is_inside = hypot((double)x - 11.5, (double)y - 7.5) <= 7.0;
+            CHECK((mask[y * 24 + x] > 0) == is_inside);
+        }
+    CHECK(!load_copies(PLAIN, "\"w\":24,\"h\":16,\"fl_x\":20,\"fisheye_crop_radius\":-1"));
+    CHECK_THAT(strstr(told, "fisheye_crop_radius"), "%s", told);
+}
+
 /* Two of five may be broken; three may not. */
 static void broken(void) {
     static const char top[] = "\"w\":24,\"h\":16,\"fl_x\":20";
@@ -279,6 +294,7 @@ int main(void) {
     orientations();
     turned();
     scaled();
+    cropped();
     broken();
     data_window();
     names();

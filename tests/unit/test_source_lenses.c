@@ -209,7 +209,6 @@ static void test_told(void) {
         {"Metashape", "c.xml", META("frame", "<f>104</f><b2>0.2</b2>"), NULL},
         {"RealityCapture", "c.csv", RC("0.1,0,0,0,0,0"), "1 lenses have k1 alone"},
         {"RealityCapture", "c.csv", RC("0.1,0.01,0,0,0,0"), NULL},
-        {"nerfstudio transforms.json", "transforms.json", NERF("\"fisheye_crop_radius\":70,"), "fisheye_crop_radius"},
     };
     for (size_t i = 0; i < sizeof told / sizeof *told; i++) {
         put(told[i].source, told[i].path, told[i].text);
