@@ -1,4 +1,4 @@
-/* sun.h -- the sun: distant light from one small disc that no photograph shows (sun_find.h).
+/* sun.h -- the sun: distant light from one small disc, that photographs show (sun_seen.h) or not (sun_find.h).
  *
  * Its shadows are sharp. While base colours are solved, every texel traces shadow rays to it, instead of interpolating
  * between probes; afterwards it becomes a part of the environment map. */
@@ -14,6 +14,7 @@
 
 struct sun {
     bool is_there;
+    bool is_measured; /* photographs show it, and how bright it is */
     vec3 direction;   /* unit, towards its middle */
     float radius_rad; /* angular radius */
     rgb irradiance;   /* of a surface that faces it */

@@ -105,6 +105,15 @@ static float distant_radiance(const struct shining *s, vec3 direction) {
     return fmaxf(radiance, (float)unseen);
 }
 
+/* Lambert radiance at albedo 1 by a sun that photographs show. */
+static float sun_radiance(const struct shining *s, const struct shining_place *place) {
+    const struct sun *sun = &s->r->sun;
+    struct surface_point at = {.position = place->position, .normal = place->normal, .shading = place->normal};
+    struct irradiance light = {0};
+    sun_add_light(sun, s->r->world.accel, &at, &light);
+    return rgb_mean(irradiance_diffuse(&light, at.shading, 1.0f, at.shading));
+}
+
 static float white_at(const struct shining *s, const struct shining_place *place, uint32_t key) {
     struct accel_ray ray[RAYS_PER_POINT];
     struct accel_hit hit[RAYS_PER_POINT];
@@ -114,7 +123,7 @@ static float white_at(const struct shining *s, const struct shining_place *place
         bool far = hit[i].triangle == ACCEL_NONE;
         sum += (double)(far ? distant_radiance(s, ray[i].direction) : radiance_of(s, hit[i].triangle));
     }
-    return (float)(sum / RAYS_PER_POINT);
+    return (float)(sum / RAYS_PER_POINT) + sun_radiance(s, place);
 }
 
 float shining_white(const struct shining *s, const uint32_t *triangle, size_t count) {

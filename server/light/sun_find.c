@@ -221,10 +221,15 @@ static void look_for_sun(struct sun_search *s, double *explains) {
     s->sun.irradiance = rgb_scale(white, BSDF_PI);
 }
 
-static void report(const struct sun_search *s, double explains) {
-    const struct reconstruction *r = s->r;
+static cJSON *report_found(const struct reconstruction *r) {
     cJSON *figures = cJSON_AddObjectToObject(r->report, "sun");
     json_add_bool(figures, "found", r->sun.is_there);
+    json_add_bool(figures, "measured", r->sun.is_measured);
+    return figures;
+}
+
+static void report(const struct sun_search *s, double explains) {
+    cJSON *figures = report_found(s->r);
     json_add_number(figures, "explains", explains);
     json_add_number(figures, "lights_share", count_lit(s, -INFINITY) / fmax((double)s->places.count, 1.0));
 }
@@ -244,6 +249,10 @@ void sun_find(struct reconstruction *r, const struct views *views) {
     struct sun_search s = {.r = r, .median_radiance = views->median_radiance};
     double explains = 0.0;
     struct survey survey;
+    if (r->sun.is_measured) {
+        report_found(r);
+        return;
+    }
     survey_lights_on(r, views, NULL);
     survey_init(&survey, r, NULL, NULL, LIGHT_PLACES);
     light_places_init(&s.places, &survey);

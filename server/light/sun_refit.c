@@ -78,7 +78,7 @@ static void find_places(struct divide *d, struct light_places *places) {
 void sun_refit(struct divide *d, struct sun *sun) {
     struct light_places places;
     struct missing_light missing;
-    if (!sun->is_there)
+    if (!sun->is_there || sun->is_measured)
         return;
     find_places(d, &places);
     missing_light_init(&missing, &places, PLACE_WHITE);

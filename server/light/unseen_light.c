@@ -71,6 +71,7 @@ static void look_from(const struct unseen *u, uint32_t texel, int thread, struct
     }
     struct irradiance light;
     irradiance_gather(&light, in, field, &at, key, RAYS_PER_POINT);
+    sun_add_light(&r->sun, r->world.accel, &at, &light);
     p->known = fmaxf(rgb_mean(irradiance_diffuse(&light, at.shading, 1.0f, at.shading)) - p->filled, 0.0f);
     p->shown = rgb_mean(fused_radiance(&r->fused, texel));
 }

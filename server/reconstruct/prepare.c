@@ -12,6 +12,7 @@
 #include "server/capture/seen_share.h"
 #include "server/capture/texel_density.h"
 #include "server/light/split.h"
+#include "server/light/sun_seen.h"
 #include "server/reconstruct/calibrate.h"
 #include "server/scene/mesh_denoise.h"
 #include "server/scene/normals.h"
@@ -265,6 +266,7 @@ static void measure_photographs(struct prepare *p) {
     clip_mark(r->scene, p->views, &r->noise, r->pool);
     fireflies_mark(r->scene, p->views, &r->noise, r->pool);
     environment_gather(&r->environment, p->views, r->pool);
+    sun_seen_take(&r->environment, &r->sun);
     prepare_environment(r);
     advance(p, CALIBRATE_SHARE);
 }

@@ -61,7 +61,7 @@ static void log_hidden_lights(const struct stage_run *run) {
     snprintf(line, sizeof line, "light: %zu lamps that no photograph shows were found by what they light", lamps);
     if (lamps > 0)
         run->hooks->log(run->hooks->user, line);
-    if (r->sun.is_there)
+    if (r->sun.is_there && !r->sun.is_measured)
         run->hooks->log(run->hooks->user, "light: a sun that no photograph shows was found by what it lights");
 }
 
