@@ -5,6 +5,7 @@
 
 #include "common/mem.h"
 #include "common/quantile.h"
+#include "server/capture/pose_walk.h"
 
 /* An occluder is nearer than the point by this share of its distance: 2 cm at 2 m. Poses are not known well yet. */
 #define OCCLUSION_MARGIN 0.01f /* +25 %: no change */
@@ -60,6 +61,13 @@ static void find_tracks(void *user, size_t index, int thread) {
         h->track[h->count++] = (uint32_t)i;
     }
     h->frame.depth_m = depth_sum_m / fmax(1.0, (double)h->count);
+    if (s->walk.is_known && h->count > 0) {
+        double twist[POSE_UNKNOWNS];
+        size_t at = (size_t)(h->photo - s->tracks->views->scene->photograph);
+        struct pose_drift drift = pose_walk_expect(s, at);
+        pose_walk_twist(&h->frame, &drift, twist);
+        pose_twist(&h->frame, twist, INFINITY);
+    }
 }
 
 /* --- alignment ----------------------------------------------------------------------------------- */
@@ -195,7 +203,8 @@ static void judge(void *user, size_t index, int thread) {
         if (isfinite(before[k]) && isfinite(now[k]))
             validation_add(&v, before[k], now[k]);
     h->frame.shift_px = shift_of(all, h);
-    h->frame.is_fixed = h->frame.shift_px < POSE_MIN_SHIFT_PX || !pose_is_improved(&v);
+    bool is_right = all->solver->walk.is_known ? v.saved >= 0.0 : pose_is_improved(&v);
+    h->frame.is_fixed = h->frame.shift_px < POSE_MIN_SHIFT_PX || !is_right;
     mem_free(before);
 }
 

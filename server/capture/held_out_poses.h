@@ -10,7 +10,8 @@
 #include "server/capture/pose_solver.h"
 #include "server/scene/scene.h"
 
-/* Moves the cameras of held-out photographs where that is significantly better; from level `coarsest` to the finest. Of
+/* Moves the cameras of held-out photographs where that is significantly better; where the others drift, each starts
+ * between its neighbours (pose_walk.h) and stays moved unless that is worse. From level `coarsest` to the finest. Of
  * the solver, whose frames must have their final poses, only the values of the current level are written. Returns the
  * number moved; *shift_px: their rms shift, pixels. */
 size_t held_out_poses_align(struct scene *scene, struct pose_solver *s, int coarsest, struct parallel *pool,

@@ -65,8 +65,15 @@ struct pose_observation {
     float d[POSE_UNKNOWNS]; /* derivative of `value` by the frame's twist, per pixel */
 };
 
+/* Prior of corrections along the order of the photographs: variances of a step, of each axis (pose_walk.h). */
+struct pose_walk {
+    bool is_known, is_learnt;            /* learnt: pose_solve improves the variances */
+    double turn_variance, move_variance; /* radians^2, metres^2 */
+};
+
 struct pose_solver {
     const struct tracks *tracks;
+    struct pose_walk walk; /* in place of pose_prior where it is known */
     size_t frames, track_count, unknowns;
     const struct track **track;           /* [track_count] */
     uint32_t *owner;                      /* [track_count] the photograph it comes from */
@@ -106,7 +113,7 @@ static inline void pose_factor(double a[POSE_UNKNOWNS][POSE_UNKNOWNS]) {
     (void)is_positive;
 }
 
-/* Solves for x: twists to apply, and offsets. */
+/* Solves for x: twists to apply, and offsets. A walk that is learnt is improved first. */
 void pose_solve(struct pose_solver *s);
 
 /* At its camera, not moved yet. */

@@ -10,6 +10,7 @@
 
 #include "common/mem.h"
 #include "server/capture/conjugate.h"
+#include "server/capture/pose_walk.h"
 
 /* Standard deviation of the offsets' prior, in logarithms: what is left of vignettes and reflections. */
 #define OFFSET_SIGMA 0.3 /* +25 %: no change */
@@ -23,6 +24,11 @@
 double pose_prior(const struct pose_frame *frame) {
     double squares = conjugate_dot(frame->total, frame->total, POSE_UNKNOWNS);
     return 1.0 / (PRIOR_PX * fmax(PRIOR_LEAST_PX, sqrt(squares)));
+}
+
+/* The same on a frame's own, where a walk may hold it to its neighbours. */
+static double own_prior(const struct pose_solver *s, size_t f) {
+    return s->walk.is_known ? 0.0 : pose_prior(&s->frame[f]);
 }
 
 /* out += A' W (I - M) z for one track; z[] by observation. */
@@ -71,7 +77,7 @@ static void multiply(const void *user, const double *x, double *out) {
     const struct pose_solver *s = system->solver;
     size_t twists = POSE_UNKNOWNS * s->frames;
     for (size_t i = 0; i < s->unknowns; i++)
-        out[i] = x[i] * (i < twists ? pose_prior(&s->frame[i / POSE_UNKNOWNS]) + system->damping[i]
+        out[i] = x[i] * (i < twists ? own_prior(s, i / POSE_UNKNOWNS) + system->damping[i]
                                     : 1.0 / (OFFSET_SIGMA * OFFSET_SIGMA));
     for (size_t t = 0; t < s->track_count; t++) {
         const struct pose_observation *observation = s->observation + t * POSE_OBSERVATIONS_MAX;
@@ -86,6 +92,8 @@ static void multiply(const void *user, const double *x, double *out) {
         }
         scatter(s, t, z, out);
     }
+    if (s->walk.is_known)
+        pose_walk_multiply(s, x, out);
     project(s, out);
 }
 
@@ -105,9 +113,12 @@ static void preconditioner_init(struct preconditioner *p, const struct pose_solv
         }
     }
     for (size_t f = 0; f < s->frames; f++) {
+        double walk[2] = {0.0, 0.0};
+        if (s->walk.is_known)
+            pose_walk_diagonal(s, f, walk);
         for (int i = 0; i < POSE_UNKNOWNS; i++) {
             damping[POSE_UNKNOWNS * f + (size_t)i] = POSE_DAMPING * p->block[f][i][i];
-            p->block[f][i][i] += pose_prior(&s->frame[f]) + POSE_DAMPING * p->block[f][i][i];
+            p->block[f][i][i] += own_prior(s, f) + walk[i / 3] + POSE_DAMPING * p->block[f][i][i];
         }
         pose_factor(p->block[f]);
     }
@@ -140,6 +151,8 @@ void pose_solve(struct pose_solver *s) {
     struct twist_system twist = {.solver = s, .damping = mem_calloc(twists, sizeof *twist.damping)};
     const struct conjugate_system system = {n, multiply, precondition, &twist};
     preconditioner_init(&twist.preconditioner, s, twist.damping);
+    if (s->walk.is_known && s->walk.is_learnt)
+        pose_walk_learn(s, twist.preconditioner.block);
     for (size_t t = 0; t < s->track_count; t++) {
         double y[POSE_OBSERVATIONS_MAX];
         for (size_t k = 0; k < pose_observation_count(s->track[t]); k++)
@@ -149,7 +162,9 @@ void pose_solve(struct pose_solver *s) {
     }
     memset(x, 0, twists * sizeof *x);
     for (size_t i = 0; i < twists; i++)
-        r[i] -= pose_prior(&s->frame[i / POSE_UNKNOWNS]) * s->frame[i / POSE_UNKNOWNS].total[i % POSE_UNKNOWNS];
+        r[i] -= own_prior(s, i / POSE_UNKNOWNS) * s->frame[i / POSE_UNKNOWNS].total[i % POSE_UNKNOWNS];
+    if (s->walk.is_known)
+        pose_walk_pull(s, r);
     project(s, r);
     conjugate_residual(&system, x, r);
     double goal = CG_TOLERANCE * CG_TOLERANCE * conjugate_dot(r, r, n);
