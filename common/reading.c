@@ -87,14 +87,14 @@ static enum status parse_mesh_axes(const cJSON *value, struct signed_axes *axes,
 }
 
 static enum status parse_coordinates(const cJSON *value, char **name, struct error *err) {
-    static const char *const names[] = {"file", "capture", "chunk", "local"};
+    static const char *const names[] = {"file", "capture", "chunk", "local", "projected"};
     const char *text = cJSON_GetStringValue(value);
     for (size_t i = 0; text && i < sizeof names / sizeof *names; i++)
         if (strcmp(text, names[i]) == 0) {
             *name = mem_strdup(text);
             return STATUS_OK;
         }
-    return error_set(err, STATUS_INPUT, "coordinates must be \"file\", \"capture\", \"chunk\" or \"local\"");
+    return error_set(err, STATUS_INPUT, "coordinates must be \"file\", \"capture\", \"chunk\", \"local\" or \"projected\"");
 }
 
 /* "told" or "ignored". */

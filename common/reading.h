@@ -14,8 +14,8 @@
  *   "scale"       length of the mesh's unit in units of the cameras' world (.001: the mesh is in millimetres)
  *   "shift"       photograph i has the pose of frame i + shift; frames without one are left out
  *   "coordinates" those in which the mesh is, where the cameras' file knows several: "file" (its poses'), "capture" (before
- *                 nerfstudio's applied_transform and applied_scale), "chunk" and "local" (of a georeferenced Metashape
- *                 chunk); otherwise by the mesh
+ *                 nerfstudio's applied_transform and applied_scale), "chunk", "local" and "projected" (of a georeferenced
+ *                 Metashape chunk); otherwise by the mesh
  *   "lens"        factor of all focal lengths and principal points: .5 where they are those of pictures of twice the size
  *   "distortion"  "told" or "ignored": the pictures have the lens's distortion as the files state it, or none
  *   "exposures"   "told" or "ignored": exposures that the files state are taken, or estimated as if they did not */

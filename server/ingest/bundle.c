@@ -188,7 +188,7 @@ static enum status settle_coordinates(struct frames *t, const char *name, const 
         findings_warning(
             f,
             "%s: the cameras are georeferenced and stand far from the mesh in all coordinates that the file "
-            "knows, as for a model in a projected system: export it in local or geocentric (EPSG:4978) ones",
+            "knows: export the model in local or geocentric (EPSG:4978) ones, or in UTM with heights above the ellipsoid",
             name);
     memcpy(scene->other, t->other, sizeof scene->other);
     scene->other_count = t->other_count;

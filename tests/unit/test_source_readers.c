@@ -338,7 +338,7 @@ static void test_geocentric(struct frames *t) {
     const double *at = t->frame[0].world_from_camera.translation;
     double scale = 12.354192447331316, distance = 0.0, origin[3] = {-2499366.429888, -4256836.520906, 4029217.965003};
     struct mesh mesh = {0};
-    CHECK(t->other_count == 2 && t->is_placed_by_mesh);
+    CHECK(t->other_count == 3 && t->is_placed_by_mesh);
     for (int i = 0; i < 3; i++)
         distance += (at[i] - origin[i]) * (at[i] - origin[i]);
     CHECK_NEAR(sqrt(distance), scale * sqrt(camera[0] * camera[0] + camera[1] * camera[1] + camera[2] * camera[2]),
@@ -367,7 +367,14 @@ static void test_geocentric(struct frames *t) {
     CHECK(frames_settle_coordinates(t, NULL, &mesh, NULL) == STATUS_OK);
     CHECK_STRING(t->coordinates, "file");
     CHECK(!t->stands_apart);
-    mesh.offset[0] += 1e5; /* a projected system, say */
+    CHECK(frames_settle_coordinates(t, "projected", NULL, NULL) == STATUS_OK);
+    for (int i = 0; i < 3; i++)
+        mesh.offset[i] = round(at[i]);
+    CHECK(mesh.offset[0] > 2e5 && mesh.offset[0] < 8e5 && mesh.offset[1] > 4.3e6 && mesh.offset[1] < 4.5e6);
+    CHECK(frames_settle_coordinates(t, "file", NULL, NULL) == STATUS_OK);
+    CHECK(frames_settle_coordinates(t, NULL, &mesh, NULL) == STATUS_OK);
+    CHECK_STRING(t->coordinates, "projected");
+    mesh.offset[0] += 1e5; /* another system, say */
     CHECK(frames_settle_coordinates(t, NULL, &mesh, NULL) == STATUS_OK && t->stands_apart);
 }
 

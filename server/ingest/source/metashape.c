@@ -2,25 +2,27 @@
  *
  * A camera's transform is camera-to-chunk, 4 x 4, row-major, with our camera axes; the chunk's transform (or, since 2.0,
  * the camera's component's) takes it to the coordinates in which models are exported. That of a georeferenced chunk leads
- * to geocentric coordinates, in which models are seldom exported: theirs may also be the chunk's own ("chunk") or have
- * their origin in the chunk's region, x to the east and z up ("local"). A model in a projected system fits none of these.
+ * to geocentric coordinates, in which models are seldom exported: theirs may also be the chunk's own ("chunk"), have
+ * their origin in the chunk's region, x to the east and z up ("local"), or be easting, northing and height above the
+ * ellipsoid of UTM ("projected"). A model in another projected system, or with heights above the sea, fits none of these.
  *
  * Distortion: k1 to k4 of even powers, p1 (r^2 + 2 x^2) + 2 p2 x y for x: OpenCV's with p1 and p2 exchanged; cx, cy from
  * the picture's centre; fx = f + b1. A fisheye has the same of x and y scaled to the angle from the axis, which with p1
  * and p2 is COLMAP's THIN_PRISM_FISHEYE. b2 (skew) and p3, p4 (of higher order of p1, p2) are not modelled: what they
  * are at the picture's corner is told. */
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "common/mem.h"
 #include "server/ingest/source/frame_list.h"
+#include "server/ingest/source/geodesy.h"
 #include "server/ingest/source/photo_folder.h"
 #include "server/ingest/source/values.h"
 #include "server/ingest/source/xml.h"
 
 /* Millions of metres from the origin: the centre of the Earth, 6.4 million metres below. */
 #define GEOCENTRIC_M 5e6
-#define WGS84_AXES_RATIO (6356752.314245 / 6378137.0) /* polar over equatorial radius */
 
 /* By what it begins with: its name is the user's. */
 static char *recognise(const struct listing *l, const char *base) {
@@ -101,36 +103,31 @@ static enum status read_sensor(const struct xml_node *sensor, const char *name, 
     return STATUS_OK;
 }
 
-/* Axes that point east, north and up where a geocentric point is, and that as their origin: WGS 84's normal there. */
-static void make_local(const double at[3], double local[3][4]) {
-    double up[3] = {at[0], at[1], at[2] / (WGS84_AXES_RATIO * WGS84_AXES_RATIO)}, length = 0.0;
-    double east[3] = {-at[1], at[0], 0.0}, across = hypot(at[0], at[1]);
-    for (int i = 0; i < 3; i++)
-        length += up[i] * up[i];
-    for (int i = 0; i < 3; i++) {
-        up[i] /= sqrt(length);
-        east[i] = across > 0.0 ? east[i] / across : i == 0;
-    }
-    for (int i = 0; i < 3; i++) {
-        int a = (i + 1) % 3, b = (i + 2) % 3;
-        local[i][0] = east[i];
-        local[i][1] = up[a] * east[b] - up[b] * east[a];
-        local[i][2] = up[i];
-        local[i][3] = at[i];
-    }
+/* The projected system that the chunk's reference names last, which is the whole's; else that of the place. */
+static struct utm utm_of(const struct xml_node *chunk, const double place[3]) {
+    static const char mark[] = "AUTHORITY[\"EPSG\",\"";
+    const struct xml_node *reference = xml_child(chunk, "reference");
+    const char *at = reference ? reference->text : "", *last = NULL;
+    struct utm utm;
+    while ((at = strstr(at, mark)) != NULL)
+        last = at += sizeof mark - 1;
+    return last && geodesy_utm_of_epsg(atoi(last), &utm) ? utm : geodesy_utm_at(place);
 }
 
 /* What a model of a georeferenced chunk may be in. */
 static void know_coordinates(const struct xml_node *chunk, const double geocentric[3][4], struct frames *t) {
     struct xml_node *centre = xml_child(xml_child(chunk, "region"), "center");
-    double at[3] = {0}, placed[3], local[3][4];
+    double at[3] = {0}, placed[3], local[3][4], projected[3][4];
     if (centre && !numbers_parse(centre->text, 3, at))
         memset(at, 0, sizeof at);
     for (int i = 0; i < 3; i++)
         placed[i] = geocentric[i][0] * at[0] + geocentric[i][1] * at[1] + geocentric[i][2] * at[2] + geocentric[i][3];
-    make_local(placed, local);
+    geodesy_from_local(placed, local);
+    const struct utm utm = utm_of(chunk, placed);
+    geodesy_from_utm(placed, &utm, projected);
     frames_know(t, "chunk", "the chunk's own", geocentric);
     frames_know(t, "local", "local ones with the origin in the chunk's region", (const double(*)[4])local);
+    frames_know(t, "projected", "easting, northing and height of UTM", (const double(*)[4])projected);
     t->is_placed_by_mesh = true;
 }
 
