@@ -2,6 +2,7 @@
 #include "common/clock.h"
 
 #include <stdio.h>
+#include <string.h>
 #include <time.h>
 
 double clock_sec(void) {
@@ -22,4 +23,13 @@ void clock_text(int64_t unix_ms, char text[CLOCK_TEXT_SIZE]) {
     gmtime_r(&seconds, &utc);
     size_t used = strftime(text, CLOCK_TEXT_SIZE, "%Y-%m-%dT%H:%M:%S", &utc);
     snprintf(text + used, CLOCK_TEXT_SIZE - used, ".%03dZ", (int)(unix_ms % 1000));
+}
+
+int64_t clock_read(const char *text) {
+    struct tm utc = {0};
+    const char *rest = strptime(text, "%Y-%m-%dT%H:%M:%S", &utc);
+    if (rest && *rest == '.' && rest[1] >= '0' && rest[1] <= '9')
+        rest += 1 + strspn(rest + 1, "0123456789");
+    time_t seconds = rest && strcmp(rest, "Z") == 0 ? timegm(&utc) : -1;
+    return seconds > 0 ? (int64_t)seconds * 1000 : 0;
 }

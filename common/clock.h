@@ -13,5 +13,7 @@ int64_t clock_unix_ms(void);
 #define CLOCK_TEXT_SIZE 32
 /* Such a time as 2026-11-21T12:00:00.123Z. */
 void clock_text(int64_t unix_ms, char text[CLOCK_TEXT_SIZE]);
+/* The time, with or without a fraction (which is left out); 0 where it is malformed. */
+int64_t clock_read(const char *text);
 
 #endif

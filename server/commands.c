@@ -22,7 +22,7 @@ static const struct server_command table[] = {
      "`token add` makes a token for the user NAME and prints it, once. WHICH is a token's number or a\n"
      "user's name; what is revoked stops working at once, in open streams too. While there has never\n"
      "been a token, whoever reaches the daemon may do everything.\n",
-     "  unbaked token add alice\n  unbaked token add wall-display --role viewer\n"
+     "  unbaked token add alice --expires 90d\n  unbaked token add wall-display --role viewer\n"
      "  unbaked token revoke alice\n",
      token_flags, token_command},
     {"check-config", "[FILE]", "say what is wrong with a configuration", "",

@@ -17,13 +17,16 @@ static enum status token_add(struct store *store, const cJSON *request, cJSON *r
     char token[TOKEN_SIZE];
     enum role role;
     int64_t id;
+    double expires_ms = 0.0;
     enum status status = json_string(request, "name", "the request", "", &name, err);
     if (status == STATUS_OK)
         status = json_string(request, "role", "the request", "user", &role_text, err);
     if (status == STATUS_OK && !role_parse(role_text, &role))
         status = error_set(err, STATUS_INPUT, "there is no role \"%.80s\": viewer, user, admin", role_text);
     if (status == STATUS_OK)
-        status = store_token_add(store, name, role, token, &id, err);
+        status = json_number(request, "expires_ms", "the request", 0.0, &expires_ms, err);
+    if (status == STATUS_OK)
+        status = store_token_add(store, name, role, (int64_t)expires_ms, token, &id, err);
     if (status != STATUS_OK)
         return status;
     log_info("token %lld made for %s, role %s", (long long)id, name, role_name(role));
@@ -43,6 +46,7 @@ static enum status token_list(struct store *store, cJSON *reply, struct error *e
         json_add_string(item, "user", rows[i].name);
         json_add_string(item, "role", role_name(rows[i].role));
         json_add_int(item, "created_ms", rows[i].created_ms);
+        json_add_int(item, "expires_ms", rows[i].expires_ms);
         cJSON_AddItemToArray(items, item);
     }
     mem_free(rows);

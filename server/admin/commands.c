@@ -11,6 +11,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "common/clock.h"
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
@@ -18,6 +19,8 @@
 
 const struct flag token_flags[] = {
     {"--role", "ROLE", "of a new token: viewer, user (the default) or admin"},
+    {"--expires", "WHEN",
+     "of a new token: after 30d or 12h, or on a day such as 2027-01-31, at its end in UTC (never)"},
     {"--json", NULL, "print JSON"},
     INVOCATION_FLAGS,
     COMMAND_HELP_FLAG,
@@ -68,21 +71,47 @@ static int ask(int code, struct invocation *in, cJSON *request, void print(const
 
 /* --- token --------------------------------------------------------------------------------- */
 
+#define TIME_SIZE 32
+#define DAY_MS INT64_C(86400000)
+#define HOUR_MS INT64_C(3600000)
+#define EXPIRES_MOST 36500 /* days or hours: a century of the former */
+
+static double time_of(const cJSON *item, const char *name, char text[TIME_SIZE]) {
+    double ms = 0;
+    json_number(item, name, "a token", 0, &ms, NULL);
+    time_t seconds = (time_t)(ms / 1000);
+    struct tm utc;
+    gmtime_r(&seconds, &utc);
+    strftime(text, TIME_SIZE, "%Y-%m-%d %H:%MZ", &utc);
+    return ms;
+}
+
 static void print_tokens(const cJSON *items) {
     const cJSON *item;
-    printf("%6s  %-20s %-7s %s\n", "token", "user", "role", "made");
+    printf("%6s  %-20s %-7s %-17s  %s\n", "token", "user", "role", "made", "expires");
     cJSON_ArrayForEach(item, items) {
-        char made[32];
-        double ms = 0;
-        json_number(item, "created_ms", "a token", 0, &ms, NULL);
-        time_t seconds = (time_t)(ms / 1000);
-        struct tm utc;
-        gmtime_r(&seconds, &utc);
-        strftime(made, sizeof made, "%Y-%m-%d %H:%MZ", &utc);
-        printf("%6d  %-20s %-7s %s\n", cJSON_GetObjectItem(item, "id")->valueint,
+        char made[TIME_SIZE], expires[TIME_SIZE];
+        time_of(item, "created_ms", made);
+        double ms = time_of(item, "expires_ms", expires);
+        printf("%6d  %-20s %-7s %-17s  %s%s\n", cJSON_GetObjectItem(item, "id")->valueint,
                cJSON_GetStringValue(cJSON_GetObjectItem(item, "user")),
-               cJSON_GetStringValue(cJSON_GetObjectItem(item, "role")), made);
+               cJSON_GetStringValue(cJSON_GetObjectItem(item, "role")), made, ms > 0.0 ? expires : "never",
+               ms > 0.0 && ms <= (double)clock_unix_ms() ? ", is past" : "");
     }
+}
+
+/* 30d, 12h or 2027-01-31; false for anything else. */
+static bool read_expiry(const char *text, int64_t *expires_ms) {
+    size_t digits = strspn(text, "0123456789");
+    struct tm day = {0};
+    if (digits > 0 && digits <= 5 && (text[digits] == 'd' || text[digits] == 'h') && text[digits + 1] == '\0') {
+        int64_t count = strtoll(text, NULL, 10);
+        *expires_ms = clock_unix_ms() + count * (text[digits] == 'd' ? DAY_MS : HOUR_MS);
+        return count > 0 && count <= EXPIRES_MOST;
+    }
+    const char *rest = strptime(text, "%Y-%m-%d", &day);
+    *expires_ms = rest && *rest == '\0' ? (int64_t)timegm(&day) * 1000 + DAY_MS : 0;
+    return *expires_ms > 0;
 }
 
 static void print_token_reply(const char *action, const cJSON *reply) {
@@ -112,6 +141,15 @@ int token_command(int argc, char **argv) {
                             : "no more words");
         code = EXIT_USAGE;
     }
+    const char *expires = code < 0 ? invocation_value(&in, "--expires", NULL) : NULL;
+    int64_t expires_ms = 0;
+    if (expires && !is_add) {
+        fputs("unbaked: --expires belongs to token add\n", stderr);
+        code = EXIT_USAGE;
+    } else if (expires && !read_expiry(expires, &expires_ms)) {
+        fprintf(stderr, "unbaked: --expires takes 30d, 12h or a day such as 2027-01-31, not \"%.80s\"\n", expires);
+        code = EXIT_USAGE;
+    }
     if (code < 0) {
         char *command = mem_printf("token-%s", action);
         json_add_string(request, "command", command);
@@ -121,6 +159,7 @@ int token_command(int argc, char **argv) {
         if (is_revoke)
             json_add_string(request, "which", in.arguments.words[1]);
         json_add_string(request, "role", invocation_value(&in, "--role", "user"));
+        json_add_int(request, "expires_ms", expires_ms);
     }
     return ask(code, &in, request, print_token_reply, action);
 }

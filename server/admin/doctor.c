@@ -17,6 +17,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "common/clock.h"
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
@@ -193,19 +194,32 @@ static bool daemon_runs(const char *dir) {
     return runs;
 }
 
+static int count_expired(const cJSON *tokens) {
+    const cJSON *item;
+    int count = 0;
+    cJSON_ArrayForEach(item, tokens) {
+        double ms = cJSON_GetNumberValue(cJSON_GetObjectItem(item, "expires_ms"));
+        count += ms > 0.0 && ms <= (double)clock_unix_ms();
+    }
+    return count;
+}
+
 static void check_tokens(struct doctor *d, bool runs) {
     const struct config *c = d->config;
     bool is_loopback = d->is_loopback;
     struct error err;
     char *path = layout_state(c->data_dir);
-    int fd, count = 0;
+    int fd, count = 0, expired = 0;
     if (runs || access(path, R_OK) == 0) {
         cJSON *request = cJSON_CreateObject(), *reply;
         json_add_string(request, "command", "token-list");
-        if (admin_call(c->data_dir, request, &reply, &fd, &err) == STATUS_OK)
-            count = cJSON_GetArraySize(cJSON_GetObjectItem(reply, "items"));
-        else
+        if (admin_call(c->data_dir, request, &reply, &fd, &err) == STATUS_OK) {
+            const cJSON *tokens = cJSON_GetObjectItem(reply, "items");
+            count = cJSON_GetArraySize(tokens);
+            expired = count_expired(tokens);
+        } else {
             tell(d, BAD, "database", "%s%s%s", err.message, *err.hint ? "; " : "", err.hint);
+        }
         cJSON_Delete(request);
         cJSON_Delete(reply);
     }
@@ -214,6 +228,10 @@ static void check_tokens(struct doctor *d, bool runs) {
         tell(d, is_loopback ? GOOD : BAD, "tokens", "access = open%s",
              is_loopback ? ": whoever has an account on this machine may do everything"
                          : " is for loopback addresses only");
+    else if (count > 0 && expired == count)
+        tell(d, WARN, "tokens", "%d, and all have expired: `unbaked token add NAME --role admin`", count);
+    else if (expired > 0)
+        tell(d, GOOD, "tokens", "%d, %d of them expired", count, expired);
     else if (count > 0)
         tell(d, GOOD, "tokens", "%d", count);
     else if (is_loopback)

@@ -123,7 +123,9 @@ static void refill(struct subscriber *s) {
         event_text_add_keepalive(&s->text, s->what.is_ndjson);
 }
 
-static bool token_was_revoked(struct subscriber *s) {
+static bool token_is_over(struct subscriber *s) {
+    if (s->caller.expires_ms && clock_unix_ms() >= s->caller.expires_ms)
+        return true;
     return hub_take_suspect(s->hub, &s->member) && s->caller.token_id &&
            !store_token_is_valid(s->store, s->caller.token_id);
 }
@@ -131,7 +133,7 @@ static bool token_was_revoked(struct subscriber *s) {
 static bool subscriber_fill(struct stream *base) {
     struct subscriber *s = (struct subscriber *)base;
     hub_listen(s->hub, &s->member); /* `wake` is set by the first fill */
-    if (token_was_revoked(s))
+    if (token_is_over(s))
         s->has_ended = true;
     else
         refill(s);

@@ -62,19 +62,33 @@ static struct response *refuse(const struct request *r, const char *detail) {
     return reply;
 }
 
-static void log_failure(const struct request *r, const char *more) {
+static void log_failure(const struct request *r, const char *why, const char *more) {
     char address[ADDRESS_TEXT_SIZE];
     address_text(&r->address, address);
     const struct log_field fields[] = {
         {"request", r->id, false}, {"client", address, false}, {"path", r->target.path, false}};
-    log_fields(LOG_INFO, fields, sizeof fields / sizeof *fields, "login failed: the token is not valid%s", more);
+    log_fields(LOG_INFO, fields, sizeof fields / sizeof *fields, "login failed: %s%s", why, more);
 }
 
-struct response *auth_reject(struct api *api, struct request *r) {
+/* Whoever has an expired token does not guess: he is told, and not throttled. */
+static struct response *refuse_expired(const struct request *r, const struct error *err) {
+    cJSON *members = cJSON_CreateObject();
+    log_failure(r, err->message, "");
+    json_add_string(members, "type", AUTH_EXPIRED);
+    json_add_string(members, "title", "Token expired");
+    struct response *reply = problem_full(r, 401, err->message, err->hint, members);
+    response_field(reply, "WWW-Authenticate", "Bearer realm=\"unbaked\", error=\"invalid_token\"");
+    return reply;
+}
+
+struct response *auth_reject(struct api *api, struct request *r, const struct error *err) {
     bool is_first;
+    if (err && err->status == STATUS_CONFLICT)
+        return refuse_expired(r, err);
     double wait_sec = auth_throttle_fail(api->auth_throttle, &r->address, clock_sec(), &is_first);
     if (wait_sec <= 0.0 || is_first)
-        log_failure(r, is_first ? "; more of them from this address are refused with 429 and not logged" : "");
+        log_failure(r, "the token is not valid",
+                    is_first ? "; more of them from this address are refused with 429 and not logged" : "");
     if (wait_sec <= 0.0)
         return refuse(r, "the token is invalid or was revoked");
     cJSON *members = cJSON_CreateObject();
@@ -100,10 +114,11 @@ struct response *auth_check(struct api *api, struct request *r) {
     enum status status = STATUS_OK;
     if (has_token)
         status = store_token_find(api->store, token, &r->caller, &err);
-    if (status == STATUS_NOT_FOUND && is_open)
+    bool is_wrong = status == STATUS_NOT_FOUND || status == STATUS_CONFLICT;
+    if (is_wrong && is_open)
         r->caller = (struct caller){.role = ROLE_ADMIN}; /* a cookie of another daemon, or an old one */
-    else if (status == STATUS_NOT_FOUND)
-        return auth_reject(api, r);
+    else if (is_wrong)
+        return auth_reject(api, r, &err);
     else if (status != STATUS_OK)
         return problem_from(r, &err);
     else if (!has_token && !is_open)

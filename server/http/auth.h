@@ -20,9 +20,11 @@ struct response *auth_check(struct api *api, struct request *r);
 /* The token of Authorization: Bearer; false where there is none. */
 bool auth_bearer(const struct request *r, char token[TOKEN_SIZE]);
 
-/* The reply to an invalid token: 401, or 429 after too many from that address (auth_throttle.h). Logs the address,
- * never the token. */
-struct response *auth_reject(struct api *api, struct request *r);
+#define AUTH_EXPIRED "urn:unbake:token-expired" /* type of the 401 that says so */
+
+/* The reply to a token that store_token_find has refused with `err` (NULL: an attempt's): 401, or 429 after too many
+ * invalid ones from that address (auth_throttle.h). Logs the address, never the token. */
+struct response *auth_reject(struct api *api, struct request *r, const struct error *err);
 
 /* Loads the job or scene that the third segment of the path names; the caller releases it. false, with *refusal: 404
  * where there is none that the caller may read (the same words whether it exists or not), 403 where `needed` is

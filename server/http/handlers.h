@@ -22,6 +22,12 @@ struct response *session_get(struct api *api, struct request *r);
 struct response *session_add(struct api *api, struct request *r);
 struct response *session_delete(struct api *api, struct request *r);
 
+/* users.c */
+struct response *users_list(struct api *api, struct request *r);
+struct response *tokens_list(struct api *api, struct request *r);
+struct response *tokens_add(struct api *api, struct request *r);
+struct response *tokens_delete(struct api *api, struct request *r);
+
 /* scenes.c */
 struct response *scenes_list(struct api *api, struct request *r);
 struct response *scenes_add(struct api *api, struct request *r);

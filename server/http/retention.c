@@ -2,21 +2,11 @@
 #include "server/http/retention.h"
 
 #include <string.h>
-#include <time.h>
 
+#include "common/clock.h"
 #include "common/file.h"
 #include "common/mem.h"
 #include "server/transport/problem.h"
-
-/* Parses 2026-11-21T15:00:00Z, with or without a fraction, to Unix milliseconds; 0 if it is malformed. */
-static int64_t read_time(const char *text) {
-    struct tm utc = {0};
-    const char *rest = strptime(text, "%Y-%m-%dT%H:%M:%S", &utc);
-    if (rest && *rest == '.' && rest[1] >= '0' && rest[1] <= '9')
-        rest += 1 + strspn(rest + 1, "0123456789");
-    time_t seconds = rest && strcmp(rest, "Z") == 0 ? timegm(&utc) : -1;
-    return seconds > 0 ? (int64_t)seconds * 1000 : 0;
-}
 
 bool retention_read(struct retention *k, const cJSON *member, cJSON *params) {
     if (strcmp(member->string, "pinned") == 0) {
@@ -28,7 +18,7 @@ bool retention_read(struct retention *k, const cJSON *member, cJSON *params) {
     if (strcmp(member->string, "expires_at") != 0)
         return false;
     k->sets_expiry = true;
-    k->expires_ms = cJSON_IsString(member) ? read_time(member->valuestring) : 0;
+    k->expires_ms = cJSON_IsString(member) ? clock_read(member->valuestring) : 0;
     if (k->expires_ms == 0 && !cJSON_IsNull(member))
         problem_param(params, "expires_at", "null leaves it to the configuration",
                       "must be a time in UTC, like 2030-01-31T12:00:00Z, or null");

@@ -1,8 +1,10 @@
 /* session.c -- /v1/session: the caller and what he keeps; the web page's token, in a cookie that no script can read. */
 #include <string.h>
 
+#include "common/clock.h"
 #include "server/http/auth.h"
 #include "server/http/handlers.h"
+#include "server/http/views.h"
 #include "server/transport/problem.h"
 
 #define COOKIE_AGE_SEC (30 * 24 * 3600)
@@ -21,6 +23,7 @@ static struct response *describe(const struct api *api, const struct request *r,
         json_add_int(value, "kept_bytes_max", (int64_t)limit);
     else
         json_add(value, "kept_bytes_max", cJSON_CreateNull());
+    view_add_time(value, "expires_at", caller->expires_ms);
     return response_json(200, value);
 }
 
@@ -35,6 +38,12 @@ static void set_cookie(const struct api *api, const struct request *r, struct re
     bool is_tls = api->config.is_tls || (scheme && strcmp(scheme, "https") == 0);
     response_field(reply, "Set-Cookie", AUTH_COOKIE "=%s; Path=/; Max-Age=%d; HttpOnly; SameSite=Strict%s", token,
                    age_sec, is_tls ? "; Secure" : "");
+}
+
+/* Seconds; a cookie does not outlive its token. */
+static int cookie_age(const struct caller *caller) {
+    int64_t left = caller->expires_ms ? (caller->expires_ms - clock_unix_ms()) / 1000 : COOKIE_AGE_SEC;
+    return left < COOKIE_AGE_SEC ? (int)left : COOKIE_AGE_SEC;
 }
 
 struct response *session_add(struct api *api, struct request *r) {
@@ -52,14 +61,14 @@ struct response *session_add(struct api *api, struct request *r) {
         reply = problem(r, 400, "the request body has no \"token\"");
     else
         status = store_token_find(api->store, token, &caller, &err);
-    if (!reply && status == STATUS_NOT_FOUND)
-        reply = auth_reject(api, r);
+    if (!reply && (status == STATUS_NOT_FOUND || status == STATUS_CONFLICT))
+        reply = auth_reject(api, r, &err);
     if (!reply && status != STATUS_OK)
         reply = problem_from(r, &err);
     if (!reply) {
         reply = describe(api, r, &caller);
         if (reply->status == 200)
-            set_cookie(api, r, reply, token, COOKIE_AGE_SEC);
+            set_cookie(api, r, reply, token, cookie_age(&caller));
     }
     cJSON_Delete(body);
     return reply;

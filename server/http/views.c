@@ -12,7 +12,7 @@
 #define LIMIT_DEFAULT 50
 #define LIMIT_MAX 200
 
-static void add_time(cJSON *object, const char *key, int64_t unix_ms) {
+void view_add_time(cJSON *object, const char *key, int64_t unix_ms) {
     char text[CLOCK_TEXT_SIZE];
     clock_text(unix_ms, text);
     json_add_string(object, key, unix_ms > 0 ? text : NULL);
@@ -48,8 +48,8 @@ static void add_webhook(cJSON *v, const struct job *job, const struct caller *wh
     int64_t at_ms = (int64_t)cJSON_GetNumberValue(cJSON_GetObjectItemCaseSensitive(known, "at_ms"));
     cJSON_DeleteItemFromObjectCaseSensitive(known, "next_ms");
     cJSON_DeleteItemFromObjectCaseSensitive(known, "at_ms");
-    add_time(known, "last_at", at_ms);
-    add_time(known, "next_try_at", next_ms);
+    view_add_time(known, "last_at", at_ms);
+    view_add_time(known, "next_try_at", next_ms);
     json_add(v, "webhook_delivery", known);
 }
 
@@ -75,11 +75,11 @@ cJSON *view_job(const struct job *job, const struct caller *who) {
     add_text(v, "settings", job->settings);
     json_add_int(v, "attempt", job->attempt);
     json_add_int(v, "attempts_left", job->attempts_left);
-    add_time(v, "created_at", job->created_ms);
-    add_time(v, "started_at", job->started_ms);
-    add_time(v, "finished_at", job->finished_ms);
+    view_add_time(v, "created_at", job->created_ms);
+    view_add_time(v, "started_at", job->started_ms);
+    view_add_time(v, "finished_at", job->finished_ms);
     json_add_bool(v, "pinned", job->is_pinned);
-    add_time(v, "expires_at", job->expires_ms);
+    view_add_time(v, "expires_at", job->expires_ms);
     json_add_string(v, "stage", or_null(job->stage));
     /* A succeeded job may not have reported the end of its last stage. */
     json_add_number(v, "progress", job->state == JOB_SUCCEEDED ? 1.0 : job->progress);
@@ -131,9 +131,9 @@ cJSON *view_scene(const struct scene_row *row) {
     json_add_string(v, "state", scene_state_name(row->state));
     json_add_int(v, "bytes", (int64_t)row->bytes);
     add_disk_bytes(v, row->disk_bytes);
-    add_time(v, "created_at", row->created_ms);
+    view_add_time(v, "created_at", row->created_ms);
     json_add_bool(v, "pinned", row->is_pinned);
-    add_time(v, "expires_at", row->expires_ms);
+    view_add_time(v, "expires_at", row->expires_ms);
     add_text(v, "problems", row->problems);
     add_text(v, "reading", row->reading);
     add_facts(v, row);
@@ -153,10 +153,10 @@ cJSON *view_upload(const struct upload_row *row) {
     json_add_string(v, "sha256", or_null(row->sha256));
     json_add_string(v, "scene", or_null(row->scene_id));
     add_text(v, "reading", row->reading ? row->reading : "");
-    add_time(v, "created_at", row->created_ms);
-    add_time(v, "updated_at", row->updated_ms);
+    view_add_time(v, "created_at", row->created_ms);
+    view_add_time(v, "updated_at", row->updated_ms);
     json_add_bool(v, "pinned", row->is_pinned);
-    add_time(v, "expires_at", row->expires_ms);
+    view_add_time(v, "expires_at", row->expires_ms);
     char path[128];
     cJSON *links = cJSON_AddObjectToObject(v, "links");
     snprintf(path, sizeof path, "/v1/uploads/%s", row->id);
@@ -174,7 +174,7 @@ cJSON *view_output(int64_t job_id, const struct output_row *row) {
     json_add_int(v, "bytes", (int64_t)row->bytes);
     json_add_string(v, "sha256", row->sha256);
     json_add_string(v, "content_type", row->content_type);
-    add_time(v, "updated_at", row->updated_ms);
+    view_add_time(v, "updated_at", row->updated_ms);
     json_add_int(v, "attempt", row->attempt);
     char *name = target_encode(row->name, true);
     char *href = mem_printf("/v1/jobs/%lld/outputs/%s", (long long)job_id, name);

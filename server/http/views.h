@@ -6,6 +6,9 @@
 #include "server/store/store.h"
 #include "server/transport/message.h"
 
+/* Adds a time as RFC 3339, null where it is 0. */
+void view_add_time(cJSON *object, const char *key, int64_t unix_ms);
+
 /* As `who` sees it: the URL of its webhook is shown to its owner only. */
 cJSON *view_job(const struct job *job, const struct caller *who);
 cJSON *view_scene(const struct scene_row *row);

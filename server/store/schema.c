@@ -310,7 +310,10 @@ static const char step_21[] =
 /* Queued jobs that must run on a certain executor: a round of the scheduler looks for those whose executor is gone. */
 static const char step_22[] = "CREATE INDEX jobs_by_executor ON jobs (executor) WHERE state = 0 AND executor <> '';";
 
+/* Tokens that end by themselves; 0: never. */
+static const char step_23[] = "ALTER TABLE tokens ADD COLUMN expires_ms INTEGER NOT NULL DEFAULT 0;";
+
 const char *const schema_steps[] = {step_1,  step_2,  step_3,  step_4,  step_5,  step_6,  step_7,  step_8,
                                     step_9,  step_10, step_11, step_12, step_13, step_14, step_15, step_16,
-                                    step_17, step_18, step_19, step_20, step_21, step_22};
+                                    step_17, step_18, step_19, step_20, step_21, step_22, step_23};
 const int schema_version = (int)(sizeof schema_steps / sizeof schema_steps[0]);

@@ -8,6 +8,7 @@
 #include <string.h>
 #include <sys/random.h>
 
+#include "common/clock.h"
 #include "common/mem.h"
 #include "common/sha256.h"
 #include "server/store/internal.h"
@@ -91,8 +92,8 @@ static enum status make_secret(char secret[SECRET_DIGITS + 1], struct error *err
     return STATUS_OK;
 }
 
-static enum status insert_token(struct store *store, const char *name, enum role role, const char *hash, int64_t *id,
-                                struct error *err) {
+static enum status insert_token(struct store *store, const char *name, enum role role, int64_t expires_ms,
+                                const char *hash, int64_t *id, struct error *err) {
     int64_t user;
     enum status status = sql_run(&store->sql, err,
                                  "INSERT INTO users (name, created_ms) VALUES (?, ?)"
@@ -102,21 +103,23 @@ static enum status insert_token(struct store *store, const char *name, enum role
         status = sql_int(&store->sql, 0, &user, err, "SELECT id FROM users WHERE name = ?", "t", name);
     if (status == STATUS_OK)
         status = sql_run(&store->sql, err,
-                         "INSERT INTO tokens (user_id, role, hash, created_ms)"
-                         " VALUES (?, ?, ?, ?)",
-                         "inti", user, (int)role, hash, store_now_ms());
+                         "INSERT INTO tokens (user_id, role, hash, created_ms, expires_ms)"
+                         " VALUES (?, ?, ?, ?, ?)",
+                         "intii", user, (int)role, hash, store_now_ms(), expires_ms);
     if (status == STATUS_OK)
         *id = sqlite3_last_insert_rowid(store->sql.db);
     return status;
 }
 
-enum status store_token_add(struct store *store, const char *name, enum role role, char token[TOKEN_SIZE], int64_t *id,
-                            struct error *err) {
+enum status store_token_add(struct store *store, const char *name, enum role role, int64_t expires_ms,
+                            char token[TOKEN_SIZE], int64_t *id, struct error *err) {
     char secret[SECRET_DIGITS + 1], hash[SHA256_HEX_SIZE];
     if (!name_is_good(name)) {
         error_set(err, STATUS_INPUT, "\"%.80s\" is no name for a user", name);
         return error_hint(err, "1 to %d letters, digits and . _ - @, a letter first", USER_NAME_SIZE - 1);
     }
+    if (expires_ms != 0 && expires_ms <= store_now_ms())
+        return error_set(err, STATUS_INPUT, "the time at which the token would end is past");
     enum status status = make_secret(secret, err);
     if (status != STATUS_OK)
         return status;
@@ -124,7 +127,7 @@ enum status store_token_add(struct store *store, const char *name, enum role rol
     status = store_begin(store, err);
     if (status != STATUS_OK)
         return status;
-    status = insert_token(store, name, role, hash, id, err);
+    status = insert_token(store, name, role, expires_ms, hash, id, err);
     status = store_end(store, status, STORE_NOTHING_CHANGED, err);
     if (status != STATUS_OK)
         return status;
@@ -147,6 +150,15 @@ static bool parse_token(const char *token, int64_t *id, const char **secret) {
     return strlen(*secret) == SECRET_DIGITS;
 }
 
+static bool is_past(int64_t expires_ms) { return expires_ms != 0 && expires_ms <= store_now_ms(); }
+
+static enum status tell_expired(int64_t expires_ms, struct error *err) {
+    char when[CLOCK_TEXT_SIZE];
+    clock_text(expires_ms, when);
+    error_set(err, STATUS_CONFLICT, "the token expired at %s", when);
+    return error_hint(err, "an admin makes another one");
+}
+
 enum status store_token_find(struct store *store, const char *token, struct caller *caller, struct error *err) {
     int64_t id;
     const char *secret;
@@ -158,23 +170,28 @@ enum status store_token_find(struct store *store, const char *token, struct call
         return error_set(err, STATUS_NOT_FOUND, "that is no token of this daemon");
     sha256_of(secret, SECRET_DIGITS, hash);
     store_lock(store);
-    enum status status = sql_first(&store->sql, &stmt, &found, err,
-                                   "SELECT users.id, role, name, hash FROM tokens JOIN users ON users.id = user_id"
-                                   " WHERE tokens.id = ?",
-                                   "i", id);
+    enum status status =
+        sql_first(&store->sql, &stmt, &found, err,
+                  "SELECT users.id, role, name, hash, expires_ms FROM tokens JOIN users ON users.id = user_id"
+                  " WHERE tokens.id = ?",
+                  "i", id);
     if (found) {
         caller->user_id = sqlite3_column_int64(stmt, 0);
         caller->token_id = id;
         caller->role = (enum role)sqlite3_column_int(stmt, 1);
         snprintf(caller->name, sizeof caller->name, "%s", sql_text(stmt, 2));
         snprintf(wanted, sizeof wanted, "%s", sql_text(stmt, 3));
+        caller->expires_ms = sqlite3_column_int64(stmt, 4);
         sqlite3_reset(stmt);
     }
     store_unlock(store);
     bool same = sha256_equal(hash, wanted);
-    if (status != STATUS_OK || (found && same))
+    int64_t expires_ms = caller->expires_ms;
+    if (status != STATUS_OK || (found && same && !is_past(expires_ms)))
         return status;
     *caller = (struct caller){0};
+    if (found && same)
+        return tell_expired(expires_ms, err);
     return error_set(err, STATUS_NOT_FOUND, "the token is invalid or was revoked");
 }
 
@@ -214,7 +231,9 @@ enum status store_token_revoke(struct store *store, const char *number_or_name, 
 bool store_token_is_valid(struct store *store, int64_t id) {
     int64_t found = 0;
     store_lock(store);
-    enum status status = sql_int(&store->sql, 0, &found, NULL, "SELECT 1 FROM tokens WHERE id = ?", "i", id);
+    enum status status =
+        sql_int(&store->sql, 0, &found, NULL,
+                "SELECT 1 FROM tokens WHERE id = ? AND (expires_ms = 0 OR expires_ms > ?)", "ii", id, store_now_ms());
     store_unlock(store);
     return status == STATUS_OK && found != 0;
 }
@@ -225,7 +244,7 @@ enum status store_token_list(struct store *store, struct token_row **rows, size_
     *count = 0;
     store_lock(store);
     enum status status = sql_query(&store->sql, &stmt, err,
-                                   "SELECT tokens.id, tokens.created_ms, role, name FROM tokens"
+                                   "SELECT tokens.id, tokens.created_ms, role, name, expires_ms FROM tokens"
                                    " JOIN users ON users.id = user_id ORDER BY tokens.id",
                                    "");
     while (sql_next(&store->sql, stmt, &status, err)) {
@@ -233,8 +252,32 @@ enum status store_token_list(struct store *store, struct token_row **rows, size_
         struct token_row *at = &(*rows)[(*count)++];
         *at = (struct token_row){.id = sqlite3_column_int64(stmt, 0),
                                  .created_ms = sqlite3_column_int64(stmt, 1),
-                                 .role = (enum role)sqlite3_column_int(stmt, 2)};
+                                 .role = (enum role)sqlite3_column_int(stmt, 2),
+                                 .expires_ms = sqlite3_column_int64(stmt, 4)};
         snprintf(at->name, sizeof at->name, "%s", sql_text(stmt, 3));
+    }
+    store_unlock(store);
+    return status;
+}
+
+enum status store_user_list(struct store *store, struct user_row **rows, size_t *count, struct error *err) {
+    sqlite3_stmt *stmt;
+    *rows = NULL;
+    *count = 0;
+    store_lock(store);
+    enum status status = sql_query(&store->sql, &stmt, err,
+                                   "SELECT id, created_ms, (SELECT count(*) FROM jobs WHERE owner_id = users.id),"
+                                   " (SELECT count(*) FROM jobs WHERE owner_id = users.id AND state <= ?), name"
+                                   " FROM users ORDER BY name",
+                                   "n", (int)JOB_PAUSED);
+    while (sql_next(&store->sql, stmt, &status, err)) {
+        *rows = mem_realloc_array(*rows, *count + 1, sizeof **rows);
+        struct user_row *at = &(*rows)[(*count)++];
+        *at = (struct user_row){.id = sqlite3_column_int64(stmt, 0),
+                                .created_ms = sqlite3_column_int64(stmt, 1),
+                                .jobs = sqlite3_column_int64(stmt, 2),
+                                .open_jobs = sqlite3_column_int64(stmt, 3)};
+        snprintf(at->name, sizeof at->name, "%s", sql_text(stmt, 4));
     }
     store_unlock(store);
     return status;

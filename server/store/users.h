@@ -37,6 +37,7 @@ struct caller {
     int64_t token_id; /* 0: no token was needed */
     enum role role;
     char name[USER_NAME_SIZE]; /* "" for nobody */
+    int64_t expires_ms;        /* when the token ends; 0: never */
 };
 
 enum access { ACCESS_NONE, ACCESS_READ, ACCESS_CHANGE };
@@ -48,22 +49,31 @@ enum status store_scene_access(struct store *store, const struct caller *who, co
 /* Whether a user exists or ever did: from then on every caller needs a token. */
 bool store_has_users(struct store *store);
 
-/* Makes a token, and the user if the name is new: 1 to 64 letters, digits and . _ - @ */
-enum status store_token_add(struct store *store, const char *name, enum role role, char token[TOKEN_SIZE], int64_t *id,
-                            struct error *err);
-/* The caller that presents this token; STATUS_NOT_FOUND unless it is valid. The time taken does not depend on how
- * much of a wrong token is right. */
+/* Makes a token that ends at expires_ms (0: never), and the user if the name is new: 1 to 64 letters, digits and . _ - @
+ * STATUS_INPUT where that time is past. */
+enum status store_token_add(struct store *store, const char *name, enum role role, int64_t expires_ms,
+                            char token[TOKEN_SIZE], int64_t *id, struct error *err);
+/* The caller that presents this token; STATUS_CONFLICT where it has expired, which only its secret is told;
+ * STATUS_NOT_FOUND unless it is valid. The time taken does not depend on how much of a wrong token is right. */
 enum status store_token_find(struct store *store, const char *token, struct caller *caller, struct error *err);
 /* Revokes the token of that number, or all tokens of the user of that name. */
 enum status store_token_revoke(struct store *store, const char *number_or_name, size_t *count, struct error *err);
 bool store_token_is_valid(struct store *store, int64_t id);
 
 struct token_row {
-    int64_t id, created_ms;
+    int64_t id, created_ms, expires_ms; /* expires_ms: 0: never */
     enum role role;
     char name[USER_NAME_SIZE];
 };
 /* Ordered by number; *rows is the caller's (mem_free). */
 enum status store_token_list(struct store *store, struct token_row **rows, size_t *count, struct error *err);
+
+struct user_row {
+    int64_t id, created_ms;
+    int64_t jobs, open_jobs; /* of all kinds; open: queued, running or paused */
+    char name[USER_NAME_SIZE];
+};
+/* All users that ever were, by name; *rows is the caller's (mem_free). */
+enum status store_user_list(struct store *store, struct user_row **rows, size_t *count, struct error *err);
 
 #endif

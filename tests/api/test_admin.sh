@@ -26,6 +26,10 @@ refused 2 "takes the user's NAME" unbaked token add --data "$data"
 refused 2 'did you mean --role' unbaked token add bob --rolle admin --data "$data"
 refused 1 'bob has no token' unbaked token revoke bob --data "$data"
 grep -rqF "${alice#unbake_1_}" "$data" && fail "the token's secret is in the data folder"
+refused 2 "--expires takes" unbaked token add bob --expires soon --data "$data"
+refused 2 "--expires takes" unbaked token add bob --expires 0d --data "$data"
+refused 2 "is past" unbaked token add bob --expires 2020-01-31 --data "$data"
+refused 2 "belongs to token add" unbaked token list --expires 3d --data "$data"
 
 # --- with one ---
 start_daemon --set keepalive_sec=1 --set log_format=json --set trusted_proxies=127.0.0.1
@@ -80,6 +84,37 @@ equal "$(lines false)" "$rejected" "lines of that address"
 jq -se 'any(.msg == "answered" and .user == "carl" and .client == "192.0.2.1")' "$work/log" >/dev/null || fail "no address of the client in the log"
 grep -qF "$wrong" "$work/log" && fail "a token is in the log"
 unbaked token revoke carl --data "$data" >/dev/null
+
+# --- tokens that end: over HTTP by admins, and what their holders are told ---
+ada=$(unbaked token add ada --role admin --expires 2d --data "$data")
+as "$ada" GET /v1/session; [[ $(field .expires_at) == 20*Z ]] || fail "the session ends at $(field .expires_at)"
+until=$(field .expires_at)
+make() { as "$1" POST /v1/tokens -H 'Content-Type: application/json' --data-binary "$(json "$2")"; }
+make "$ada" '{"user":"carl"}'; expect 403 "a token that lasts longer than its maker's"; [[ $(field .detail) == *"$until"* ]] || fail "$(field .detail)"
+make "$ada" '{"user":"7up","expires_at":"'"$until"'"}'; expect 422
+make "$ada" '{"name":"carl","role":"king","expires_at":"2020-01-31T00:00:00Z"}'; expect 422
+equal "$(field '[.invalid_params[].name] | sort | join(" ")')" "expires_at name role user" "faults of a token"
+make "$ada" '{"user":"carl","role":"viewer","expires_at":"'"$(date -u -d '+4 seconds' +%FT%TZ)"'"}'; expect 201
+carl=$(field .token) number=$(field .id)
+[[ $carl =~ ^unbake_${number}_[0-9a-f]{48}$ ]] || fail "the token is '$carl'"
+as "$carl" GET /v1/tokens; expect 403
+curl -sS -m 60 -N -H "Authorization: Bearer $carl" "$url/v1/events" >"$work/stream" & stream=$!
+expired() { as "$carl" GET /v1/jobs; [ "$status" = 401 ]; }
+wait_for 60 expired
+equal "$(field .type)" urn:unbake:token-expired "type of the reply to an expired token"
+[[ $(field .detail) == "the token expired at 20"* ]] || fail "an expired token is told: $(field .detail)"
+for i in $(seq 24); do as "$carl" GET /v1/jobs; expect 401 "an expired token for the ${i}th time"; done
+wait "$stream" || fail "the stream of an expired token goes on"
+call POST /v1/session -H 'Content-Type: application/json' -d "{\"token\":\"$carl\"}"; expect 401; equal "$(field .type)" urn:unbake:token-expired
+as "$ada" GET /v1/tokens; equal "$(field '[.items[] | select(.expired)] | length')" 1 "expired tokens"
+grep -qF "${carl#unbake_*_}" "$work/body" && fail "the list of tokens has secrets"
+unbaked token list --data "$data" | grep -q "carl .*, is past" || fail "$(unbaked token list --data "$data")"
+unbaked doctor --data "$data" 2>&1 | grep -q '2, 1 of them expired' || fail "doctor: $(unbaked doctor --data "$data" 2>&1 | grep tokens)"
+as "$ada" GET /v1/users; equal "$(field '[.items[].name] | join(" ")')" "ada alice carl wall" users
+equal "$(field '.items[] | select(.name == "alice") | .kept_bytes > 0 and .jobs == 0')" true "what alice keeps"
+as "$ada" DELETE "/v1/tokens/$number"; expect 204; as "$ada" DELETE "/v1/tokens/$number"; expect 404
+as "$ada" DELETE /v1/tokens/ada; expect 404
+unbaked token revoke ada --data "$data" >/dev/null
 
 # --- backup ---
 equal "$(unbaked backup "$work/copy.db" --data "$data" | cut -d: -f1)" "$work/copy.db" "what backup prints"

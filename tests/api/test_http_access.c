@@ -20,7 +20,7 @@ static const char *const scenes[THING_COUNT] = {NO_SCENE, OTHER_SCENE, SHARED_SC
 static void add_token(enum who who, const char *name, enum role role) {
     struct error err;
     int64_t id;
-    rig_must(store_token_add(rig.store, name, role, tokens[who], &id, &err), &err, "store_token_add");
+    rig_must(store_token_add(rig.store, name, role, 0, tokens[who], &id, &err), &err, "store_token_add");
 }
 
 static int64_t user_of(enum who who) {
@@ -128,6 +128,8 @@ static int wanted_refusal(const struct route *route, enum who who, enum thing th
         return 401;
     if ((who == VIEWER && changes) || (route->access == ROUTE_ADMIN && who != ADMIN))
         return 403;
+    if (strstr(route->pattern, "{token}"))
+        return 404; /* there is no token of that number */
     if (!names_thing)
         return 0;
     if (thing == NONE || (thing == OTHERS && who != ADMIN))

@@ -344,7 +344,7 @@ int main(void) {
     check_garbled();
     calls += strike_all(true) + strike_all(false);
     rig_must(store_keep(rig.store, 0, 0, 3600000, &err), &err, "store_keep");
-    rig_must(store_token_add(rig.store, "root", ROLE_ADMIN, token, &id, &err), &err, "token");
+    rig_must(store_token_add(rig.store, "root", ROLE_ADMIN, 0, token, &id, &err), &err, "token");
     snprintf(token_field, sizeof token_field, "Authorization: Bearer %s\r\n", token);
     snprintf(login, sizeof login, "{\"token\":\"%s\"}", token);
     rig.api->config.user_max_bytes = (uint64_t)1 << 30;

@@ -43,9 +43,9 @@ static void check_who_sees_what(void) {
     struct caller who;
     struct buf reply;
     int64_t id;
-    rig_must(store_token_add(rig.store, "ann", ROLE_USER, ann, &id, &err), &err, "token");
-    rig_must(store_token_add(rig.store, "ben", ROLE_VIEWER, ben, &id, &err), &err, "token");
-    rig_must(store_token_add(rig.store, "root", ROLE_ADMIN, root, &id, &err), &err, "token");
+    rig_must(store_token_add(rig.store, "ann", ROLE_USER, 0, ann, &id, &err), &err, "token");
+    rig_must(store_token_add(rig.store, "ben", ROLE_VIEWER, 0, ben, &id, &err), &err, "token");
+    rig_must(store_token_add(rig.store, "root", ROLE_ADMIN, 0, root, &id, &err), &err, "token");
     rig_must(store_token_find(rig.store, ann, &who, &err), &err, "find");
     int64_t before, hers = job_of(who.user_id), nobodys = job_of(0);
     rig_must(store_event_last(rig.store, 0, &before, &err), &err, "last");

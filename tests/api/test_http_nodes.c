@@ -280,7 +280,7 @@ static void check_tokens(struct rig *rig) {
     struct error err;
     int64_t id;
     begin(rig);
-    rig_must(store_token_add(rig->store, "root", ROLE_ADMIN, token, &id, &err), &err, "store_token_add");
+    rig_must(store_token_add(rig->store, "root", ROLE_ADMIN, 0, token, &id, &err), &err, "store_token_add");
     snprintf(fields, sizeof fields, "Authorization: Bearer %s\r\nUnbake-Claimant: 00112233445566778899\r\n", token);
     IS(post(rig, "claim", fields, VERSION), 401);
     IS(post(rig, "claim", ANN, VERSION), 200);

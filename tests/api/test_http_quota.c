@@ -262,8 +262,8 @@ int main(void) {
     struct caller who;
     rig_start(&rig, &rig_patient, 60);
     log_set_level(LOG_ERROR);
-    rig_must(store_token_add(rig.store, "anna", ROLE_USER, anna, &id, &err), &err, "token");
-    rig_must(store_token_add(rig.store, "chief", ROLE_ADMIN, chief, &id, &err), &err, "token");
+    rig_must(store_token_add(rig.store, "anna", ROLE_USER, 0, anna, &id, &err), &err, "token");
+    rig_must(store_token_add(rig.store, "chief", ROLE_ADMIN, 0, chief, &id, &err), &err, "token");
     rig_must(store_token_find(rig.store, anna, &who, &err), &err, "token");
     test_pledges();
     anna_id = who.user_id;

@@ -162,8 +162,8 @@ int main(void) {
     rig_start(&rig, &rig_patient, 60);
     rig.api->config.user_max_bytes = 1 << 20;
     rig.api->config.user_queue_limit = 2;
-    rig_must(store_token_add(rig.store, "alice", ROLE_USER, alice, &id, &err), &err, "token");
-    rig_must(store_token_add(rig.store, "bob", ROLE_ADMIN, bob, &id, &err), &err, "token");
+    rig_must(store_token_add(rig.store, "alice", ROLE_USER, 0, alice, &id, &err), &err, "token");
+    rig_must(store_token_add(rig.store, "bob", ROLE_ADMIN, 0, bob, &id, &err), &err, "token");
     rig_scene(&rig);
 
     /* Bytes: announced, and found out on the way. */
@@ -184,9 +184,9 @@ int main(void) {
     buf_release(&reply);
     CHECK(send_chunked(&rig, alice, 600 << 10, ' ', &reply) == 200);
     buf_release(&reply);
-    rig_must(store_token_add(rig.store, "carol", ROLE_USER, carol, &id, &err), &err, "token");
+    rig_must(store_token_add(rig.store, "carol", ROLE_USER, 0, carol, &id, &err), &err, "token");
     test_two_at_once(&rig, carol, true);
-    rig_must(store_token_add(rig.store, "dora", ROLE_USER, dora, &id, &err), &err, "token");
+    rig_must(store_token_add(rig.store, "dora", ROLE_USER, 0, dora, &id, &err), &err, "token");
     test_two_at_once(&rig, dora, false);
 
     test_streams(&rig, alice, bob);

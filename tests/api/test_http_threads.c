@@ -331,7 +331,7 @@ int main(void) {
     memset(bytes, 'z', UPLOADED);
     rig_start(&rig, &rig_patient, 60.0);
     log_set_level(LOG_ERROR);
-    rig_must(store_token_add(rig.store, "root", ROLE_ADMIN, token, &id, &err), &err, "token");
+    rig_must(store_token_add(rig.store, "root", ROLE_ADMIN, 0, token, &id, &err), &err, "token");
     snprintf(token_field, sizeof token_field, "Authorization: Bearer %s\r\n", token);
     make_output();
     faults_watch = watch;

@@ -33,9 +33,9 @@ int main(void) {
     struct caller who;
     rig_start(&rig, &rig_patient, 60);
     log_set_level(LOG_ERROR);
-    rig_must(store_token_add(rig.store, "anna", ROLE_USER, anna, &id, &err), &err, "token");
-    rig_must(store_token_add(rig.store, "bert", ROLE_USER, bert, &id, &err), &err, "token");
-    rig_must(store_token_add(rig.store, "chief", ROLE_ADMIN, chief, &id, &err), &err, "token");
+    rig_must(store_token_add(rig.store, "anna", ROLE_USER, 0, anna, &id, &err), &err, "token");
+    rig_must(store_token_add(rig.store, "bert", ROLE_USER, 0, bert, &id, &err), &err, "token");
+    rig_must(store_token_add(rig.store, "chief", ROLE_ADMIN, 0, chief, &id, &err), &err, "token");
     rig_must(store_token_find(rig.store, anna, &who, &err), &err, "token");
     rig_must(store_scene_add(rig.store, RIG_SCENE, "room", 10, who.user_id, &existed, &err), &err, "store_scene_add");
     rig_must(store_scene_ready(rig.store, RIG_SCENE, NULL, "{}", &err), &err, "store_scene_ready");

@@ -25,6 +25,7 @@ sqlite3 "$data/state.db" "DROP TABLE attempts; DROP TABLE usage_months; DROP TAB
     DROP INDEX jobs_by_executor; DROP TRIGGER job_labels_of_new; DROP TRIGGER job_labels_of_changed;
     DROP TABLE job_labels; DROP TABLE job_files; DROP INDEX jobs_by_source; ALTER TABLE jobs DROP COLUMN executor;
     ALTER TABLE jobs DROP COLUMN kind; ALTER TABLE jobs DROP COLUMN source_id; ALTER TABLE jobs DROP COLUMN cost;
+    ALTER TABLE tokens DROP COLUMN expires_ms;
     UPDATE outputs SET attempt = 7; PRAGMA user_version = 16" || fail "sqlite3"
 
 daemon_start --set checkpoint_interval_sec=1

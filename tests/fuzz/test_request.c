@@ -96,7 +96,7 @@ static void start_daemon(void) {
     put_file("scenes/" SCENE "/archive", "0123456789");
     add_jobs(&err);
     add_upload(&err);
-    MUST_OK(store_token_add(lab.store, "ada", ROLE_USER, lab.token, &token_id, &err), &err);
+    MUST_OK(store_token_add(lab.store, "ada", ROLE_USER, 0, lab.token, &token_id, &err), &err);
     struct scheduler_config work = {
         .data_dir = lab.dir, .max_running = 1, .checkpoint_interval_sec = 60, .stop_grace_sec = 1};
     MUST_OK(scheduler_new(&lab.scheduler, &work, lab.store, &err), &err);

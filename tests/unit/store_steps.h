@@ -95,7 +95,7 @@ static enum status share_scene(void) {
     return store_scene_add(store, SCENE_A, "room", 10, 0, &existed, &err);
 }
 
-static enum status add_token(void) { return store_token_add(store, "alice", ROLE_USER, token, &token_id, &err); }
+static enum status add_token(void) { return store_token_add(store, "alice", ROLE_USER, 0, token, &token_id, &err); }
 static enum status find_token(void) { return store_token_find(store, token, &alice, &err); }
 static enum status valid_token(void) { return doubt(store_token_is_valid(store, token_id)); }
 static enum status list_tokens(void) {

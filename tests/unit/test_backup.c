@@ -82,7 +82,7 @@ int main(void) {
     int64_t id;
     OK(store_open(&shared.store, dir, &err));
     add_ready_scene(shared.store, SCENE_A);
-    OK(store_token_add(shared.store, "alice", ROLE_USER, token, &id, &err));
+    OK(store_token_add(shared.store, "alice", ROLE_USER, 0, token, &id, &err));
     for (int i = 0; i < JOBS_BEFORE; i++)
         add_job(shared.store, SCENE_A, 0);
     for (int i = 0; i < WRITERS; i++)

@@ -183,7 +183,7 @@ static void check_limits(void) {
     int64_t source = add_source(), user, id, jobs[4];
     int attempt;
     char token[TOKEN_SIZE];
-    OK(store_token_add(store, "alice", ROLE_USER, token, &id, &err));
+    OK(store_token_add(store, "alice", ROLE_USER, 0, token, &id, &err));
     struct caller who;
     OK(store_token_find(store, token, &who, &err));
     user = who.user_id;

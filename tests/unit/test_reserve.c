@@ -124,7 +124,7 @@ int main(void) {
     store_reserve_renew(store);
     add_ready_scene(store, SCENE_A);
     add_ready_scene(store, SCENE_B);
-    OK(store_token_add(store, "anna", ROLE_USER, token, &token_id, &err));
+    OK(store_token_add(store, "anna", ROLE_USER, 0, token, &token_id, &err));
     OK(add_upload(UPLOAD));
     for (size_t i = 0; i < JOBS; i++)
         ids[i] = add_job(store, SCENE_A, 0);

@@ -87,7 +87,7 @@ static void test_share(void) {
     bool existed, is_gone;
     OK(store_open(&store, dir, &err));
     for (int i = 0; i < 2; i++) {
-        OK(store_token_add(store, i ? "bob" : "alice", ROLE_USER, token, &id, &err));
+        OK(store_token_add(store, i ? "bob" : "alice", ROLE_USER, 0, token, &id, &err));
         OK(store_token_find(store, token, &who[i], &err));
         OK(store_scene_add(store, SCENE_A, "one", 10, who[i].user_id, &existed, &err));
     }
@@ -168,7 +168,7 @@ static void test_reading_and_jobs(void) {
     int64_t id, job;
     int attempt;
     OK(store_open(&store, dir, &err));
-    OK(store_token_add(store, "alice", ROLE_USER, token, &id, &err));
+    OK(store_token_add(store, "alice", ROLE_USER, 0, token, &id, &err));
     OK(store_token_find(store, token, &alice, &err));
     add_ready_scene(store, SCENE_A);
     job = add_job(store, SCENE_A, 0); /* nobody's */

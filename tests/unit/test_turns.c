@@ -91,7 +91,7 @@ static void test_months(void) {
     OK(store_usage_list(other, &rows, &count, &err));
     CHECK(count == 0);
     store_usage_release(rows, count);
-    OK(store_token_add(other, "ada", ROLE_USER, secret, &token, &err));
+    OK(store_token_add(other, "ada", ROLE_USER, 0, secret, &token, &err));
     OK(store_usage_add(other, 1, 3600.0, &err));
     OK(store_usage_add(other, 0, 7.0, &err));
     sql_faults_arm_only("INSERT INTO usage_months", 1, false);

@@ -4,6 +4,7 @@
 #include <time.h>
 
 #include "common/sha256.h"
+#include "server/store/internal.h"
 #include "tests/unit/store_rig.h"
 
 static void test_equal(void) {
@@ -37,10 +38,10 @@ static void test_tokens(void) {
                                       "\xc3\xa9t\xc3\xa9",
                                       "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa"};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
-        IS(store_token_add(store, bad[i], ROLE_USER, token, &id, &err), STATUS_INPUT);
+        IS(store_token_add(store, bad[i], ROLE_USER, 0, token, &id, &err), STATUS_INPUT);
     CHECK(!store_has_users(store));
-    OK(store_token_add(store, "alice", ROLE_USER, token, &id, &err));
-    OK(store_token_add(store, "alice", ROLE_VIEWER, second, &other, &err));
+    OK(store_token_add(store, "alice", ROLE_USER, 0, token, &id, &err));
+    OK(store_token_add(store, "alice", ROLE_VIEWER, 0, second, &other, &err));
     CHECK(store_has_users(store) && id != other);
     OK(store_token_find(store, token, &who, &err));
     CHECK(who.role == ROLE_USER && who.token_id == id);
@@ -92,6 +93,47 @@ static void test_tokens(void) {
     store_close(store);
     OK(store_open(&store, dir, &err));
     CHECK(store_has_users(store));
+    store_close(store);
+    drop_dir(dir);
+}
+
+/* A token that ends by itself: its holder is told, whoever guesses is not; one that is past is not made. */
+static void test_expiry(void) {
+    char *dir = fresh_dir(), token[TOKEN_SIZE], wrong[TOKEN_SIZE];
+    struct store *store;
+    struct caller who;
+    struct token_row *rows;
+    int64_t id, until = store_now_ms() + 3600000;
+    size_t count;
+    OK(store_open(&store, dir, &err));
+    IS(store_token_add(store, "alice", ROLE_USER, 1, token, &id, &err), STATUS_INPUT);
+    CHECK(!store_has_users(store));
+    OK(store_token_add(store, "alice", ROLE_USER, until, token, &id, &err));
+    OK(store_token_find(store, token, &who, &err));
+    CHECK(who.expires_ms == until && store_token_is_valid(store, id));
+    OK(store_token_list(store, &rows, &count, &err));
+    CHECK(count == 1 && rows[0].expires_ms == until);
+    mem_free(rows);
+    store_close(store);
+
+    sqlite3 *db;
+    char *path = file_join(dir, "state.db");
+    CHECK(sqlite3_open(path, &db) == SQLITE_OK);
+    CHECK(sqlite3_exec(db, "UPDATE tokens SET expires_ms = 1767225600000", NULL, NULL, NULL) == SQLITE_OK);
+    sqlite3_close(db);
+    mem_free(path);
+    OK(store_open(&store, dir, &err));
+    IS(store_token_find(store, token, &who, &err), STATUS_CONFLICT);
+    CHECK_STRING(err.message, "the token expired at 2026-01-01T00:00:00.000Z");
+    CHECK(who.user_id == 0 && who.token_id == 0 && who.role == ROLE_VIEWER && !store_token_is_valid(store, id));
+    memcpy(wrong, token, sizeof wrong);
+    wrong[strlen(wrong) - 1] = wrong[strlen(wrong) - 1] == '0' ? '1' : '0';
+    IS(store_token_find(store, wrong, &who, &err), STATUS_NOT_FOUND);
+    struct user_row *users;
+    OK(store_user_list(store, &users, &count, &err));
+    CHECK(count == 1 && users[0].jobs == 0);
+    CHECK_STRING(users[0].name, "alice");
+    mem_free(users);
     store_close(store);
     drop_dir(dir);
 }
@@ -157,7 +199,7 @@ static struct caller add_user(struct store *store, const char *name) {
     char token[TOKEN_SIZE];
     struct caller who = {0};
     int64_t id;
-    OK(store_token_add(store, name, ROLE_USER, token, &id, &err));
+    OK(store_token_add(store, name, ROLE_USER, 0, token, &id, &err));
     OK(store_token_find(store, token, &who, &err));
     return who;
 }
@@ -319,6 +361,7 @@ static void test_lists(void) {
 int main(void) {
     test_equal();
     test_tokens();
+    test_expiry();
     test_lists();
     test_names();
     test_ages();

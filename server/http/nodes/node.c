@@ -37,7 +37,7 @@ struct response *node_key(const struct request *r, struct node_key *key) {
 
 struct response *node_refusal(struct api *api, struct request *r, const struct error *err) {
     if (err->status == STATUS_NOT_FOUND)
-        return auth_reject(api, r);
+        return auth_reject(api, r, NULL);
     if (err->status == STATUS_CONFLICT || err->status == STATUS_INPUT)
         return problem_full(r, 409, err->message, err->hint, NULL);
     if (err->status != STATUS_LIMIT)
