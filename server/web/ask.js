@@ -1,13 +1,16 @@
 // ask.js -- requests to the server. The token is in a cookie that no script can read; every request simply carries it.
 
-let whenSignedOut = () => {};
+const EXPIRED = "urn:unbake:token-expired";
+
+let whenSignedOut = () => {}; // hears why, "" where there is nothing to say
 export function onSignedOut(callback) { whenSignedOut = callback; }
 
 // The reply; an Error with the problem's words, its hint and its status where the server refuses.
 export async function ask(path, options = {}) {
   const reply = await fetch(path, options);
   if (reply.status === 401) {
-    whenSignedOut();
+    const { type, detail } = await reply.json().catch(() => ({}));
+    whenSignedOut(type === EXPIRED ? `${detail}.` : ""); // others have nothing to tell: nobody was signed in
     throw Object.assign(new Error("a token is needed"), { status: 401 });
   }
   if (!reply.ok) {

@@ -6,6 +6,7 @@ import { go } from "./address.js";
 import { drawCurve } from "./curve.js";
 import { Mixer } from "./mixer.js";
 import { Slider, showThumbnails } from "./pictures.js";
+import { verdictOf } from "./verdict.js";
 
 const TERMINAL = ["succeeded", "failed", "cancelled"];
 const ACTIONS = {
@@ -106,7 +107,7 @@ export class JobView {
     const seconds = (report.stages ?? []).reduce((sum, stage) => sum + stage.seconds, 0);
     const seen = report.seen_surface_share;
     showFigures(this.at("figures"), [
-      ["held-out views", metrics.psnr_db && `${metrics.psnr_db.toFixed(1)} dB`, "PSNR of photographs that the reconstruction never saw; 25 dB and more is good"],
+      ["held-out views", ...verdictOf(metrics)],
       ["lamps", this.report && segments.filter((s) => s.emitter).length],
       ["segments", this.report && segments.length],
       ["surface seen", seen !== undefined && `${Math.round(100 * seen)} %`, "share of the surface that photographs show"],

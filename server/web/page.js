@@ -6,7 +6,9 @@ import { go, onMove, place } from "./address.js";
 import { forgetCheck, onStarted } from "./check.js";
 import { JobView } from "./job.js";
 import { showList } from "./list.js";
+import { forgetPeople, showPeople } from "./people.js";
 
+const DAY_MS = 86400000, WARN_DAYS = 14;  // before a token ends
 const PAGES_MOST = 20, PAGE_JOBS = 200; // of the list
 
 const server = { me: null, jobs: new Map(), refresh }; // me: {user, role, open}; jobs: by number
@@ -15,7 +17,8 @@ let stream = null; // events of all jobs
 
 // --- signing in -----------------------------------------------------------------------------
 
-function showSignIn() {
+function showSignIn(why) {
+  $("sign-in-problem").textContent = why;
   stream?.close();
   stream = null;
   $("work").hidden = true;
@@ -41,6 +44,7 @@ $("sign-out").addEventListener("click", async () => {
   await fetch("v1/session", { method: "DELETE" });
   server.jobs.clear();
   forgetCheck();
+  forgetPeople();
   go({ job: null, with: null });
   start();
 });
@@ -48,8 +52,10 @@ $("sign-out").addEventListener("click", async () => {
 // What is kept changes with every job.
 function showWho() {
   const { me } = server, limit = me.kept_bytes_max ? ` of ${bytes(me.kept_bytes_max)}` : "";
+  const left = me.expires_at ? (new Date(me.expires_at) - Date.now()) / DAY_MS : Infinity;
+  const ends = left < WARN_DAYS ? `; your token ends on ${new Date(me.expires_at).toLocaleString()}` : "";
   const who = me.user ? `${me.user} (${me.role})` : "open to everybody who reaches it";
-  $("who").textContent = `${who}; ${bytes(me.kept_bytes)}${limit} kept`;
+  $("who").textContent = `${who}; ${bytes(me.kept_bytes)}${limit} kept${ends}`;
 }
 
 async function updateWho() {
@@ -132,6 +138,7 @@ async function start() {
   $("sign-out").hidden = server.me.open;
   $("new").hidden = server.me.role === "viewer";
   showWho();
+  showPeople(server.me);
   await loadJobs();
   const newest = [...server.jobs.values()].filter((job) => job.state === "succeeded").sort((a, b) => b.id - a.id)[0];
   if (!place().job && newest) go({ job: newest.id }, true); // what one sees first is a room

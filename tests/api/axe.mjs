@@ -92,6 +92,24 @@ async function lookIntoTheRoom(page, scheme) {
   if ((await drawn()) === before) console.log(`job-${scheme}: the slider does nothing`, ++faults);
 }
 
+// An admin makes a token, which is shown once, sees who there is, and revokes it.
+async function makeAToken(page, scheme) {
+  await page.$eval("#people summary", (summary) => summary.click());
+  await page.waitForFunction(() => document.querySelectorAll("#users tr").length > 0);
+  await page.type("#token-user", `guest-${scheme}`);
+  await page.$eval("#add-token button", (button) => button.click());
+  await page.waitForFunction(() => document.getElementById("new-token-text").value.startsWith("unbake_"));
+  await page.waitForFunction((name) => document.getElementById("users").textContent.includes(name), {}, `guest-${scheme}`);
+  await look(page, `people-${scheme}`);
+  const made = await page.$eval("#new-token-text", (field) => field.value);
+  const session = (token) => fetch(`${url}/v1/session`, { headers: { Authorization: `Bearer ${token}` } });
+  const { role, expires_at } = await (await session(made)).json(), days = (new Date(expires_at) - Date.now()) / 86400000;
+  if (role !== "user" || !(days > 89 && days <= 90)) console.log(`people-${scheme}: a token of role ${role} for ${days} days`, ++faults);
+  await page.$eval("#tokens tr:last-child button", (button) => button.click());
+  await page.waitForFunction((name) => !document.getElementById("tokens").textContent.includes(name), {}, `guest-${scheme}`);
+  if ((await session(made)).status !== 401) console.log(`people-${scheme}: the token is not revoked`, ++faults);
+}
+
 async function lookAtAll(scheme) {
   const context = await browser.createBrowserContext(), page = await context.newPage();
   await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: scheme }]);
@@ -126,6 +144,7 @@ async function lookAtAll(scheme) {
   await look(page, `job-${scheme}`);
   await holdAnAction(page, scheme);
   await checkARoom(page, scheme);
+  await makeAToken(page, scheme);
   await page.setViewport({ width: 390, height: 800 });
   await look(page, `job-narrow-${scheme}`);
   await page.goto(`file://${report}`);

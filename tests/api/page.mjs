@@ -1,9 +1,10 @@
 // page.mjs -- what people do with the web page: lights are mixed and saved, the room is rendered from where it is looked at.
 //
-// node page.mjs NODE_MODULES CHROMIUM URL PICTURES: job 1 is a room with lamps; a line for each fault
+// node page.mjs NODE_MODULES CHROMIUM URL PICTURES ROOM: ROOM is a folder that can be sent; job 1 is a room with lamps; a line for each fault
+import { readdirSync, readFileSync } from "node:fs";
 import { launch, look, modules as loaded } from "./browser.mjs";
 
-const [modules, chromium, url, pictures] = process.argv.slice(2);
+const [modules, chromium, url, pictures, room] = process.argv.slice(2);
 const { puppeteer, axe } = loaded(modules), browser = await launch(puppeteer, chromium);
 let faults = 0;
 
@@ -12,6 +13,10 @@ function check(isRight, words) {
   faults++;
   console.log(`fault: ${words}`);
 }
+
+// {name: its bytes as base64, or such an object}
+const readFolder = (path) => Object.fromEntries(readdirSync(path, { withFileTypes: true }).map((entry) => [entry.name,
+  entry.isDirectory() ? readFolder(`${path}/${entry.name}`) : readFileSync(`${path}/${entry.name}`).toString("base64")]));
 
 const get = async (path) => (await fetch(`${url}/v1/${path}`)).json();
 
@@ -176,6 +181,69 @@ async function mixLights() {
   await page.close();
 }
 
+// --- words ------------------------------------------------------------------------------------
+
+// Nothing is called far from the photograph where it is the noise of the re-render that is far.
+async function judge(page) {
+  const cases = [
+    [{}, []],
+    [{ psnr_db: 18, msre: 0.3, msre_noise_left: 0.01, msre_render_noise: 0.2 }, ["18.0 dB, far from the photograph"]],
+    [{ psnr_db: 18, msre: 0.3, msre_noise_left: 0.2, msre_render_noise: 0.2 }, ["18.0 dB, far from the photograph, as far as noise lets tell"]],
+    [{ psnr_db: 18, msre: 0.3, msre_render_noise: 0.2 }, ["18.0 dB, mostly noise of the re-render"]],
+    [{ psnr_db: 26, msre: 0.01, msre_render_noise: 0.001 }, ["26.0 dB, agrees but for details"]],
+  ];
+  for (const [metrics, wanted] of cases) {
+    const found = await page.evaluate(async (m) => (await import("/web/verdict.js")).verdictOf(m), metrics);
+    check(found[0] === wanted[0], `${JSON.stringify(metrics)} is called ${found[0]}`);
+  }
+}
+
+// --- sending a room ---------------------------------------------------------------------------
+
+// A folder that is dropped is sent as a whole, files in folders of it too, and what is hidden is not.
+async function dropFolder(page, files) {
+  await page.evaluate(async (files) => {
+    const entry = (name, parts) => typeof parts === "string"
+      ? { name, isFile: true, file: (done) => done(new File([Uint8Array.from(atob(parts), (c) => c.charCodeAt(0))], name, { lastModified: 7 })) }
+      : { name, isDirectory: true, createReader: () => {
+        const children = Object.entries(parts).map(([child, inside]) => entry(child, inside));
+        return { readEntries: (done) => done(children.splice(0, 5)) }; // some at a time, as browsers do
+      } };
+    const event = new Event("drop", { bubbles: true, cancelable: true });
+    event.dataTransfer = { items: [{ webkitGetAsEntry: () => entry("dropped", files) }], files: [] };
+    window.dispatchEvent(event);
+  }, files);
+  await page.waitForFunction(() => !document.getElementById("check").hidden, { timeout: 60000 });
+  await page.waitForFunction(() => document.getElementById("check-progress").hidden, { timeout: 60000 });
+  check(await page.$eval("#check-name", (name) => name.textContent) === "dropped", "the dropped room has another name");
+  const [scene] = (await get("scenes?limit=1")).items;
+  check(scene.state === "ready" && scene.name === "dropped", `the dropped room: ${JSON.stringify(scene.problems)}`);
+}
+
+// An upload whose connection breaks off in the middle goes on; so does one whose page was closed, where it stopped.
+async function resumeUpload(files) {
+  const big = { ...files, "noise.bin": Buffer.alloc(20 << 20, 5).toString("base64") }; // three parts
+  let page = await open(""), parts = 0;
+  await page.waitForSelector("#jobs button");
+  await page.setRequestInterception(true);
+  page.on("request", (request) => {
+    if (request.method() === "PATCH" && request.url().includes("/v1/uploads/") && ++parts > 1) request.abort("connectionreset");
+    else request.continue();
+  });
+  dropFolder(page, big).catch(() => {}); // it is left
+  await page.waitForFunction(() => document.getElementById("sent-words").textContent.includes("trying again"), { timeout: 60000 });
+  await page.close();
+  const [upload] = (await get("uploads?limit=1")).items;
+  check(upload.offset > 0 && upload.offset < upload.length, `the upload broke off at ${upload.offset} of ${upload.length}`);
+  page = await open("");
+  await page.waitForSelector("#jobs button");
+  let first = null;
+  page.on("request", (request) => { if (request.method() === "PATCH") first ??= Number(request.headers()["upload-offset"]); });
+  await dropFolder(page, big);
+  check(first === upload.offset, `it goes on at ${first}, not at ${upload.offset}`);
+  await page.close();
+}
+
 // --- the room ---------------------------------------------------------------------------------
 
 // The picture from where the room is looked at shows what the room in three dimensions shows: the camera is inside.
@@ -207,6 +275,9 @@ async function renderFromRoom() {
 const page = await open("");
 await page.waitForSelector("#jobs button");
 await saveSettings(page);
+await judge(page);
+await dropFolder(page, readFolder(room));
+await resumeUpload(readFolder(room));
 await timeMix(page);
 await makeLights();
 await compareSum(page);

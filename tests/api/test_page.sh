@@ -7,7 +7,7 @@ daemon_start --set threads=2 --set small_render_paths=3000000
 make_room "$work/room" 12
 # shellcheck disable=SC2086
 run 0 submit "$work/room" $tiny --set emitters.2=off --watch
-HOME=$work timeout 150 node tests/api/page.mjs "$modules" "$chromium" "$UNBAKE_SERVER" "$build/axe/pictures" >"$work/out" 2>&1 ||
+HOME=$work timeout 150 node tests/api/page.mjs "$modules" "$chromium" "$UNBAKE_SERVER" "$build/axe/pictures" "$work/room" >"$work/out" 2>&1 ||
     fail "the page: $(cat "$work/out")"
 cat "$work/out"
 daemon_end TERM
