@@ -351,6 +351,7 @@ cJSON *evaluate_to_json(const struct evaluation *v) {
     json_add_int(root, "views", (int64_t)v->view_count);
     json_add_number(root, "base_color_psnr_db", score_psnr_db(s->base_color_seen));
     json_add_number(root, "base_color_psnr_all_db", score_psnr_db(s->base_color_all));
+    json_add_number(root, "base_color_inside_psnr_db", score_psnr_db(s->base_color_inside));
     json_add_number(root, "base_color_ratio", score_base_color_ratio(s));
     json_add_number(root, "seen_share", s->plain_pixels ? (double)s->seen_pixels / (double)s->plain_pixels : 0.0);
     json_add_number(root, "roughness_psnr_db", score_psnr_db(s->roughness));

@@ -84,6 +84,8 @@ void score_add(struct score *score, const struct image *found, const struct imag
             }
             if (!seen || !one_object(truth, object, x, y))
                 continue;
+            for (int c = 0; c < 3; c++)
+                add_square(&score->base_color_inside, f[fc.base_color[c]], t[tc.base_color[c]]);
             add_square(&score->roughness, f[fc.roughness], t[tc.roughness]);
             add_square(&score->specular, f[fc.specular], t[tc.specular]);
         }

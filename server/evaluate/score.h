@@ -7,6 +7,7 @@
  *                values clamped to [0, 1]; once over pixels all of whose samples are seen by a training view (seen.h;
  *                the headline figure), once over all
  *                and the ratio of the means of both over the seen ones: light is told from albedo only up to a factor
+ *                and once more over the pixels of the next two lines
  *   roughness,   the same over seen pixels whose 3 x 3 neighbourhood is one object of the truth
  *   specular
  *   emission     intersection over union of the emitting pixels; mean over pixels and channels of
@@ -32,7 +33,7 @@ struct score_sum {
 };
 
 struct score {
-    struct score_sum base_color_seen, base_color_all, roughness, specular, emission_log;
+    struct score_sum base_color_seen, base_color_all, base_color_inside, roughness, specular, emission_log;
     double base_color_found, base_color_truth; /* sums over the terms of base_color_seen */
     size_t emission_both, emission_either;     /* pixels */
     size_t pixels, plain_pixels, seen_pixels;  /* seen: plain and seen */

@@ -50,6 +50,8 @@ static void test_score(void) {
     CHECK_NEAR(score_base_color_ratio(&score), (8 * 0.6 + 1.0) / (9 * 0.5), 1e-7); /* pixel 3 is not seen */
     /* Pixel 3 borders on another object, pixels 0 to 2 do not. */
     CHECK(score.roughness.count == 3);
+    CHECK(score.base_color_inside.count == 9);
+    CHECK_NEAR(score_mean(score.base_color_inside), (8 * 0.01 + 0.25) / 9, 1e-8);
     CHECK_NEAR(score_psnr_db(score.roughness), 20.0, 1e-4);
     CHECK(isinf(score_psnr_db(score.specular)));
     CHECK_NEAR(score_emission_iou(&score), 1.0 / 3.0, 1e-12);
