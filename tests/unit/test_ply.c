@@ -269,6 +269,26 @@ static void test_wrapped(void) {
     CHECK_THAT(strstr(err.message, "line 14: face 0 has fewer values"), "%s", err.message);
 }
 
+/* Numbers that a writer has broken at a width, without regard to records. */
+static void test_broken_lines(void) {
+    struct mesh mesh;
+    struct error err = {.message = ""};
+    const char *vertices = HEAD VERTEX(4) FACE(2) "end_header\n0 0 0 1 0 0 1\n1 0 0 1 0 4 0\n1 2 3 3 0 1 2\n";
+    CHECK_THAT(parse(vertices, &mesh, NULL, &err) == STATUS_OK, "%s", err.message);
+    CHECK(mesh.triangle_count == 3 && mesh.position[1].x == 1 && mesh.position[2].y == 1 && mesh.position[3].x == 0);
+    mesh_release(&mesh);
+    CHECK_THAT(parse(HEAD FACE(2) VERTEX(4) "end_header\n4 0 1 2 3 3 0\n1 2 0 0 0 1 0\n0 1 1 0 0 1 0", &mesh, NULL,
+                     &err) == STATUS_OK,
+               "%s", err.message);
+    CHECK(mesh.triangle_count == 3 && mesh.position[3].y == 1);
+    mesh_release(&mesh);
+    CHECK(parse(HEAD VERTEX(3) FACE(1) "end_header\n0 0 0 1 0 0\n1 1 0 3 0 1 2 7\n", &mesh, NULL, &err) ==
+          STATUS_INPUT);
+    CHECK_THAT(strstr(err.message, "vertex 2 is missing"), "%s", err.message);
+    CHECK(parse(HEAD VERTEX(3) FACE(1) "end_header\n0 0 0 1 0 0\n1 1 0 3 0 1\n", &mesh, NULL, &err) == STATUS_INPUT);
+    CHECK_THAT(strstr(err.message, "vertex 2 is missing"), "%s", err.message);
+}
+
 /* Names in capitals; of two names, the exact one. */
 static void test_capitals(void) {
     struct mesh mesh;
@@ -328,6 +348,7 @@ int main(void) {
     test_ascii();
     test_strips();
     test_wrapped();
+    test_broken_lines();
     test_capitals();
     test_order();
     test_binary();

@@ -275,16 +275,19 @@ static enum status read_body(struct ply_reader *r, struct faces *faces) {
                   has_vertices ? "faces" : "vertices", has_vertices ? "face" : "vertex");
         return error_hint(r->err, "a mesh of triangles or polygons is needed, not a point cloud");
     }
-    if (!surface_at.data)
-        return STATUS_OK;
+    enum status status = ply_end_body(&r->in);
+    if (status != STATUS_OK || !surface_at.data)
+        return status;
     r->in.cursor = surface_at;
     return read_surface(r, surface, faces);
 }
 
-enum status ply_parse(const void *data, size_t size, const char *name, size_t triangle_limit, struct mesh *mesh,
-                      struct faces_report *report, struct error *err) {
+/* *is_broken: it is faulty, but it may be read as a stream. */
+static enum status parse(const void *data, size_t size, const char *name, size_t triangle_limit, bool is_stream,
+                         bool *is_broken, struct mesh *mesh, struct faces_report *report, struct error *err) {
     *mesh = (struct mesh){0};
     struct ply_reader *r = mem_calloc(1, sizeof *r);
+    r->in.is_stream = is_stream;
     struct faces *faces = faces_new(mesh, name, triangle_limit, false);
     r->in.cursor = (struct ply_cursor){.name = name, .data = data, .size = size};
     r->err = r->in.err = err;
@@ -300,8 +303,19 @@ enum status ply_parse(const void *data, size_t size, const char *name, size_t tr
     positions_release(&r->position);
     if (report)
         *report = faces->report;
+    *is_broken = status == STATUS_INPUT && r->in.header.format == PLY_ASCII && r->in.has_extra && !is_stream;
     mem_free(faces);
     mem_free(r);
+    return status;
+}
+
+enum status ply_parse(const void *data, size_t size, const char *name, size_t triangle_limit, struct mesh *mesh,
+                      struct faces_report *report, struct error *err) {
+    struct error other;
+    bool is_broken;
+    enum status status = parse(data, size, name, triangle_limit, false, &is_broken, mesh, report, err);
+    if (is_broken && parse(data, size, name, triangle_limit, true, &is_broken, mesh, report, &other) == STATUS_OK)
+        return STATUS_OK;
     return status;
 }
 

@@ -137,12 +137,20 @@ enum status ply_skip_property(struct ply_values *r, const struct ply_property *p
     return STATUS_OK;
 }
 
+enum status ply_end_body(struct ply_values *r) {
+    skip_blanks(r);
+    bool has_more = r->is_stream && (r->cursor.at < r->cursor.line_end || next_filled_line(r));
+    return has_more ? ply_value_error(r, "is the last, but values follow") : STATUS_OK;
+}
+
 enum status ply_begin_record(struct ply_values *r, uint64_t record) {
     r->record = record;
     r->is_wrapped = false;
     if (r->header.format != PLY_ASCII)
         return STATUS_OK;
-    bool found = find_filled_line(r);
+    skip_blanks(r);
+    bool is_within = r->is_stream && r->cursor.at < r->cursor.line_end;
+    bool found = is_within || (r->is_stream ? next_filled_line(r) : find_filled_line(r));
     r->first_line = r->cursor.line;
     return found ? STATUS_OK : ply_value_error(r, "is missing: the file ends there");
 }
@@ -151,7 +159,11 @@ enum status ply_end_record(struct ply_values *r) {
     if (r->header.format != PLY_ASCII)
         return STATUS_OK;
     skip_blanks(r);
-    if (r->is_wrapped && r->cursor.at < r->cursor.line_end)
+    bool has_more = r->cursor.at < r->cursor.line_end;
+    r->has_extra = r->has_extra || has_more;
+    if (r->is_stream && has_more)
+        return STATUS_OK;
+    if (!r->is_stream && r->is_wrapped && r->cursor.at < r->cursor.line_end)
         return ply_value_error(r, MISSING);
     leave_line(r);
     return STATUS_OK;
