@@ -8,7 +8,9 @@
  * 2. A job succeeds only by an attempt whose node said so, once; nothing is accepted after.
  * 3. Lines are heard in their order, none is missing of an attempt whose node has ended it, and one is heard again only
  *    after the daemon died.
- * 4. When the faults stop, every job comes to an end. */
+ * 4. An end that the store has taken from a node is the attempt's end, whatever this side has judged meanwhile.
+ * 5. Lost is only what the site had; a submission of which nothing came is repeated.
+ * 6. When the faults stop, every job comes to an end. */
 #ifndef UNBAKE_TESTS_EXECUTOR_MODEL_H
 #define UNBAKE_TESTS_EXECUTOR_MODEL_H
 
@@ -73,7 +75,8 @@ static struct model {
     struct model_job job[JOBS_MAX];
     size_t job_count, running, running_max; /* running_max 0: no limit */
     char *dir;
-    long claims, ends, restarts, resubmissions, losses, preemptions; /* over all scripts */
+    long claims, ends, restarts, losses, preemptions; /* over all scripts */
+    long last_words;                                  /* of nodes, after this side had decided */
 } model;
 
 static inline double chance(void) { return (double)(rng_mix64(model.random++) >> 11) * 0x1p-53; }
@@ -388,6 +391,36 @@ static inline void start_one(struct model_job *job) {
     mem_free(folder);
 }
 
+/* The HTTP side works while the scheduler's thread decides: a node that has just been asked to stop, or was given up, may
+ * have reported its end before that. */
+static inline void node_hurries(const struct model_job *job) {
+    for (size_t i = 0; i < model.cluster_count; i++) {
+        struct cluster_job *c = &model.cluster[i];
+        if (c->job_id != job->id || c->attempt != job->attempt || !c->alive || !c->is_claimed || c->is_unanswered ||
+            model.now < c->cut_until || model.now >= c->lease_until)
+            continue;
+        c->done = WORK_REPORTS;
+        const struct remote_key key = {c->job_id, c->attempt, c->token_sha256, c->claimant};
+        node_reports(c, &key);
+        model.last_words++;
+        return;
+    }
+}
+
+/* Rules 4 and 5. */
+static inline void check_end(const struct model_job *job, const struct remote_row *row, const struct run_end *end) {
+    bool was_there = false;
+    if (row->end.way[0])
+        CHECK_THAT(end->way == (strcmp(row->end.way, "preempted") == 0 ? RUN_PREEMPTED : RUN_EXIT) &&
+                       (end->way == RUN_PREEMPTED || end->code == row->end.code),
+                   "attempt %d of job %lld: its node ended it with %s %d, and it ends as %d: %s", job->attempt,
+                   (long long)job->id, row->end.way, row->end.code, (int)end->way, end->reason);
+    for (size_t i = 0; i < model.cluster_count; i++)
+        was_there |= strcmp(model.cluster[i].name, row->name) == 0;
+    CHECK_THAT(end->way != RUN_LOST || job->wish >= 0 || was_there || model.cluster_count == CLUSTER_MAX,
+               "attempt %d of job %lld is lost, and the site never had it", job->attempt, (long long)job->id);
+}
+
 static inline void settle(struct model_job *job, const struct run_end *end) {
     struct store *store = model.store;
     for (size_t i = 0; i < model.cluster_count; i++)
@@ -432,12 +465,15 @@ static inline void job_turn(struct model_job *job) {
             OK(store_remote_get(model.store, job->id, job->attempt, &at_end, &err));
             told = 2 * (at_end.last_seq - (at_end.end.way[0] ? 1 : 0));
             CHECK_THAT(job->heard == told, "%lld lines of %lld were heard", (long long)job->heard, (long long)told);
+            check_end(job, &at_end, &end);
             settle(job, &end);
         } else if (job->wish < 0 && happens(0.0005)) {
             job->wish = chance() < 0.5 ? RUN_STOP : RUN_KILL;
             if (job->wish == RUN_KILL)
                 OK(store_job_cancel(model.store, job->id, &err));
             run_ask(job->run, (enum run_request)job->wish);
+            if (happens(0.5))
+                node_hurries(job);
         }
         return;
     }
