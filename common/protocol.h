@@ -45,6 +45,7 @@
 #define TUS_VERSION "1.0.0" /* of the protocol of /v1/uploads: tus.io */
 
 /* The field in which an `unbaked node` says which of them it is: random hex digits. */
+#define NODE_LOG_MAX 65536 /* bytes of a worker's log, its end, that a node sends */
 #define NODE_CLAIMANT_FIELD "Unbake-Claimant"
 
 #define MIME_JSON "application/json"

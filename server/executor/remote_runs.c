@@ -8,8 +8,10 @@
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
+#include "common/protocol.h"
 #include "server/data/layout.h"
 #include "server/executor/remote_run.h"
+#include "server/job/worker_log.h"
 
 #define RETRY_SEC 1.0      /* after a fault of the store */
 #define REPORTS_AT_ONCE 16 /* of one attempt; others wait meanwhile */
@@ -191,6 +193,21 @@ static bool close_row(struct remote_run *r) {
     return writers == 0;
 }
 
+/* What its worker has printed goes where that of workers on this machine is. */
+static void take_log(const struct remote_run *r) {
+    const char *data_dir = r->remote->parts.data_dir;
+    char *dir = layout_attempt(data_dir, r->row.job_id, r->row.number), *from = layout_log(dir);
+    char *home = layout_job(data_dir, r->row.job_id), *path = layout_log(home);
+    struct error err;
+    if (worker_log_take(path, from, NODE_LOG_MAX, &err) != STATUS_OK)
+        log_warning("job %lld: the log of attempt %d is not kept: %s", (long long)r->row.job_id, r->row.number,
+                    err.message);
+    mem_free(path);
+    mem_free(home);
+    mem_free(from);
+    mem_free(dir);
+}
+
 static bool remote_ended(struct run *run, struct run_end *end, run_hear *each, void *user) {
     struct remote_run *r = of(run);
     if ((!r->has_verdict && r->row.phase != REMOTE_ENDED) || r->is_closed || !close_row(r))
@@ -199,6 +216,7 @@ static bool remote_ended(struct run *run, struct run_end *end, run_hear *each, v
     if (r->has_unread)
         return false;
     r->is_closed = true;
+    take_log(r);
     if (r->row.end.way[0] || !r->has_verdict) /* its node's word comes first */
         read_end(&r->row, end);
     else
@@ -270,11 +288,11 @@ static enum status write_order(const struct remote *m, const struct run_work *wo
 static enum status start(const struct executor *executor, const struct run_work *work, struct run **run,
                          struct error *err) {
     struct remote *m = remote_of(executor);
-    char token[65], random[17], digest[SHA256_HEX_SIZE];
+    char token[65], random[9], digest[SHA256_HEX_SIZE];
     struct remote_row row = {
         .job_id = work->job_id, .number = work->attempt, .lease_sec = (int)m->parts.site->lease_sec};
     *run = NULL;
-    if (!remote_draw(token, 64) || !remote_draw(random, 16))
+    if (!remote_draw(token, 64) || !remote_draw(random, 8))
         return error_set(err, STATUS_IO, "the system has no random numbers");
     snprintf(row.executor, sizeof row.executor, "%s", m->parts.site->name);
     snprintf(row.name, sizeof row.name, NAME_PREFIX "%lld-%d-%s", (long long)row.job_id, row.number, random);

@@ -86,6 +86,7 @@ struct response *node_files_checkpoint(struct api *api, struct request *r);
 struct response *node_files_checkpoint_get(struct api *api, struct request *r);
 struct response *node_files_checkpoint_put(struct api *api, struct request *r);
 struct response *node_files_output_put(struct api *api, struct request *r);
+struct response *node_files_log_put(struct api *api, struct request *r);
 
 /* events.c */
 struct response *events_get(struct api *api, struct request *r);

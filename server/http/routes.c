@@ -76,6 +76,7 @@ static const struct route table[] = {
      ROUTE_BODY_FILE, PACE_SLOW, "first"},
     {METHOD_PUT, "/v1/attempts/{job}/{number}/outputs/{name...}", ROUTE_NODE, node_files_output_put, ROUTE_BODY_FILE,
      PACE_SLOW, ""},
+    {METHOD_PUT, "/v1/attempts/{job}/{number}/log", ROUTE_NODE, node_files_log_put, ROUTE_BODY_FILE, PACE_QUICK, ""},
 };
 
 const struct route *routes_table(size_t *count) {

@@ -43,6 +43,28 @@ enum status worker_log_open(const char *path, int *fd, off_t *start, struct erro
     return status;
 }
 
+enum status worker_log_take(const char *path, const char *from, size_t limit, struct error *err) {
+    off_t start;
+    int fd = -1, log = -1;
+    fd = open(from, O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
+    if (fd < 0)
+        return errno == ENOENT ? STATUS_OK : error_set_errno(err, errno, "cannot open %s", from);
+    char *text = mem_alloc(limit);
+    ssize_t got = pread(fd, text, limit, 0);
+    enum status status = got < 0 ? error_set_errno(err, errno, "cannot read %s", from) : STATUS_OK;
+    if (status == STATUS_OK)
+        status = worker_log_open(path, &log, &start, err);
+    if (status == STATUS_OK)
+        status = file_write_all(log, text, (size_t)got, path, err);
+    if (status == STATUS_OK && unlink(from) != 0)
+        status = error_set_errno(err, errno, "cannot remove %s", from);
+    if (log >= 0)
+        close(log);
+    close(fd);
+    mem_free(text);
+    return status;
+}
+
 char *worker_log_words(const char *path, off_t start, size_t limit) {
     char *text = mem_calloc(limit + 1, 1);
     int fd = open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW);

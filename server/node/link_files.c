@@ -172,7 +172,7 @@ enum status link_send(struct attempt_link *l, const char *what, const char *name
     struct transfer t = {.link = l, .fd = fd, .err = err};
     char value[64], digest[96];
     if (fstat(fd, &info) != 0)
-        return error_set_errno(err, errno, "cannot look at %s", name);
+        return error_set_errno(err, errno, "cannot look at %s", name ? name : what);
     field_digest_format(hex, value);
     snprintf(digest, sizeof digest, "Repr-Digest: %s", value);
     char *path = path_of(l, what, name, query);

@@ -226,6 +226,7 @@ static int finish(struct node *n, enum status status, const struct error *why) {
     r->gives_up = status != STATUS_OK;
     char *words = run_last_words(r->run, WORDS_MAX_BYTES);
     end.last_words = words;
+    relay_send_log(r);
     bool is_told = relay_flush(r) && link_end(&r->link, &end, run_cpu_sec(r->run), &err) == STATUS_OK;
     if (is_told)
         log_info("job %llu: attempt %u: %s %d; %zu parts of checkpoints, %.1f MB; %.1f MB sent in all",

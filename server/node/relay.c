@@ -2,11 +2,13 @@
 #include "server/node/relay.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <math.h>
 #include <poll.h>
 #include <signal.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -14,6 +16,7 @@
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
+#include "common/protocol.h"
 #include "server/data/layout.h"
 #include "server/data/work_file.h"
 #include "server/node/hash.h"
@@ -219,6 +222,49 @@ static enum status pass_on(struct relay *r, struct error *err) {
     mem_free(r->heard[0]);
     memmove(r->heard, r->heard + 1, --r->heard_count * sizeof *r->heard);
     return STATUS_OK;
+}
+
+/* The end of the log, from a whole line on if possible, as a file without a name. */
+static enum status copy_log(int fd, int *copy, struct error *err) {
+    off_t length = lseek(fd, 0, SEEK_END), start = length > NODE_LOG_MAX ? length - NODE_LOG_MAX : 0;
+    char *text = mem_alloc(NODE_LOG_MAX);
+    ssize_t got = pread(fd, text, NODE_LOG_MAX, start);
+    char *newline = got > 0 && start > 0 ? memchr(text, '\n', (size_t)got) : NULL;
+    ptrdiff_t skip = newline ? newline + 1 - text : 0;
+    enum status status = got < 0 ? error_set_errno(err, errno, "cannot read the worker's log") : STATUS_OK;
+    *copy = memfd_create("log", MFD_CLOEXEC);
+    if (*copy < 0)
+        status = error_set_errno(err, errno, "cannot copy the worker's log");
+    if (status == STATUS_OK)
+        status = file_write_all(*copy, text + skip, (size_t)(got - skip), "the worker's log", err);
+    mem_free(text);
+    return status;
+}
+
+void relay_send_log(struct relay *r) {
+    char hex[SHA256_HEX_SIZE];
+    int copy = -1, fd;
+    struct error err;
+    if (!r->run || link_state(&r->link) != LINK_OPEN)
+        return;
+    char *dir = layout_attempt(r->data_dir, r->job_id, r->number), *path = layout_log(dir);
+    fd = open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
+    enum status status = fd < 0 ? error_set_errno(&err, errno, "cannot open %s", path) : STATUS_OK;
+    bool has_any = fd >= 0 && lseek(fd, 0, SEEK_END) > 0;
+    if (has_any)
+        status = copy_log(fd, &copy, &err);
+    if (has_any && status == STATUS_OK)
+        status = hash_file(copy, keep_on, r, hex, &err);
+    if (has_any && status == STATUS_OK)
+        status = link_send(&r->link, "log", NULL, "", copy, hex, &err);
+    if (status != STATUS_OK)
+        log_warning("the worker's log is not sent: %s", err.message);
+    if (copy >= 0)
+        close(copy);
+    if (fd >= 0)
+        close(fd);
+    mem_free(path);
+    mem_free(dir);
 }
 
 /* --- the whole ---------------------------------------------------------------------------------- */

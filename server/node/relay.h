@@ -46,6 +46,8 @@ enum status relay_may_begin(struct relay *r, struct error *err);
 /* Follows the run to its end, and passes everything on. STATUS_OK: the end may be told. Otherwise the run was killed:
  * STATUS_CANCELLED where the link is not open any more; else a file could not be sent, and *err says why. */
 enum status relay_follow(struct relay *r, struct error *err);
+/* Sends the end of the worker's log. A failure is logged: nothing depends on it. */
+void relay_send_log(struct relay *r);
 /* Reports all that the link has to say; false when it is not open any more. */
 bool relay_flush(struct relay *r);
 

@@ -186,6 +186,12 @@ static void check_outputs(struct rig *rig) {
     SAYS("Repr-Digest says");
     HOLDS("out/preview/b_c.png", "picture");
     IS(put(rig, "outputs/empty.exr", ANN, "", ""), 204);
+    IS(put(rig, "log", BOB, "said\n", "said\n"), 409);
+    IS(put(rig, "log", ANN, "said\n", "said\n"), 204);
+    char *long_log = mem_calloc(65538, 1);
+    memset(long_log, 'a', 65537);
+    IS(put(rig, "log", ANN, long_log, long_log), 413);
+    mem_free(long_log);
     HOLDS("out/empty.exr", "");
     IS(ask(rig, "PUT", "outputs/a.exr", ANN "Content-Type: application/octet-stream\r\n", "x", 1), 400);
     static const char *const bad[] = {"outputs/../job.json", "outputs/%2e%2e/job.json", "outputs/..%2fjob.json",

@@ -47,7 +47,7 @@ ended = ended
 status_sec = 1
 lease_sec = 6
 [script]
-export UNBAKE_NODE_TOKEN={token} TMPDIR=$work
+export UNBAKE_NODE_TOKEN={token} TMPDIR=$work LD_DEBUG=statistics
 exec {command}
 CONF
 daemon_end TERM
@@ -89,6 +89,9 @@ run 0 get "$job" -o "$work/home"
 
 submit batch 2500
 same "undisturbed" 1
+# What the worker has printed there is where that of workers here is.
+grep -q "runtime linker statistics" "$data/jobs/$job/worker.log" || fail "the worker's log: $(ls -R "$data/jobs/$job")"
+[ ! -e "$data/jobs/$job/attempt-1/worker.log" ] || fail "the log of the attempt is left over"
 
 submit batch 2500
 wait_for 60 has_part

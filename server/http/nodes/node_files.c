@@ -11,6 +11,7 @@
 
 #include "common/file.h"
 #include "common/mem.h"
+#include "common/protocol.h"
 #include "server/data/attempt_folder.h"
 #include "server/data/layout.h"
 #include "server/data/scene_files.h"
@@ -185,5 +186,19 @@ struct response *node_files_output_put(struct api *api, struct request *r) {
         reply = problem(r, 422, "\"%.100s\" is no name for an output", name);
     }
     mem_free(name);
+    return reply;
+}
+
+struct response *node_files_log_put(struct api *api, struct request *r) {
+    struct node_key key;
+    struct response *reply = node_key(r, &key);
+    if (reply)
+        return reply;
+    if (r->content_length > NODE_LOG_MAX)
+        return problem(r, 413, "of a log the last %d bytes are kept", NODE_LOG_MAX);
+    char *dir = layout_attempt(api->config.data_dir, key.key.job_id, key.key.number), *path = layout_log(dir);
+    reply = node_body_end(api, r, &key, path, NULL, NULL);
+    mem_free(path);
+    mem_free(dir);
     return reply;
 }
