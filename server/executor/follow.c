@@ -261,14 +261,14 @@ void remote_receive(struct remote *m) {
 static void submit_again(struct remote_run *r) {
     struct remote *m = r->remote;
     const char *name = m->parts.site->name;
-    char token[65], random[17];
+    char token[65], random[9];
     struct error err;
     if (r->tries >= REMOTE_TRIES_MAX) {
         remote_decide(r, RUN_REFUSED, 0, "%s does not take it: %.190s", name,
                       r->fault[0] ? r->fault : "no reason is known");
         return;
     }
-    if (!remote_draw(token, 64) || !remote_draw(random, 16))
+    if (!remote_draw(token, 64) || !remote_draw(random, 8))
         return;
     char digest[SHA256_HEX_SIZE], fresh[REMOTE_NAME_SIZE];
     sha256_of(token, 64, digest);

@@ -24,7 +24,9 @@ static char *next_word(const char **at) {
     bool is_quoted = false;
     buf_init(&word, 1 << 20);
     while (**at && (is_quoted || !strchr(BLANKS, **at))) {
-        if (**at == '"')
+        bool is_escaped = (*at)[0] == '\\' && (*at)[1] == '"';
+        *at += is_escaped;
+        if (**at == '"' && !is_escaped)
             is_quoted = !is_quoted;
         else
             buf_append(&word, *at, 1);

@@ -8,7 +8,7 @@
 #include "common/buf.h"
 #include "common/error.h"
 
-/* Takes `text` apart at white space; "..." holds white space together and is removed. *words: NULL-terminated, the
+/* Takes `text` apart at white space; "..." holds white space together and is removed, \" is a quotation mark. *words: NULL-terminated, the
  * caller's (words_free). STATUS_INPUT where a quotation mark is left over, or there is no word. */
 enum status words_parse(const char *text, char ***words, struct error *err);
 void words_free(char **words);
