@@ -167,6 +167,7 @@ export class JobView {
     }
     this.room.up = this.report?.up;
     await this.room.show(job, items, this.report?.segments ?? []);
+    this.roomRender?.update();
   }
 
   addToCurve({ step, value }) {

@@ -39,16 +39,18 @@ export class Mixer {
     const isRoom = job.kind === "reconstruct" && job.state === "succeeded", { me, jobs } = this.server;
     const its = isRoom ? [...jobs.values()].filter((other) => other.source === job.id && isPerLight(other)).sort((a, b) => b.id - a.id)
       : isPerLight(job) ? [job] : [];
-    const base = its.find((other) => other.state === "succeeded"), busy = its.find(isBusy), failed = its[0]?.state === "failed" ? its[0] : null;
+    const base = its.find((other) => other.state === "succeeded"), busy = its.find(isBusy), newest = its[0];
     this.source = isRoom ? job.id : job.source;
     this.root.hidden = !isRoom && its.length === 0;
     this.at("make").hidden = !isRoom || me.role === "viewer" || Boolean(busy);
     this.at("progress").hidden = !busy;
     if (busy) this.at("progress").value = busy.progress;
     if (busy) this.say(`Each light is rendered alone: job ${busy.id}, ${busy.state}.`);
-    else if (failed && !base) this.say(failed.reason || "The render failed.");
-    else if (isRoom && !base) this.say("Each light has to be rendered alone once; then they are mixed here at once.");
-    else if (!this.mix) this.say("");
+    else if (isRoom && !newest) this.say("Each light has to be rendered alone once; then they are mixed here at once.");
+    else if (newest && newest.state !== "succeeded" && newest.id !== this.told) {
+      this.told = newest.id; // once, since what is mixed meanwhile has words of its own
+      this.say([`Job ${newest.id} has ${newest.state === "failed" ? "failed" : "been cancelled"}`, newest.reason].filter(Boolean).join(": "));
+    }
     this.at("save").hidden = this.at("saves").hidden = me.role === "viewer";
     if (this.root.hidden || !this.isSeen) return;
     if (isRoom && this.frames.length === 0) this.listViews();

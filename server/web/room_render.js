@@ -13,7 +13,6 @@ export class RoomRender {
     this.at = (name) => root.querySelector(`.view-${name}`);
     this.at("small").addEventListener("click", () => this.press(() => this.small()));
     this.at("large").addEventListener("click", () => this.press(() => this.large()));
-    this.at("bar").hidden = server.me.role === "viewer";
   }
 
   async press(action) {
@@ -47,7 +46,8 @@ export class RoomRender {
 
   // Whenever any job changes.
   async update() {
-    const job = this.render && this.server.jobs.get(this.render.id);
+    const { me, jobs } = this.server, job = this.render && jobs.get(this.render.id);
+    this.at("bar").hidden = me.role === "viewer" || jobs.get(this.job?.id)?.state !== "succeeded"; // what runs changes
     this.at("progress").hidden = !isBusy(job);
     if (!job || this.isShown === job.id) return;
     if (isBusy(job)) {

@@ -181,6 +181,18 @@ async function mixLights() {
   await page.close();
 }
 
+// Renders of each light that fail say why, also where older ones are mixed, which they stay.
+async function failLights() {
+  const page = await openMixer();
+  await page.waitForSelector("#job .mixer-desk:not([hidden])");
+  await fetch(`${url}/v1/jobs`, { method: "POST", headers: { "Content-Type": "application/json" },
+    body: JSON.stringify({ kind: "render", source: 1, settings: { per_light: true, lights: "off", size: "8x8", spp: 4 } }) });
+  await page.waitForFunction(() => document.querySelector("#job .mixer-state").textContent.includes("Nothing shines"), { timeout: 30000 })
+    .catch(() => check(false, "a failed render of each light is not told"));
+  check(await page.$$eval("#job .mixer-lights fieldset", (rows) => rows.length) >= 3, "the lights are gone");
+  await page.close();
+}
+
 // --- words ------------------------------------------------------------------------------------
 
 // Nothing is called far from the photograph where it is the noise of the re-render that is far.
@@ -283,6 +295,7 @@ await makeLights();
 await compareSum(page);
 await page.close();
 await mixLights();
+await failLights();
 await renderFromRoom();
 await browser.close();
 process.exit(faults > 0 ? 1 : 0);
