@@ -58,7 +58,7 @@ FUZZ_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(call built,$(FUZZ_SRC)))
 # The goals that build first and then run something build on all processors, unless told otherwise.
 BUILD = echo building... && $(MAKE) -s $(if $(filter -j%,$(MAKEFLAGS)),,-j$(shell nproc))
 
-.PHONY: all help deps man deb demo test tests check check-build benches bench fidelity light rooms sensitivity paper many chaos soak asan tsan asan-build tsan-build fuzz \
+.PHONY: all help deps man deb demo test tests check check-build benches bench fidelity light rooms sensitivity relight paper many chaos soak asan tsan asan-build tsan-build fuzz \
         fuzzers fuzz-build portable format coverage coverage-build install clean
 .SECONDARY:
 .DELETE_ON_ERROR:
@@ -184,6 +184,11 @@ light: deps ## compare the light that is found with that of known rooms (make ro
 rooms: ## make furnished rooms with their truth, by Mitsuba 3, under build/rooms, for FIDELITY_ROOMS and LIGHT_ROOMS; ROOM_NAMES, ROOM_SPP
 	@deploy/install-deps.sh rooms
 	@tests/bench/rooms.sh $(B)
+
+relight: deps ## compare rooms in another light with the true rooms in that light; RELIGHT_ROOMS, RELIGHT_QUALITY; writes build/relight.json
+	@deploy/install-deps.sh bench
+	@+$(BUILD) all $(B)/tests/bench/reconstruct_room $(B)/tests/render/relight_room
+	@tests/bench/relight.sh $(B)
 
 sensitivity: deps ## how much results move with each constant of the engine (hours); SENSITIVITY="server/material ..."
 	@+$(BUILD) all

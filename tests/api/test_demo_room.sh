@@ -43,8 +43,11 @@ base_color=.base_color_psnr_db
 msre_of=.msre
 found=.emitters_found
 false_found=.emitters_false
-try hdr 25 0.2 2
-try sdr 25 0.2 1 --sdr
+try hdr 25 0.1 2
+# In another light it is near the true room in that light (relight_room.c): a glowing ball, each lamp alone.
+"$build/tests/render/relight_room" "$work/hdr" "$work/hdr.out" "$work/relit" views=0,2 spp=16 label=hdr least=24 ratio=1.05 ||
+    fail "relit it is not near the truth"
+try sdr 25 0.1 1 --sdr
 stop_daemon
 equal "$daemon_status" 0 "the daemon's exit status"
 finish
