@@ -54,7 +54,7 @@ static const struct command table[] = {
      "  unbake render last --set light.27=off --set light.28=2,1.8,1.2 --set passes=radiance,depth --set format=exr\n",
      1, 1, render_options, render_run},
     {"evaluate", "JOB", "compare a reconstruction with the truth of its room",
-     "The room must have come with it: truth/ beside its photographs, as `unbaked demo` writes it.\n",
+     "The room must have come with it: truth/ beside its photographs, as `unbaked demo-room` writes it.\n",
      "  unbake evaluate 17 -o figures\n", 1, 1, evaluate_options, evaluate_run},
     {"list", "", "list jobs, newest first", "",
      "  unbake list\n  unbake list --state failed --limit 5\n  unbake list -o jsonl | jq -r '[.id, .name] | @tsv'\n"

@@ -47,6 +47,14 @@ try hdr 25 0.1 2
 # In another light it is near the true room in that light (relight_room.c): a glowing ball, each lamp alone.
 "$build/tests/render/relight_room" "$work/hdr" "$work/hdr.out" "$work/relit" views=0,2 spp=16 label=hdr least=24 ratio=1.05 ||
     fail "relit it is not near the truth"
+# A job compares it with the truth that comes with a room, and finds what the command does.
+tar -C "$work/hdr" -cf "$work/known.tar" .
+known=$(curl -s -X POST -T "$work/known.tar" -H 'Content-Type: application/x-tar' "$url/v1/scenes?name=known" | jq -r .id)
+"$build/unbake" evaluate last --scene "$known" -q -o "$work/evaluated" || fail "the job that evaluates failed"
+jq -S . "$work/evaluated/evaluation.json" >"$work/by_job.json"
+jq -S . "$work/hdr.json" | cmp - "$work/by_job.json" || fail "a job and the command evaluate differently"
+[ -s "$work/evaluated/pictures/base_color_$(jq -r '[.frames[] | select(.split == "test").file_path][0]' "$work/hdr/transforms.json" |
+    sed 's/.*\///; s/\..*//').png" ] || fail "no pictures of the comparison: $(ls -R "$work/evaluated")"
 try sdr 25 0.1 1 --sdr
 stop_daemon
 equal "$daemon_status" 0 "the daemon's exit status"

@@ -17,14 +17,15 @@ build=$1
 . tests/bench/lib.sh
 rows=$build/relight.tsv
 sky=$data/hdri/lythwood_room_1k.hdr
-: >"$rows"
+rm -rf "$build/relight"
 mkdir -p "$build/relight"
+: >"$rows"
 
 has_flip=
 if [ -x "$build/flip/bin/python" ] || python3 -m venv "$build/flip" >&2; then
-    "$build/flip/bin/python" -c 'import flip_evaluator' 2>/dev/null ||
-        timeout 300 "$build/flip/bin/pip" install -q flip-evaluator==1.7 >&2
-    "$build/flip/bin/python" -c 'import flip_evaluator' 2>/dev/null && has_flip=1
+    "$build/flip/bin/python" -c 'import flip_evaluator, numpy' 2>/dev/null ||
+        timeout 300 "$build/flip/bin/pip" install -q flip-evaluator==1.7 numpy >&2
+    "$build/flip/bin/python" -c 'import flip_evaluator, numpy' 2>/dev/null && has_flip=1
 fi
 [ -n "$has_flip" ] || echo "flip-evaluator is not to be had: FLIP is left out" >&2
 [ -e "$sky" ] || echo "no $sky: the sky is left out" >&2
@@ -42,7 +43,7 @@ window() {
     esac
 }
 
-# recover ROOM FOLDER: once for all rows that need it.
+# recover ROOM FOLDER: once in a run for all rows that need it.
 recover() {
     [ -e "$build/relight/$1/out/report.json" ] ||
         reconstruct "$2" "$build/relight/$1/out" "texture_size=${RELIGHT_TEXTURE:-1024}" \
