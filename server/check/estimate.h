@@ -11,7 +11,7 @@
 #include "common/settings.h"
 #include "server/scene/scene.h"
 
-#define ESTIMATE_TEXEL_BYTES 100.0 /* a texel of the square, of the memory below */
+#define ESTIMATE_TEXEL_BYTES 102.0 /* a texel of the square, of the memory below */
 
 /* Bytes at the peak, with textures of `side` texels a side. Pixels beyond the budget of the scene's spill lie on the
  * disk. */

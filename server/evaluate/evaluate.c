@@ -32,7 +32,8 @@ struct evaluator {
     struct recovered recovered;
     bool *emits; /* [triangle_count] by the truth */
     struct seen seen;
-    double median; /* radiance of the training pixels */
+    double median;            /* radiance of the training pixels */
+    struct texture deviation; /* of base colour, as confidence.exr states it; texel NULL: it does not */
 };
 
 struct evaluate_settings evaluate_default_settings(void) {
@@ -242,9 +243,17 @@ static enum status score_photograph(struct evaluator *e, const struct photograph
     return status;
 }
 
+/* The stated deviation of base colour as the camera sees it: that takes the place of base colour for the while. */
+static void render_deviation(struct evaluator *e, const struct camera *camera, struct image *out) {
+    struct texture *shown = &e->recovered.materials.base_color, kept = *shown;
+    *shown = e->deviation;
+    film_render_first_hits(&e->recovered.world, camera, e->settings->samples, e->settings->seed, e->pool, out);
+    *shown = kept;
+}
+
 static enum status score_view(struct evaluator *e, const struct photograph *p, uint32_t view, struct evaluation *v,
                               struct metric *msre, struct error *err) {
-    struct image truth = {0}, found = {0};
+    struct image truth = {0}, found = {0}, deviation = {0};
     char *stem = stem_of(p->name);
     uint8_t *flags = mem_array((size_t)p->camera.width * p->camera.height, 1);
     enum status status = read_truth(e, p, stem, &truth, err);
@@ -254,11 +263,15 @@ static enum status score_view(struct evaluator *e, const struct photograph *p, u
     seen_flags(&e->seen, &p->camera, e->pool, flags);
     mark_by_truth(&truth, flags);
     score_add(&v->score, &found, &truth, flags);
+    if (e->deviation.texel)
+        render_deviation(e, &p->camera, &deviation);
+    trust_add(&v->trust, &found, e->deviation.texel ? &deviation : NULL, &truth, flags);
     if (e->settings->pictures_dir)
         status = write_pair(e, "base_color", stem, &truth, &found, "base_color.", 1.0f, err);
     if (status == STATUS_OK && e->settings->spp)
         status = score_photograph(e, p, view, stem, &truth, v, msre, err);
 out:
+    image_release(&deviation);
     image_release(&found);
     image_release(&truth);
     mem_free(flags);
@@ -308,6 +321,23 @@ static enum status load_room(struct evaluator *e, struct error *err) {
     return STATUS_OK;
 }
 
+/* Outputs of before had something else under that name, or nothing. */
+static enum status load_deviation(struct evaluator *e, const char *outputs, struct error *err) {
+    struct image image = {0};
+    char *path = file_join(outputs, "confidence.exr");
+    const struct texture *color = &e->recovered.materials.base_color;
+    enum status status = file_is_in(outputs, "confidence.exr") ? image_read(path, &image, NULL, err) : STATUS_OK;
+    if (status == STATUS_OK && image.pixel && image_channel(&image, "R") == 0 && image.channel_count == 3 &&
+        image.width == color->width && image.height == color->height) {
+        texture_init(&e->deviation, &e->recovered.inverse, rgb_gray(0.0f));
+        for (size_t i = 0; i < (size_t)image.width * image.height; i++)
+            memcpy(e->deviation.texel[i], image.pixel + 3 * i, 3 * sizeof(float));
+    }
+    image_release(&image);
+    mem_free(path);
+    return status;
+}
+
 enum status evaluate_outputs(const char *room, const char *outputs, const struct evaluate_settings *settings,
                              struct parallel *pool, struct evaluation *v, struct error *err) {
     struct evaluator e = {.settings = settings, .pool = pool};
@@ -330,12 +360,15 @@ enum status evaluate_outputs(const char *room, const char *outputs, const struct
         goto out;
     status = settings->pictures_dir ? file_make_dirs(settings->pictures_dir, err) : STATUS_OK;
     if (status == STATUS_OK)
+        status = load_deviation(&e, outputs, err);
+    if (status == STATUS_OK)
         status = score_objects(&e, v, err);
     if (status == STATUS_OK) {
         seen_init(&e.seen, &e.scene, e.recovered.world.accel, e.emits, pool);
         status = score_views(&e, v, err);
         seen_release(&e.seen);
     }
+    texture_release(&e.deviation);
     recovered_release(&e.recovered);
 out:
     mem_free(root);
@@ -354,6 +387,10 @@ cJSON *evaluate_to_json(const struct evaluation *v) {
     json_add_number(root, "base_color_inside_psnr_db", score_psnr_db(s->base_color_inside));
     json_add_number(root, "base_color_ratio", score_base_color_ratio(s));
     json_add_number(root, "seen_share", s->plain_pixels ? (double)s->seen_pixels / (double)s->plain_pixels : 0.0);
+    json_add_number(root, "base_color_within_one_deviation", trust_share(v->trust.within_one, v->trust.judged));
+    json_add_number(root, "base_color_within_two_deviations", trust_share(v->trust.within_two, v->trust.judged));
+    json_add_number(root, "plain_deviation", trust_plain_deviation(&v->trust));
+    json_add_number(root, "plain_specks", trust_share(v->trust.specks, v->trust.plain_pixels));
     json_add_number(root, "roughness_psnr_db", score_psnr_db(s->roughness));
     json_add_number(root, "roughness_rms_error", sqrt(score_mean(s->roughness)));
     json_add_number(root, "specular_psnr_db", score_psnr_db(s->specular));

@@ -17,6 +17,7 @@
 #include "server/evaluate/smooth_areas.h"
 #include "server/evaluate/noise_floor.h"
 #include "server/evaluate/score.h"
+#include "server/evaluate/trust.h"
 
 struct reading; /* common/reading.h */
 
@@ -33,6 +34,7 @@ struct evaluate_settings evaluate_default_settings(void);
 
 struct evaluation {
     struct score score;
+    struct trust trust;
     size_t view_count;
     /* By object of the truth. An emitter is found if more than half of its area emits; a non-emitting object any part
      * of which emits is a false emitter. */

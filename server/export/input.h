@@ -49,8 +49,7 @@ struct export_input {
     const struct atlas *atlas;
     const struct inverse_uv *inverse;
     const struct materials *materials;
-    const float *confidence_count;              /* [height][width] number of observations; NULL until known: */
-    const float *confidence_spread;             /* [height][width] their spread; then there is no preview of it */
+    const float *observation_count;             /* [height][width] photographs of each texel; NULL until known */
     const bool *is_emitter;                     /* [segment_count] */
     const struct image *environment;            /* R G B; NULL: no distant light; */
     const struct image *environment_confidence; /* count, spread; NULL together with environment */

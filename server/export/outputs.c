@@ -44,9 +44,8 @@ static const struct output_kind kinds[] = {
     {PICTURE_SPECULAR, "specular", IMAGE_HALF, "Specular", "1",
      "by segment, 0 to 1; 0.5 is an index of refraction of 1.5"},
     {PICTURE_CONFIDENCE, "confidence", IMAGE_FLOAT, "Confidence",
-     "count: observations; spread: standard deviation of log radiance",
-     "observations by texel and the spread of their radiance; in the preview from blue (few) to "
-     "yellow (many), red where no photograph sees the surface"},
+     "standard deviation of base_color.exr, in reflectance",
+     "standard deviation of base colour by texel; in the preview from yellow (.01 and less) to blue (.2 and more)"},
 };
 #define KIND_COUNT (sizeof kinds / sizeof *kinds)
 
@@ -109,6 +108,15 @@ static enum status put_radiance_preview(struct export *e, struct error *err) {
     return status;
 }
 
+/* Whether the deviation of base colour is known: not before it was measured, nor where a resumed job was measured by an
+ * older version. */
+static bool knows_deviation(const struct export_input *in) {
+    for (size_t i = 0; i < in->inverse->valid_count; i++)
+        if (!rgb_is_black(materials_deviation(in->materials, in->inverse->valid[i])))
+            return true;
+    return false;
+}
+
 /* --- previews and textures ---------------------------------------------------------------- */
 
 static enum status put_previews(struct export *e, struct error *err) {
@@ -118,7 +126,7 @@ static enum status put_previews(struct export *e, struct error *err) {
     for (size_t k = 0; e->input->has_materials && k < KIND_COUNT && status == STATUS_OK; k++) {
         struct image image;
         char name[64];
-        if (kinds[k].kind == PICTURE_CONFIDENCE && !e->input->confidence_count)
+        if (kinds[k].kind == PICTURE_CONFIDENCE && !knows_deviation(e->input))
             continue;
         snprintf(name, sizeof name, "preview/%s.png", kinds[k].stem);
         picture_preview(e->input, kinds[k].kind, &image);
@@ -151,6 +159,8 @@ static enum status put_textures(struct export *e, struct error *err) {
     for (size_t k = 0; k < KIND_COUNT && status == STATUS_OK; k++) {
         struct image image;
         char name[64];
+        if (kinds[k].kind == PICTURE_CONFIDENCE && !knows_deviation(e->input))
+            continue;
         snprintf(name, sizeof name, "%s.exr", kinds[k].stem);
         picture_texture(e->input, kinds[k].kind, source, &image);
         status = output_files_image(&e->files, EVENT_OUTPUT, name, &image,

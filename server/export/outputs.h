@@ -6,7 +6,7 @@
  *   base_color.exr  roughness.exr  specular.exr  emission.exr   half, tiled, ZIP; R G B or Y. The
  *                    values continue EXPORT_MARGIN texels beyond the charts, so that other
  *                    renderers may filter and make mipmaps
- *   confidence.exr   float: `count` observations and `spread` of their radiance, by texel
+ *   confidence.exr   float: R G B standard deviation of base colour by texel; not where it is unknown
  *   environment.exr  float: distant light, R G B by latitude and longitude in the layout of latlong.h (column x is
  *                    at atan2(x, -z) = 2 pi (x + 1/2) / width, row y at acos(y) = pi y / (height - 1)), where
  *                    some was seen

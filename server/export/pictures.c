@@ -89,21 +89,20 @@ static rgb value_at(const struct export_input *input, enum picture_kind kind, si
     case PICTURE_SPECULAR: return rgb_gray(m->specular[segment_of_texel(input, texel)]);
     case PICTURE_CONFIDENCE: break;
     }
-    return rgb_make(input->confidence_count[texel], input->confidence_spread[texel], 0.0f);
+    return materials_deviation(m, texel);
 }
 
 void picture_texture(const struct export_input *input, enum picture_kind kind, const uint32_t *source,
                      struct image *image) {
     static const char *const rgb_channel[] = {"R", "G", "B"};
     static const char *const gray_channel[] = {"Y"};
-    static const char *const confidence_channel[] = {"count", "spread"};
     static const struct {
         uint32_t count;
         const char *const *name;
     } channels[] = {
-        [PICTURE_BASE_COLOR] = {3, rgb_channel},        [PICTURE_EMISSION] = {3, rgb_channel},
-        [PICTURE_ROUGHNESS] = {1, gray_channel},        [PICTURE_SPECULAR] = {1, gray_channel},
-        [PICTURE_CONFIDENCE] = {2, confidence_channel},
+        [PICTURE_BASE_COLOR] = {3, rgb_channel}, [PICTURE_EMISSION] = {3, rgb_channel},
+        [PICTURE_ROUGHNESS] = {1, gray_channel}, [PICTURE_SPECULAR] = {1, gray_channel},
+        [PICTURE_CONFIDENCE] = {3, rgb_channel},
     };
     const struct inverse_uv *inverse = input->inverse;
     uint32_t channel_count = channels[kind].count;
@@ -135,8 +134,12 @@ static rgb ramp(float t) {
     return rgb_make(image_srgb_to_linear(c.r), image_srgb_to_linear(c.g), image_srgb_to_linear(c.b));
 }
 
+/* Standard deviations at the ends of the preview's scale. */
+#define DEVIATION_LEAST 0.01f
+#define DEVIATION_MOST 0.2f
+
 /* Display colour of a mean value. */
-static rgb show(enum picture_kind kind, rgb value, float count_max) {
+static rgb show(enum picture_kind kind, rgb value) {
     switch (kind) {
     case PICTURE_BASE_COLOR: return value;
     case PICTURE_EMISSION: return rgb_scale(value, 1.0f / (1.0f + rgb_max(value)));
@@ -144,9 +147,7 @@ static rgb show(enum picture_kind kind, rgb value, float count_max) {
     case PICTURE_SPECULAR: return rgb_gray(image_srgb_to_linear(value.r));
     case PICTURE_CONFIDENCE: break;
     }
-    if (value.r <= 0.0f)
-        return rgb_make(0.6f, 0.02f, 0.02f);
-    return ramp(log1pf(value.r) / log1pf(fmaxf(count_max, 1.0f)));
+    return ramp(logf(DEVIATION_MOST / rgb_mean(value)) / logf(DEVIATION_MOST / DEVIATION_LEAST));
 }
 
 typedef rgb texel_value(const void *user, size_t texel);
@@ -186,7 +187,6 @@ static void shrink(const struct inverse_uv *inverse, texel_value *value, texel_l
 struct preview {
     const struct export_input *input;
     enum picture_kind kind;
-    float count_max; /* of confidence */
 };
 
 static rgb preview_value(const void *user, size_t texel) {
@@ -196,15 +196,12 @@ static rgb preview_value(const void *user, size_t texel) {
 
 static rgb preview_look(const void *user, rgb mean) {
     const struct preview *p = user;
-    return show(p->kind, mean, p->count_max);
+    return show(p->kind, mean);
 }
 
 void picture_preview(const struct export_input *input, enum picture_kind kind, struct image *image) {
     const struct inverse_uv *inverse = input->inverse;
-    struct preview p = {input, kind, 0.0f};
-    if (kind == PICTURE_CONFIDENCE)
-        for (size_t i = 0; i < inverse->valid_count; i++)
-            p.count_max = fmaxf(p.count_max, input->confidence_count[inverse->valid[i]]);
+    struct preview p = {input, kind};
     shrink(inverse, preview_value, preview_look, &p, image);
 }
 

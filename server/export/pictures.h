@@ -13,7 +13,7 @@ enum picture_kind {
     PICTURE_EMISSION,   /* R G B radiance */
     PICTURE_ROUGHNESS,  /* Y in [0, 1] */
     PICTURE_SPECULAR,   /* Y in [0, 1] */
-    PICTURE_CONFIDENCE  /* count, spread */
+    PICTURE_CONFIDENCE  /* R G B: standard deviation of base colour */
 };
 
 /* Source texel of each texel: itself if valid, the (approximately) nearest valid one within EXPORT_MARGIN texels, or
@@ -25,8 +25,8 @@ void picture_texture(const struct export_input *input, enum picture_kind kind, c
                      struct image *image);
 
 /* At most EXPORT_PREVIEW_SIZE texels a side, mean over valid texels, R G B for image_write_png with scale 1: base
- * colour unchanged, roughness and specular as grey, emission compressed by 1 / (1 + maximum), confidence from dark
- * blue (few observations) to yellow (many), red where a surface was never observed. */
+ * colour unchanged, roughness and specular as grey, emission compressed by 1 / (1 + maximum), confidence from
+ * yellow (a deviation of .01 and less) to dark blue (of .2 and more). */
 void picture_preview(const struct export_input *input, enum picture_kind kind, struct image *image);
 
 /* The measured light, as large as the others, its median at mid grey. It must be there. */

@@ -2,6 +2,7 @@
 #include "server/export/report_curve.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "common/mem.h"
 #include "server/export/html.h"
@@ -29,9 +30,9 @@ static struct curve_point *read_series(const cJSON *series, size_t *count) {
 #define LEFT 56
 #define RIGHT 8
 #define TOP 8
-#define BOTTOM 22
+#define BOTTOM 36 /* with the title of the axis */
 #define WIDTH 480
-#define HEIGHT 200
+#define HEIGHT 214
 
 /* The y axis is logarithmic if all values are positive and span a factor of 8. */
 struct curve {
@@ -68,7 +69,24 @@ static void put_axes(struct buf *out, const struct curve *c) {
     buf_printf(out,
                "<text x=\"%d\" y=\"%d\">%.4g</text>"
                "<text x=\"%d\" y=\"%d\" text-anchor=\"end\">%.4g</text>",
-               LEFT, HEIGHT - 6, c->point[0].step, WIDTH - RIGHT, HEIGHT - 6, c->point[c->count - 1].step);
+               LEFT, HEIGHT - 20, c->point[0].step, WIDTH - RIGHT, HEIGHT - 20, c->point[c->count - 1].step);
+}
+
+/* What the values of a series are, and their unit; "" of one that is not known here. */
+static const char *value_title(const char *name) {
+    static const char *const titles[][2] = {
+        {"loss", "squared relative error, 1"}, {"msre", "squared relative error, 1"}, {"rays", "rays of this attempt"}};
+    for (size_t i = 0; i < sizeof titles / sizeof *titles; i++)
+        if (strcmp(titles[i][0], name) == 0)
+            return titles[i][1];
+    return "";
+}
+
+static void put_titles(struct buf *out, const struct curve *c, const char *name) {
+    buf_printf(out, "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">steps of the optimiser</text>",
+               (LEFT + WIDTH - RIGHT) / 2, HEIGHT - 4);
+    buf_printf(out, "<text x=\"%d\" y=\"%d\">%s%s</text>", LEFT + 6, TOP + 12, value_title(name),
+               c->logarithmic ? ", logarithmic" : "");
 }
 
 static void put_path(struct buf *out, const struct curve *c) {
@@ -89,6 +107,10 @@ static void put_path(struct buf *out, const struct curve *c) {
 void report_curve(struct buf *out, const char *name, const cJSON *series) {
     struct curve c;
     curve_init(&c, series);
+    if (!c.count) { /* an empty card says nothing */
+        mem_free(c.point);
+        return;
+    }
     buf_puts(out, "<figure>");
     if (c.count >= 2 && c.steps > 0.0) {
         buf_printf(out, "<svg viewBox=\"0 0 %d %d\" role=\"img\" aria-label=\"", WIDTH, HEIGHT);
@@ -96,19 +118,15 @@ void report_curve(struct buf *out, const char *name, const cJSON *series) {
         buf_printf(out, ", from %.3g at step %.4g to %.3g at step %.4g\">", c.point[0].value, c.point[0].step,
                    c.point[c.count - 1].value, c.point[c.count - 1].step);
         put_axes(out, &c);
+        put_titles(out, &c, name);
         put_path(out, &c);
         buf_puts(out, "</svg>");
     }
     buf_puts(out, "<figcaption>");
     html_key(out, name);
     buf_puts(out, "<span>");
-    if (c.count) {
-        buf_puts(out, "last: ");
-        html_number(out, c.point[c.count - 1].value);
-        buf_puts(out, c.logarithmic ? ", logarithmic scale" : "");
-    } else {
-        buf_puts(out, "no value was reported");
-    }
+    buf_puts(out, "last: ");
+    html_number(out, c.point[c.count - 1].value);
     buf_puts(out, "</span></figcaption></figure>");
     mem_free(c.point);
 }

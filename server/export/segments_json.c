@@ -12,7 +12,7 @@ static void average_segments(const struct export_input *in, double (*color)[3], 
     double(*seen_color)[3] = mem_calloc(in->segments->count, sizeof *seen_color);
     for (size_t i = 0; i < in->inverse->valid_count; i++) {
         uint32_t texel = in->inverse->valid[i], s = in->segments->of_triangle[in->inverse->triangle[texel]];
-        bool shown = in->confidence_count && in->confidence_count[texel] > 0.0f;
+        bool shown = in->observation_count && in->observation_count[texel] > 0.0f;
         texels[s]++;
         seen[s] += shown;
         for (int c = 0; c < 3; c++) {

@@ -19,6 +19,8 @@
 #define COARSE_WINDOW 24 /* the same radius on the coarse scales, samples of the grid; +25 %: no change */
 #define COARSE_STEP ((1 << FINE_LEVELS) / GRID) /* samples: step of the first coarse level */
 
+enum { SMOOTH_ERROR = 3, SMOOTH };
+
 struct box {
     long x0, y0, x1, y1; /* [x0, x1) x [y0, y1), texels of the atlas */
 };
@@ -28,7 +30,7 @@ struct layer {
     struct box box;              /* a whole number of grid steps, one more than the chart covers; empty: not wanted */
     size_t width, height;        /* of the grid */
     float *plane[WIENER_PLANES]; /* [height][width] low-pass of the fine scales; owned */
-    float (*smooth)[3];          /* [height][width] the same, denoised; owned */
+    float (*smooth)[SMOOTH];     /* [height][width] the same, denoised, and its squared error over channels; owned */
 };
 
 /* A part of a chart. */
@@ -43,6 +45,8 @@ struct denoise_job {
     const struct measured *measured;
     const struct color_prior *prior;
     struct texture *out;
+    uint32_t stride;
+    uint16_t *deviation; /* NULL: not wanted; meanwhile squared errors of the fine scales */
     struct layer *layer; /* [chart_count] */
     struct item *item;
     struct wiener *tile; /* [threads] */
@@ -77,6 +81,7 @@ static void tile_read(struct wiener *t, const struct denoise_job *job, const str
                 t->plane[p][at] = m.weight * plane[p];
             for (int c = 0; c < 3; c++)
                 t->kept[c][at] = 0.0f;
+            t->error[at] = 0.0f;
         }
     }
 }
@@ -89,6 +94,9 @@ static void tile_write(const struct wiener *t, const struct denoise_job *job, co
             size_t at = (size_t)(y - item->around.y0) * t->width + (size_t)(x - item->around.x0);
             for (int c = 0; c < 3 && t->inside[at]; c++)
                 job->out->texel[(size_t)y * job->inverse->width + (size_t)x][c] = t->kept[c][at];
+            if (t->inside[at] && job->deviation)
+                job->deviation[(size_t)y * job->inverse->width + (size_t)x] =
+                    image_half_from_float(sqrtf(t->error[at]));
             long i = x - layer->box.x0, j = y - layer->box.y0;
             if (i % GRID != 0 || j % GRID != 0)
                 continue;
@@ -102,7 +110,7 @@ static void filter_fine(void *user, size_t index, int thread) {
     const struct denoise_job *job = user;
     struct wiener *t = &job->tile[thread];
     tile_read(t, job, &job->item[index]);
-    wiener_levels(t, 1, FINE_LEVELS, FINE_WINDOW);
+    wiener_levels(t, 1, FINE_LEVELS, FINE_WINDOW, job->stride);
     tile_write(t, job, &job->item[index]);
 }
 
@@ -133,14 +141,18 @@ static int coarse_levels(const struct layer *l) {
 
 /* Sum of the scales kept and of the final low-pass, which is shrunk to the prior by the variance from light of other
  * surfaces. */
-static void add_mean(float smooth[3], const struct wiener *w, size_t at, const struct color_prior *prior) {
+static void add_mean(float smooth[SMOOTH], const struct wiener *w, size_t at, const struct color_prior *prior) {
     const float mean[3] = {prior->mean.r, prior->mean.g, prior->mean.b};
     float weight = w->plane[WIENER_WEIGHT][at];
     float known = weight > 0.0f ? prior->variance / (prior->variance + w->plane[WIENER_MIXING][at] / weight) : 0.0f;
+    float error = w->error[at] + (1.0f - known) * prior->variance; /* known of mixing is the same */
     for (int c = 0; c < 3; c++) {
         float measured = known > 0.0f ? w->plane[WIENER_VALUE + c][at] / weight : mean[c];
         smooth[c] = w->kept[c][at] + mean[c] + known * (measured - mean[c]);
+        float noise = known > 0.0f ? known * w->plane[WIENER_NOISE + c][at] / weight : 0.0f;
+        error += noise * noise;
     }
+    smooth[SMOOTH_ERROR] = error;
 }
 
 static void filter_coarse(void *user, size_t chart, int thread) {
@@ -158,9 +170,10 @@ static void filter_coarse(void *user, size_t chart, int thread) {
         memcpy(w.plane[p], l->plane[p], samples * sizeof *w.plane[p]);
     for (int c = 0; c < 3; c++)
         memset(w.kept[c], 0, samples * sizeof *w.kept[c]);
+    memset(w.error, 0, samples * sizeof *w.error);
     for (size_t i = 0; i < samples; i++)
         w.inside[i] = true;
-    wiener_levels(&w, COARSE_STEP, coarse_levels(l), COARSE_WINDOW);
+    wiener_levels(&w, COARSE_STEP, coarse_levels(l), COARSE_WINDOW, 0);
     for (size_t i = 0; i < samples; i++)
         add_mean(l->smooth[i], &w, i, &job->prior[chart]);
     wiener_release(&w);
@@ -170,9 +183,19 @@ static void filter_coarse(void *user, size_t chart, int thread) {
 static float smooth_at(const struct layer *l, long x, long y, int channel) {
     long i = (x - l->box.x0) / GRID, j = (y - l->box.y0) / GRID;
     float tx = (float)((x - l->box.x0) % GRID) / GRID, ty = (float)((y - l->box.y0) % GRID) / GRID;
-    const float(*at)[3] = l->smooth + (size_t)j * l->width + i, (*below)[3] = at + l->width;
+    const float(*at)[SMOOTH] = l->smooth + (size_t)j * l->width + i, (*below)[SMOOTH] = at + l->width;
     return (1.0f - ty) * ((1.0f - tx) * at[0][channel] + tx * at[1][channel]) +
            ty * ((1.0f - tx) * below[0][channel] + tx * below[1][channel]);
+}
+
+/* The standard deviation of a texel, over channels. Detail of one that was not measured is that of its chart. */
+static void add_error(const struct denoise_job *job, const struct item *item, long x, long y) {
+    size_t texel = (size_t)y * job->inverse->width + (size_t)x;
+    float fine = image_float_from_half(job->deviation[texel]);
+    float variance = fine * fine + smooth_at(&job->layer[item->chart], x, y, SMOOTH_ERROR);
+    if (!(job->measured[texel].weight > 0.0f))
+        variance = fmaxf(variance, job->prior[item->chart].variance);
+    job->deviation[texel] = image_half_from_float(sqrtf(variance / 3.0f));
 }
 
 static void add_coarse(void *user, size_t index, int thread) {
@@ -187,6 +210,8 @@ static void add_coarse(void *user, size_t index, int thread) {
             float *texel = job->out->texel[(size_t)y * job->inverse->width + (size_t)x];
             for (int c = 0; c < 3; c++)
                 texel[c] = clampf(texel[c] + smooth_at(layer, x, y, c), 0.0f, 1.0f);
+            if (job->deviation)
+                add_error(job, item, x, y);
         }
     }
 }
@@ -252,8 +277,14 @@ static size_t list_items(const struct denoise_job *job, struct item *item) {
 
 void denoise(const struct atlas *atlas, const struct inverse_uv *inverse, size_t triangle_count,
              const struct measured *measured, const struct color_prior *prior, const bool *wanted, struct texture *out,
-             struct parallel *pool) {
-    struct denoise_job job = {.atlas = atlas, .inverse = inverse, .measured = measured, .prior = prior, .out = out};
+             uint32_t stride, uint16_t *deviation, struct parallel *pool) {
+    struct denoise_job job = {.atlas = atlas,
+                              .inverse = inverse,
+                              .measured = measured,
+                              .prior = prior,
+                              .out = out,
+                              .stride = stride,
+                              .deviation = deviation};
     const size_t threads = (size_t)parallel_thread_count(pool);
     const size_t side = TILE + 2 * wiener_reach(1, FINE_LEVELS, FINE_WINDOW);
     make_layers(&job, triangle_count, wanted);

@@ -314,6 +314,11 @@ static void keep_measured(struct divide *d, const struct color_prior *prior) {
         to[0] = clampf(value.r, 0.0f, 1.0f);
         to[1] = clampf(value.g, 0.0f, 1.0f);
         to[2] = clampf(value.b, 0.0f, 1.0f);
+        rgb noise = rgb_from_half(m->noise);
+        float variance = m->weight > 0.0f ? rgb_dot(noise, noise) + image_float_from_half(m->mixing)
+                                          : prior[surface_chart(&d->surface, texel)].variance;
+        if (d->materials->deviation)
+            d->materials->deviation[texel] = image_half_from_float(sqrtf(variance / 3.0f));
     }
 }
 
@@ -324,7 +329,7 @@ void divide_finish(struct divide *d) {
     struct color_prior *prior = color_priors(s, d->is_emitter, d->measured);
     if (d->denoises)
         denoise(s->atlas, s->inverse, s->mesh->triangle_count, d->measured, prior, NULL, &d->materials->base_color,
-                d->pool);
+                d->stride, d->materials->deviation, d->pool);
     else
         keep_measured(d, prior);
     mem_free(prior);

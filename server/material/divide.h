@@ -32,7 +32,7 @@ struct divide {
     const struct sun *sun;
     const struct accel *accel;   /* for shadows of the sun */
     const bool *is_emitter;      /* [segment_count] */
-    struct materials *materials; /* base_color is written, roughness and specular are read */
+    struct materials *materials; /* base_color and deviation are written, roughness and specular are read */
     struct parallel *pool;
     bool denoises;             /* else base colour is as measured */
     size_t highlight_samples;  /* directions of one highlight (divide_highlight_samples) */
@@ -58,7 +58,7 @@ bool divide_lambert(const struct divide *d, uint32_t texel, rgb *lambert);
 /* The same for all measured texels, [height][width]; 0 where it is too dark to divide by. */
 void divide_lambert_all(const struct divide *d, uint16_t (*lambert)[3]);
 
-/* After all texels: writes materials->base_color. */
+/* After all texels: writes materials->base_color, and its deviation where there is room for that. */
 void divide_finish(struct divide *d);
 
 /* --- for divide_outgoing.h --- */

@@ -272,7 +272,7 @@ void emission_pattern_find(const struct emission_pattern_input *in, struct mater
         mark_charts(e);
     }
     denoise(surface->atlas, surface->inverse, surface->mesh->triangle_count, f.measured, f.prior, f.has_emitter,
-            &f.denoised, in->pool);
+            &f.denoised, 1, NULL, in->pool);
     for (size_t i = 0; i < f.emitter_count; i++) {
         if (f.emitter[i].is_measured)
             set_pattern(&f.emitter[i]);

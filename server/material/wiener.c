@@ -10,6 +10,11 @@
 #define WINDOW_STEPS 5 /* to 6: 0 dB */
 /* Factor on the noise power: noise of rare, far outliers locally exceeds that of its sample. */
 #define NOISE_SAFETY 2.0f /* +25 %: -0.03 dB */
+/* Squared error beside an edge over the mean power of its details in 3 x 3 steps, of levels finer than what was
+ * resolved: an ideal step of height 1 has .07 of the latter; a place that is off by half a sample has it wrong by .25 in
+ * the mean. Of the finest level that was resolved half of that. 1 in place of .6: 77 in place of 74 % of the errors of the demo
+ * room (256 texels, all measured) are within one deviation. */
+#define UNRESOLVED 0.6f
 /* Clipped power over noise power from which samples above POWER_BOUND count as texture, not as outliers. */
 #define TEXTURE_CERTAIN 2.0f /* +25 %: -0.02 dB */
 /* Clip of a sample's power, in variances of its noise: 3 standard deviations. */
@@ -23,7 +28,8 @@ void wiener_init(struct wiener *w, size_t samples) {
     }
     for (int c = 0; c < 3; c++)
         w->kept[c] = mem_array(samples, sizeof(float));
-    float **plane[] = {&w->power, &w->bounded_power, &w->noise_power, &w->weight_sum, &w->count, &w->scratch};
+    float **plane[] = {&w->error,      &w->power, &w->bounded_power, &w->noise_power,
+                       &w->weight_sum, &w->count, &w->scratch};
     for (size_t i = 0; i < sizeof plane / sizeof *plane; i++)
         *plane[i] = mem_array(samples, sizeof(float));
 }
@@ -36,7 +42,7 @@ void wiener_release(struct wiener *w) {
     }
     for (int c = 0; c < 3; c++)
         mem_free(w->kept[c]);
-    float *plane[] = {w->power, w->bounded_power, w->noise_power, w->weight_sum, w->count, w->scratch};
+    float *plane[] = {w->error, w->power, w->bounded_power, w->noise_power, w->weight_sum, w->count, w->scratch};
     for (size_t i = 0; i < sizeof plane / sizeof *plane; i++)
         mem_free(plane[i]);
     *w = (struct wiener){0};
@@ -160,7 +166,8 @@ static float texture_power(const struct wiener *w, size_t at) {
     return fmaxf(power - NOISE_SAFETY * noise, 0.0f) / w->weight_sum[at];
 }
 
-/* Adds this level's detail by its share of texture. */
+/* Adds this level's detail by its share of texture. Of noise the same share is kept and of
+ * texture the rest is lost, which makes keep^2 noise + (1 - keep)^2 texture = keep noise. */
 static void keep_texture(struct wiener *w) {
     size_t samples = w->width * w->height;
     for (size_t at = 0; at < samples; at++) {
@@ -169,12 +176,29 @@ static void keep_texture(struct wiener *w) {
         float texture = texture_power(w, at);
         float noise = noise_variance(w, at) + w->plane[WIENER_MIXING][at] / w->plane[WIENER_WEIGHT][at];
         float keep = texture > 0.0f ? texture / (texture + noise) : 0.0f;
+        w->error[at] += keep * noise;
         for (int c = 0; c < 3; c++)
             w->kept[c][at] += keep * detail(w, WIENER_VALUE + c, at);
     }
 }
 
-static void take_level(struct wiener *w, size_t step, size_t radius) {
+/* Adds the error of detail that is too fine to be resolved: where the finest that is resolved has edges. */
+static void add_unresolved(struct wiener *w, size_t step, float part) {
+    size_t samples = w->width * w->height;
+    for (size_t at = 0; at < samples; at++) {
+        bool is_there = counts(w, at);
+        float power = is_there ? detail_power(w, WIENER_VALUE, at) - NOISE_SAFETY * noise_variance(w, at) : 0.0f;
+        w->power[at] = fmaxf(power, 0.0f);
+        w->bounded_power[at] = is_there ? 1.0f : 0.0f;
+    }
+    window_sums(w->power, w->scratch, w->width, w->height, step);
+    window_sums(w->bounded_power, w->scratch, w->width, w->height, step);
+    for (size_t at = 0; at < samples; at++)
+        if (counts(w, at))
+            w->error[at] += part * UNRESOLVED * w->power[at] / w->bounded_power[at];
+}
+
+static void take_level(struct wiener *w, size_t step, size_t radius, size_t resolution) {
     for (int p = 0; p < WIENER_PLANES; p++) {
         spline_rows(w->scratch, w->plane[p], w->width, w->height, step);
         spline_columns(w->coarse[p], w->scratch, w->width, w->height, step);
@@ -182,6 +206,8 @@ static void take_level(struct wiener *w, size_t step, size_t radius) {
     measure_noise(w, radius);
     measure_power(w, radius);
     keep_texture(w);
+    if (step <= resolution)
+        add_unresolved(w, step, step == resolution ? 0.5f : 1.0f);
     for (int p = 0; p < WIENER_PLANES; p++) {
         float *was = w->plane[p];
         w->plane[p] = w->coarse[p];
@@ -193,9 +219,9 @@ static size_t radius_of(size_t step, size_t max_window) {
     return WINDOW_STEPS * step < max_window ? WINDOW_STEPS * step : max_window;
 }
 
-void wiener_levels(struct wiener *w, size_t step, int levels, size_t max_window) {
+void wiener_levels(struct wiener *w, size_t step, int levels, size_t max_window, size_t resolution) {
     for (int level = 0; level < levels; level++, step *= 2)
-        take_level(w, step, radius_of(step, max_window));
+        take_level(w, step, radius_of(step, max_window), resolution);
 }
 
 size_t wiener_reach(size_t step, int levels, size_t max_window) {

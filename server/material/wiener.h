@@ -22,6 +22,7 @@ struct wiener {
     bool *inside;                 /* samples that count; only these are filtered */
     float *plane[WIENER_PLANES];  /* the picture; after each level its low-pass */
     float *kept[3];               /* by channel: sum of the filtered details so far */
+    float *error;                 /* expected squared error of these, summed over channels and levels */
     float *coarse[WIENER_PLANES]; /* scratch, as all below */
     float *power, *bounded_power, *noise_power, *weight_sum, *count;
     float *scratch;
@@ -32,8 +33,9 @@ void wiener_init(struct wiener *w, size_t samples);
 void wiener_release(struct wiener *w);
 
 /* Filters `levels` levels, the first with a step of `step` samples, each with twice the step of the one before, and
- * adds their texture to `kept`. The radius of the power window is at most max_window samples. */
-void wiener_levels(struct wiener *w, size_t step, int levels, size_t max_window);
+ * adds their texture to `kept` and what that is off to `error`. The radius of the power window is at most max_window samples. Nothing finer than
+ * `resolution` samples was resolved. */
+void wiener_levels(struct wiener *w, size_t step, int levels, size_t max_window, size_t resolution);
 
 /* Radius of the samples that such a call reads. */
 size_t wiener_reach(size_t step, int levels, size_t max_window);

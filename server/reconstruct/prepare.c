@@ -108,6 +108,7 @@ static enum status map_surface(struct reconstruction *r, const float *density, s
     inverse_uv_make(&r->inverse, &r->atlas, mesh->triangle_count, r->pool);
     materials_init(&r->materials, &r->inverse, r->segments.count, rgb_gray(NEUTRAL_BASE_COLOR), NEUTRAL_ROUGHNESS,
                    NEUTRAL_SPECULAR);
+    materials_start_deviation(&r->materials);
     r->is_emitter = mem_calloc(r->segments.count, sizeof *r->is_emitter);
     r->evidence = mem_calloc(r->segments.count, sizeof *r->evidence);
     return world_init(&r->world, mesh, &r->segments, &r->atlas, &r->materials, NULL, r->pool, err);

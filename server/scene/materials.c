@@ -1,8 +1,14 @@
 /* materials.c -- see materials.h. */
 #include "server/scene/materials.h"
 
+#include <math.h>
+
+#include "common/image.h"
 #include "common/mem.h"
 
+/* Relative error of base colour that photographs do not tell: of the light that surfaces get (what gathered rays found
+ * between and behind things, lamps' outlines), of lobes that the model lacks. */
+#define MODEL_DEVIATION 0.01f
 #define MAX_POLISHED_ROUGHNESS 0.5f /* roughness, at most */
 
 void materials_init(struct materials *m, const struct inverse_uv *inverse, size_t segment_count, rgb base_color,
@@ -10,6 +16,7 @@ void materials_init(struct materials *m, const struct inverse_uv *inverse, size_
     texture_init(&m->base_color, inverse, base_color);
     m->segment_count = segment_count;
     m->emission_pattern = NULL;
+    m->deviation = NULL;
     m->cone = NULL;
     m->roughness = mem_array(segment_count, sizeof *m->roughness);
     m->specular = mem_array(segment_count, sizeof *m->specular);
@@ -26,8 +33,22 @@ void materials_release(struct materials *m) {
     mem_free(m->specular);
     mem_free(m->emission);
     mem_free(m->cone);
+    mem_free(m->deviation);
     materials_drop_emission_pattern(m);
     *m = (struct materials){0};
+}
+
+void materials_start_deviation(struct materials *m) {
+    mem_free(m->deviation);
+    m->deviation = mem_calloc((size_t)m->base_color.width * m->base_color.height, sizeof *m->deviation);
+}
+
+rgb materials_deviation(const struct materials *m, size_t texel) {
+    float measured = m->deviation ? image_float_from_half(m->deviation[texel]) : 0.0f;
+    const float *c = m->base_color.texel[texel];
+    rgb model = rgb_scale(rgb_make(c[0], c[1], c[2]), MODEL_DEVIATION);
+    return measured > 0.0f ? rgb_make(hypotf(measured, model.r), hypotf(measured, model.g), hypotf(measured, model.b))
+                           : rgb_gray(0.0f);
 }
 
 bool materials_is_polished(const struct materials *m, uint32_t segment) {

@@ -29,6 +29,8 @@ struct materials {
                                  * emitter; owned */
     uint16_t (*emission_pattern)[3]; /* [height][width] half precision: emission of a texel over the mean of its
                                       * segment, positive; 0 where unknown, which reads as 1. NULL: none. Owned */
+    uint16_t *deviation; /* [height][width] half precision: standard deviation of base colour by measurement, over its
+                          * channels; 0: unknown. NULL: none. Owned */
     struct emission_cone *cone; /* [segment_count] of lamps that were added to a room; no derivative knows it. NULL:
                                       * none. Owned */
 };
@@ -39,6 +41,13 @@ void materials_release(struct materials *m);
 
 /* Whether a segment is close to a mirror. The specular lobe of rougher ones is so wide that photographs show it. */
 bool materials_is_polished(const struct materials *m, uint32_t segment);
+
+/* Allocates the deviations, all unknown. */
+void materials_start_deviation(struct materials *m);
+
+/* Standard deviation of a texel's base colour, by channel: that of its measurement and that of the model. Black where it
+ * is unknown. */
+rgb materials_deviation(const struct materials *m, size_t texel);
 
 /* Allocates a pattern of unknown texels, or frees it. Untouched pages of the former take no memory. */
 void materials_start_emission_pattern(struct materials *m);

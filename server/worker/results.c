@@ -15,8 +15,7 @@ struct export_input results_so_far(const struct reconstruction *r, const char *t
         .has_materials = r->has_materials,
         .radiance =
             r->radiance_preview ? (const uint16_t(*)[3])r->radiance_preview : (const uint16_t(*)[3])r->fused.radiance,
-        .confidence_count = r->fused.count,
-        .confidence_spread = r->fused.spread,
+        .observation_count = r->fused.count,
         .is_emitter = r->is_emitter,
         .environment = e->map.pixel ? &e->map : NULL,
         .environment_confidence = e->map.pixel ? &e->confidence : NULL,

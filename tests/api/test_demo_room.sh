@@ -31,6 +31,8 @@ try() {
     cat "$work/$name.json"
     at_least "$name: base-colour PSNR over seen surface" "$(jq "$base_color" "$work/$name.json")" "$psnr"
     at_most "$name: MSRE" "$(jq "$msre_of" "$work/$name.json")" "$msre"
+    at_least "$name: errors within one standard deviation" "$(jq .base_color_within_one_deviation "$work/$name.json")" 0.6
+    at_most "$name: errors within one standard deviation" "$(jq .base_color_within_one_deviation "$work/$name.json")" 0.75
     equal "$(jq "$found" "$work/$name.json")" 2 "$name: emitters found"
     equal "$(jq "$false_found" "$work/$name.json")" 0 "$name: emitters that are none"
     for file in base_color.exr roughness.exr specular.exr emission.exr confidence.exr base_color.png scene.ply \

@@ -61,6 +61,9 @@ measure() { # ROOM KIND
     read -r color roughness overlap log_error msre < <(goals "$name" "$2")
     row "base colour PSNR of seen surface, dB" "$(value base_color_psnr_db)" "$color" higher
     row "base colour PSNR of all surface, dB" "$(value base_color_psnr_all_db)" $((color - 3)) higher
+    row "errors within one standard deviation of confidence.exr" "$(value base_color_within_one_deviation)" - higher
+    row "spread of base colour on plain surface" "$(value plain_deviation)" - lower
+    row "plain pixels off their surroundings by more than .03, share" "$(value plain_specks)" - lower
     row "roughness PSNR, dB" "$(value roughness_psnr_db)" "$roughness" higher
     row "specular PSNR, dB" "$(value specular_psnr_db)" - higher
     row "emission, intersection over union" "$(value emission_iou)" "$overlap" higher

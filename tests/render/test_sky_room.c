@@ -39,7 +39,6 @@ static void write_outputs(const char *dir, const struct reconstruction *r) {
                               &r->inverse,
                               &r->materials,
                               r->fused.count,
-                              r->fused.spread,
                               r->is_emitter,
                               &r->environment.map,
                               &r->environment.confidence,

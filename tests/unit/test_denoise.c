@@ -21,6 +21,7 @@ static struct inverse_uv inverse = {.width = WIDTH, .height = HEIGHT, .triangle 
 static struct measured *measured;
 static struct color_prior prior[2];
 static struct texture out;
+static uint16_t deviation[TEXELS];
 static struct parallel *pool;
 
 static void make_surface(void) {
@@ -57,7 +58,7 @@ static void measure(void) {
 static void filter(void) {
     prior[0] = prior[1] = (struct color_prior){rgb_gray(0.5f), 0.05f};
     texture_init(&out, &inverse, rgb_gray(0.0f));
-    denoise(&atlas, &inverse, 2, measured, prior, NULL, &out, pool);
+    denoise(&atlas, &inverse, 2, measured, prior, NULL, &out, 1, deviation, pool);
 }
 
 /* Root mean square error over [x0, x1) x [y0, y1). */
@@ -71,12 +72,30 @@ static double error_of(uint32_t x0, uint32_t x1, uint32_t y0, uint32_t y1) {
     return sqrt(sum / ((x1 - x0) * (y1 - y0)));
 }
 
+/* The stated deviation is that of the error: its mean square over [x0, x1), and how many errors are within it.
+ * Above it, since here edges fall between texels, where no measurement is off. */
+static void check_deviation(uint32_t x0, uint32_t x1) {
+    double stated = 0.0, real = error_of(x0, x1, 0, HEIGHT);
+    size_t within = 0, count = 0;
+    for (uint32_t y = 0; y < HEIGHT; y++)
+        for (uint32_t x = x0; x < x1; x++, count++) {
+            double d = (double)image_float_from_half(deviation[y * WIDTH + x]);
+            stated += d * d;
+            within += fabs((double)(out.texel[y * WIDTH + x][1] - truth(x, y))) <= d;
+        }
+    stated = sqrt(stated / (double)count);
+    double share = (double)within / (double)count;
+    CHECK_THAT(stated > 0.7 * real && stated < 2.0 * real, "%.4f is stated, the error is %.4f", stated, real);
+    CHECK_THAT(share > 0.55 && share < 0.92, "%.2f of the errors are within one deviation", share);
+}
+
 static void test_noise_goes_and_texture_stays(void) {
     measure();
     filter();
     double plain = error_of(0, WIDTH / 2 - 1, 0, HEIGHT), stripes = error_of(WIDTH / 2 + 1, WIDTH, 0, HEIGHT);
     CHECK_THAT(plain < 0.15 * (double)DEVIATION, "%.4f is left of %.4f", plain, (double)DEVIATION);
     CHECK_THAT(stripes < 1.05 * (double)DEVIATION, "stripes are off by %.4f", stripes);
+    check_deviation(WIDTH / 2 + 1, WIDTH);
     texture_release(&out);
 }
 

@@ -141,10 +141,25 @@ static void export_room(const char *dir, const struct room *room) {
     float *zero = mem_calloc(texels, sizeof *zero);
     bool is_emitter[ROOM_OBJECT_COUNT] = {false};
     cJSON *report = cJSON_CreateObject();
-    struct export_input in = {"room", &room->mesh, &room->segments,    &room->atlas, &room->inverse, &room->materials,
-                              zero,   zero,        is_emitter,         NULL,         NULL,           0,
-                              NULL,   report,      {0.0f, 1.0f, 0.0f}, true,         NULL,           {0},
-                              0,      NULL};
+    struct export_input in = {"room",
+                              &room->mesh,
+                              &room->segments,
+                              &room->atlas,
+                              &room->inverse,
+                              &room->materials,
+                              zero,
+                              is_emitter,
+                              NULL,
+                              NULL,
+                              0,
+                              NULL,
+                              report,
+                              {0.0f, 1.0f, 0.0f},
+                              true,
+                              NULL,
+                              {0},
+                              0,
+                              NULL};
     enum status status = export_outputs(dir, &in, NULL, NULL, &err);
     CHECK_THAT(status == STATUS_OK, "%s", err.message);
     cJSON_Delete(report);

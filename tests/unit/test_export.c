@@ -54,7 +54,7 @@ static void test_headers(const char *dir) {
         {"base_color.exr", "seed", "7"},
         {"base_color.exr", "units", "reflectance"},
         {"emission.exr", "units", "radiance of which"},
-        {"confidence.exr", "units", "count: observations"},
+        {"confidence.exr", "units", "standard deviation of base_color"},
     };
     for (size_t i = 0; i < sizeof table / sizeof *table; i++) {
         struct error err;
@@ -80,14 +80,15 @@ static void test_textures(const char *dir, const struct export_input *in) {
     read_back(dir, "emission.exr", &emission);
     read_back(dir, "confidence.exr", &confidence);
     CHECK(color.width == in->atlas->width && color.height == in->atlas->height);
-    CHECK_STRING(confidence.channel[0], "count");
+    CHECK_STRING(confidence.channel[0], "R");
+    CHECK(confidence.channel_count == 3);
     size_t margin = 0;
     for (size_t i = 0; i < (size_t)color.width * color.height; i++) {
         uint32_t triangle = in->inverse->triangle[i];
         bool filled = color.pixel[3 * i] != 0.0f;
         if (triangle == INVERSE_UV_NONE) {
             margin += filled;
-            CHECK(confidence.pixel[2 * i] == 0.0f);
+            CHECK(confidence.pixel[3 * i] == 0.0f);
             continue;
         }
         uint32_t s = in->segments->of_triangle[triangle];
@@ -95,7 +96,8 @@ static void test_textures(const char *dir, const struct export_input *in) {
         CHECK_NEAR(color.pixel[3 * i + 1], wanted, 1e-3f * wanted);
         CHECK_NEAR(roughness.pixel[3 * i], in->materials->roughness[s], 1e-3);
         CHECK_NEAR(emission.pixel[3 * i + 2], in->materials->emission[s].b, 1e-3f * in->materials->emission[s].b);
-        CHECK(confidence.pixel[2 * i] == in->confidence_count[i]);
+        CHECK(confidence.pixel[3 * i + 1] == materials_deviation(in->materials, i).g &&
+              confidence.pixel[3 * i + 1] > 0.0f);
     }
     CHECK_THAT(margin > in->inverse->valid_count / 20, "%zu texels of margin", margin);
     image_release(&color);
@@ -220,7 +222,7 @@ static void test_means(const cJSON *segments, const struct export_input *in) {
     double sum = 0.0, count = 0.0;
     for (size_t i = 0; i < in->inverse->valid_count; i++) {
         uint32_t texel = in->inverse->valid[i];
-        if (in->segments->of_triangle[in->inverse->triangle[texel]] != 0 || !(in->confidence_count[texel] > 0.0f))
+        if (in->segments->of_triangle[in->inverse->triangle[texel]] != 0 || !(in->observation_count[texel] > 0.0f))
             continue;
         sum += (double)in->materials->base_color.texel[texel][1];
         count += 1.0;
@@ -372,8 +374,7 @@ static void test_left_out(const char *dir, struct parallel *pool) {
                               .atlas = &atlas,
                               .inverse = &inverse,
                               .materials = &materials,
-                              .confidence_count = zero,
-                              .confidence_spread = zero,
+                              .observation_count = zero,
                               .is_emitter = is_emitter,
                               .report = report};
     CHECK_THAT(export_outputs(dir, &in, hear, &heard, &err) == STATUS_OK, "%s", err.message);
@@ -409,9 +410,9 @@ int main(void) {
     CHECK(room_init(&room, &(struct room_look){256, 15.0f, 15.0f, false}, pool, &err) == STATUS_OK);
     memcpy(room.mesh.offset, (double[3]){500000.0, -4100000.0, 0.0}, sizeof room.mesh.offset);
     size_t texels = (size_t)room.atlas.width * room.atlas.height;
-    float *count = mem_calloc(texels, sizeof *count), *spread = mem_calloc(texels, sizeof *spread);
+    float *count = mem_calloc(texels, sizeof *count);
     for (size_t i = 0; i < texels; i++)
-        count[i] = (float)(i % 9), spread[i] = 0.1f;
+        count[i] = (float)(i % 9);
     for (size_t i = 0; i < room.inverse.valid_count; i++) /* what no photograph shows is filled in white */
         for (int c = 0; c < 3 && count[room.inverse.valid[i]] == 0.0f; c++)
             room.materials.base_color.texel[room.inverse.valid[i]][c] = 1.0f;
@@ -441,7 +442,6 @@ int main(void) {
                               &room.inverse,
                               &room.materials,
                               NULL,
-                              NULL,
                               is_emitter,
                               NULL,
                               NULL,
@@ -460,7 +460,12 @@ int main(void) {
     CHECK(heard.previews == 5 && heard.outputs == 0); /* with the mesh, no confidence yet */
     heard = (struct announced){.dir = dir};
     CHECK(export_preview(dir, &in, hear, &heard, &err) == STATUS_OK && heard.previews == 4); /* the mesh is there */
-    in.confidence_count = count, in.confidence_spread = spread;
+    in.observation_count = count;
+    materials_start_deviation(&room.materials);
+    CHECK(export_preview(dir, &in, hear, &heard, &err) == STATUS_OK &&
+          heard.previews == 8); /* nothing is known of it */
+    for (size_t i = 0; i < texels; i++)
+        room.materials.deviation[i] = image_half_from_float(0.1f);
     heard = (struct announced){.dir = dir};
     enum status status = export_outputs(dir, &in, hear, &heard, &err);
     CHECK_THAT(status == STATUS_OK, "%s", err.message);
@@ -479,7 +484,6 @@ int main(void) {
     cJSON_Delete(report);
     image_release(&photograph);
     mem_free(count);
-    mem_free(spread);
     room_release(&room);
     CHECK(file_remove_tree(dir, NULL) == STATUS_OK);
     parallel_free(pool);

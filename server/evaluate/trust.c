@@ -1,0 +1,87 @@
+/* trust.c -- see trust.h. */
+#include "server/evaluate/trust.h"
+
+#include <math.h>
+#include <stdbool.h>
+
+#include "common/vec.h"
+#include "server/evaluate/pair_picture.h"
+#include "server/evaluate/score.h"
+
+#define RADIUS 2          /* pixels, of the 5 x 5 window: specks are of 1 to 3 */
+#define SAME_COLOR 0.002f /* base colours of the truth that differ less are one */
+#define WINDOW ((2 * RADIUS + 1) * (2 * RADIUS + 1))
+
+static const float *pixel_at(const struct image *image, uint32_t x, uint32_t y) {
+    return image->pixel + ((size_t)y * image->width + x) * image->channel_count;
+}
+
+static void judge(struct trust *trust, const float *found, const float *truth, const float *deviation,
+                  struct rgb_columns fc, struct rgb_columns tc, struct rgb_columns dc) {
+    for (int c = 0; c < 3; c++) {
+        float sigma = deviation[dc.at[c]];
+        float off = fabsf(clampf(found[fc.at[c]], 0.0f, 1.0f) - clampf(truth[tc.at[c]], 0.0f, 1.0f));
+        trust->judged++;
+        trust->within_one += off <= sigma;
+        trust->within_two += off <= 2.0f * sigma;
+    }
+}
+
+/* Whether the window shows one surface of the truth, seen in all its pixels; *mean is then found's over it. */
+static bool is_plain(const struct image *found, const struct image *truth, const uint8_t *flags, uint32_t x, uint32_t y,
+                     double mean[3]) {
+    struct rgb_columns tc = pair_picture_columns(truth, "base_color."), fc = pair_picture_columns(found, "base_color.");
+    int object = image_channel(truth, "object_id");
+    const float *centre = pixel_at(truth, x, y);
+    mean[0] = mean[1] = mean[2] = 0.0;
+    for (uint32_t j = y - RADIUS; j <= y + RADIUS; j++) {
+        for (uint32_t i = x - RADIUS; i <= x + RADIUS; i++) {
+            const float *t = pixel_at(truth, i, j), *f = pixel_at(found, i, j);
+            if (!(flags[(size_t)j * truth->width + i] & SCORE_SEEN) || t[object] != centre[object])
+                return false;
+            for (int c = 0; c < 3; c++) {
+                if (fabsf(t[tc.at[c]] - centre[tc.at[c]]) > SAME_COLOR)
+                    return false;
+                mean[c] += (double)f[fc.at[c]] / WINDOW;
+            }
+        }
+    }
+    return true;
+}
+
+static void add_plain(struct trust *trust, const struct image *found, const struct image *truth, const uint8_t *flags,
+                      uint32_t x, uint32_t y) {
+    double mean[3], most = 0.0;
+    struct rgb_columns fc = pair_picture_columns(found, "base_color.");
+    if (x < RADIUS || y < RADIUS || x + RADIUS >= truth->width || y + RADIUS >= truth->height ||
+        !is_plain(found, truth, flags, x, y, mean))
+        return;
+    for (int c = 0; c < 3; c++) {
+        double off = (double)pixel_at(found, x, y)[fc.at[c]] - mean[c];
+        trust->plain_squares += off * off;
+        most = fmax(most, fabs(off));
+    }
+    trust->plain_pixels++;
+    trust->specks += most > (double)TRUST_SPECK;
+}
+
+void trust_add(struct trust *trust, const struct image *found, const struct image *deviation, const struct image *truth,
+               const uint8_t *flags) {
+    struct rgb_columns fc = pair_picture_columns(found, "base_color."), tc = pair_picture_columns(truth, "base_color.");
+    for (uint32_t y = 0; y < truth->height; y++) {
+        for (uint32_t x = 0; x < truth->width; x++) {
+            if (!(flags[(size_t)y * truth->width + x] & SCORE_SEEN))
+                continue;
+            if (deviation)
+                judge(trust, pixel_at(found, x, y), pixel_at(truth, x, y), pixel_at(deviation, x, y), fc, tc,
+                      pair_picture_columns(deviation, "base_color."));
+            add_plain(trust, found, truth, flags, x, y);
+        }
+    }
+}
+
+double trust_share(size_t part, size_t whole) { return whole ? (double)part / (double)whole : (double)NAN; }
+
+double trust_plain_deviation(const struct trust *trust) {
+    return trust->plain_pixels ? sqrt(trust->plain_squares / (3.0 * (double)trust->plain_pixels)) : (double)NAN;
+}
