@@ -94,7 +94,8 @@ static enum status parse_coordinates(const cJSON *value, char **name, struct err
             *name = mem_strdup(text);
             return STATUS_OK;
         }
-    return error_set(err, STATUS_INPUT, "coordinates must be \"file\", \"capture\", \"chunk\", \"local\" or \"projected\"");
+    return error_set(err, STATUS_INPUT,
+                     "coordinates must be \"file\", \"capture\", \"chunk\", \"local\" or \"projected\"");
 }
 
 /* "told" or "ignored". */

@@ -108,7 +108,8 @@ static struct response *check_states(struct job_submission *s) {
     }
     if (s->scene.state == SCENE_READY && !work_file_has_truth(s->api->config.data_dir, s->scene.id)) {
         error_set(&err, STATUS_CONFLICT, "scene %.12s has no truth to compare with", s->scene.id);
-        error_hint(&err, "Such a scene has truth/objects.json beside its photographs, as `unbaked demo-room` writes it.");
+        error_hint(&err,
+                   "Such a scene has truth/objects.json beside its photographs, as `unbaked demo-room` writes it.");
         return problem_from(s->r, &err);
     }
     return NULL;
