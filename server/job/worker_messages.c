@@ -89,11 +89,13 @@ static void enter_event(const struct message_listener *l, const char *type, cJSO
 }
 
 /* The file must exist, complete and regular, since it will be served to users. Where the disk gives no answer, it is
- * asked again, for the last time after the worker has ended. */
+ * asked again, for the last time after the worker has ended. A preview of another size is a newer one, which the worker
+ * announces next: it is not entered, and not wrong. */
 static enum status put_file(const struct attempt *a, struct store *store, const char *type, const cJSON *line,
                             bool is_last, struct error *err) {
     const char *name, *sha256, *content_type;
     double bytes;
+    bool is_replaced = false;
     enum status status = json_string(line, "name", type, "", &name, err);
     if (status == STATUS_OK)
         status = json_string(line, "sha256", type, "", &sha256, err);
@@ -107,11 +109,13 @@ static enum status put_file(const struct attempt *a, struct store *store, const 
         bool is_there = lstat(path, &info) == 0;
         if (!is_there && errno != ENOENT && !is_last)
             status = error_set_errno(err, errno, "cannot look at %s", path);
+        else if (is_there && S_ISREG(info.st_mode) && (double)info.st_size != bytes && strcmp(type, EVENT_PREVIEW) == 0)
+            is_replaced = true;
         else if (!is_there || !S_ISREG(info.st_mode) || (double)info.st_size != bytes)
             status = error_set(err, STATUS_INPUT, "%s is not a file of %.0f bytes", name, bytes);
         mem_free(path);
     }
-    if (status == STATUS_OK)
+    if (status == STATUS_OK && !is_replaced)
         status = store_output_put(store, a->job_id, a->number, type, name, (uint64_t)bytes, sha256, content_type, err);
     return status;
 }

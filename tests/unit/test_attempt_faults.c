@@ -30,6 +30,7 @@ static int worker(const char *folder) {
         if (file_replace(out, "data", 4, &err) != STATUS_OK)
             return PROGRESS_EXIT_FAILED;
         progress_stage(&p, "refine");
+        progress_file(&p, "preview", "a.txt", 3, SCENE_A, "text/plain"); /* replaced by now */
         progress_file(&p, "preview", "a.txt", 4, SCENE_A, "text/plain");
         progress_metric(&p, "loss", 3, 0.25);
         progress_file(&p, "output", "a.txt", 4, SHA, "text/plain");
