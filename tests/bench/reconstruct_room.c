@@ -139,8 +139,10 @@ static enum status run(int argc, char **argv, struct error *err) {
     limits.later_bytes = PHOTOGRAPH_LATER_BYTES;
     struct reading reading = reading_default();
     reading.transforms = mem_strdup(settings_text(&settings, "transforms"));
+    cJSON *problems = cJSON_CreateArray(); /* err has the first */
     if (status == STATUS_OK)
-        status = bundle_load(argv[1], &reading, &limits, pool, &scene, NULL, err);
+        status = bundle_load(argv[1], &reading, &limits, pool, &scene, problems, err);
+    cJSON_Delete(problems);
     reading_release(&reading);
     printf("loaded in %.1f s\n", clock_sec() - begin);
     if (status == STATUS_OK)
