@@ -264,18 +264,28 @@ static enum status put_comparisons(struct export *e, struct error *err) {
 
 /* --- the report --------------------------------------------------------------------------- */
 
+/* The previews that put_previews has written; returns their number. Their paths are the caller's. */
+static size_t list_textures(const struct export *e, struct report_picture texture[KIND_COUNT + 1]) {
+    size_t count = 0;
+    for (size_t k = 0; k < KIND_COUNT; k++) {
+        if (kinds[k].kind == PICTURE_CONFIDENCE && !knows_deviation(e->input))
+            continue;
+        char *path = mem_printf("%s/preview/%s.png", e->files.dir, kinds[k].stem);
+        texture[count++] = (struct report_picture){path, kinds[k].title, kinds[k].about};
+    }
+    if (e->input->environment)
+        texture[count++] = (struct report_picture){file_join(e->files.dir, "preview/environment.png"),
+                                                   ENVIRONMENT_TITLE, ENVIRONMENT_ABOUT};
+    return count;
+}
+
 static enum status put_page(struct export *e, const cJSON *report, struct error *err) {
     size_t shown = e->input->comparison_count;
     if (shown > PAGE_COMPARISONS)
         shown = PAGE_COMPARISONS;
     struct report_picture texture[KIND_COUNT + 1];
-    size_t texture_count = KIND_COUNT + (e->input->environment ? 1 : 0);
+    size_t texture_count = list_textures(e, texture);
     struct report_picture *comparison = mem_array(shown, sizeof *comparison);
-    for (size_t k = 0; k < KIND_COUNT; k++)
-        texture[k] = (struct report_picture){mem_printf("%s/preview/%s.png", e->files.dir, kinds[k].stem),
-                                             kinds[k].title, kinds[k].about};
-    texture[KIND_COUNT] = (struct report_picture){file_join(e->files.dir, "preview/environment.png"), ENVIRONMENT_TITLE,
-                                                  ENVIRONMENT_ABOUT};
     for (size_t i = 0; i < shown; i++) {
         char name[64];
         comparison_file(name, i);
@@ -291,7 +301,7 @@ static enum status put_page(struct export *e, const cJSON *report, struct error 
     for (size_t i = 0; i < shown; i++)
         mem_free((char *)comparison[i].path);
     mem_free(comparison);
-    for (size_t k = 0; k <= KIND_COUNT; k++)
+    for (size_t k = 0; k < texture_count; k++)
         mem_free((char *)texture[k].path);
     return status;
 }
