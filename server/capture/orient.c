@@ -8,6 +8,7 @@
 #include "common/mem.h"
 #include "server/render/accel.h"
 #include "server/scene/adjacency.h"
+#include "server/scene/photograph_reduce.h"
 
 /* Along both axes, of the pixels traced, for time: what is seen at all covers more; to 3: no change. */
 #define PIXEL_STRIDE 2
@@ -19,6 +20,7 @@ struct trace_job {
     const struct camera *camera;
     uint32_t *hit_triangle; /* [rows][columns] the triangle met there, or ACCEL_NONE */
     size_t columns;
+    uint32_t stride;
 };
 
 static void trace_row(void *user, size_t row, int thread) {
@@ -27,7 +29,7 @@ static void trace_row(void *user, size_t row, int thread) {
     for (size_t column = 0; column < job->columns; column++) {
         struct accel_hit hit;
         vec3 direction;
-        float x = (float)(column * PIXEL_STRIDE) + 0.5f, y = (float)(row * PIXEL_STRIDE) + 0.5f;
+        float x = (float)(column * job->stride) + 0.5f, y = (float)(row * job->stride) + 0.5f;
         bool meets = camera_direction(job->camera, x, y, &direction) &&
                      accel_intersect(job->accel, camera_origin(job->camera), direction, 0.0f, INFINITY, &hit);
         job->hit_triangle[row * job->columns + column] = meets ? hit.triangle : ACCEL_NONE;
@@ -37,9 +39,10 @@ static void trace_row(void *user, size_t row, int thread) {
 /* Adds to balance[triangle] 1 for each pixel that shows its front and -1 for its back. */
 static void count_sides(const struct scene *scene, const struct camera *camera, const struct accel *accel,
                         struct parallel *pool, long *balance) {
-    size_t columns = (camera->width + PIXEL_STRIDE - 1) / PIXEL_STRIDE;
-    size_t rows = (camera->height + PIXEL_STRIDE - 1) / PIXEL_STRIDE;
-    struct trace_job job = {accel, camera, mem_array(rows * columns + 1, sizeof *job.hit_triangle), columns};
+    uint32_t stride = PIXEL_STRIDE * camera_step(camera);
+    size_t columns = (camera->width + stride - 1) / stride;
+    size_t rows = (camera->height + stride - 1) / stride;
+    struct trace_job job = {accel, camera, mem_array(rows * columns + 1, sizeof *job.hit_triangle), columns, stride};
     parallel_for(pool, rows, trace_row, &job);
     for (size_t i = 0; i < rows * columns; i++) {
         if (job.hit_triangle[i] == ACCEL_NONE)

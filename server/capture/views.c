@@ -12,19 +12,6 @@
 /* Least cosine between normal and view at which a photograph is used: 84 degrees, where an error of the normal by 2
  * degrees, as scans have, changes the cosine by a third. */
 #define MIN_COSINE 0.1f /* +25 %: 0 dB */
-/* Depth edge: corner hits are off each other's plane by more than this many pixel footprints, plus a share of the
- * distance, for rounding and for a mesh's noise (2 mm at a metre). A lower step shifts what a
- * photograph shows by less than three pixels. */
-#define EDGE_FOOTPRINTS 3.0f /* +25 %: no change */
-#define EDGE_RELATIVE 0.002f /* +25 %: no change */
-/* Surfaces touch where the corner hits of a mixed pixel are no farther apart than this, in footprints: at 84 degrees
- * (MIN_COSINE) neighbouring corners of one plane are as far. */
-#define SEAM_FOOTPRINTS 10.0f /* +25 %: no change */
-
-/* Crease: cosine between normals below which surfaces are lit differently. At 37 degrees light along one normal gives a
- * fifth less on the other; a column of ten faces stays whole. */
-#define CREASE_COSINE 0.8f /* to .85: +0.04 dB */
-
 /* Light of other surfaces: pixels around a look-up that are searched for brighter ones, as far as the edge
  * distances of `trust` reach; the ratio up to which these do not count, usual between two paints. */
 #define MIXING_PIXELS 2.0f     /* +25 %: +0.02 dB */
@@ -33,64 +20,6 @@
 #define MAX_MIXING 1.0f /* +25 %: 0 dB */
 /* Least observed radiance in ratios, as a share of the median: keeps them finite. */
 #define DARK_SHARE 1e-3f /* +25 %: no change */
-
-#define NO_SURFACE UINT32_MAX
-#define BAND 8 /* rows of pixels a work item */
-
-struct corner {
-    vec3 point;
-    vec3 normal;
-    float distance_m;
-    uint32_t segment; /* or NO_SURFACE */
-};
-
-struct edge_job {
-    struct views *views;
-    uint32_t train;
-};
-
-static bool centre_meets(const struct edge_job *job, const struct camera *camera, uint32_t x, uint32_t y) {
-    vec3 direction;
-    return !camera_direction(camera, (float)x + 0.5f, (float)y + 0.5f, &direction) ||
-           accel_occluded(job->views->accel, camera_origin(camera), direction, 0.0f, INFINITY);
-}
-
-static struct corner trace_corner(const struct edge_job *job, const struct camera *camera, uint32_t x, uint32_t y) {
-    struct corner corner = {.segment = NO_SURFACE};
-    vec3 direction;
-    struct accel_hit hit;
-    vec3 origin = camera_origin(camera);
-    if (!camera_direction(camera, (float)x, (float)y, &direction) ||
-        !accel_intersect(job->views->accel, origin, direction, 0.0f, INFINITY, &hit))
-        return corner;
-    corner.point = vec3_mad(origin, hit.distance_m, direction);
-    corner.normal = vec3_normalize(mesh_cross(&job->views->scene->mesh, hit.triangle));
-    corner.distance_m = hit.distance_m;
-    corner.segment = job->views->segments->of_triangle[hit.triangle];
-    return corner;
-}
-
-static bool differ(const struct corner *a, const struct corner *b, float focal) {
-    if (a->segment != b->segment)
-        return true;
-    if (a->segment == NO_SURFACE)
-        return false;
-    if (vec3_dot(a->normal, b->normal) < CREASE_COSINE)
-        return true;
-    vec3 between = vec3_sub(b->point, a->point);
-    float slack = a->distance_m * (EDGE_FOOTPRINTS / focal + EDGE_RELATIVE);
-    return fabsf(vec3_dot(between, a->normal)) > slack && fabsf(vec3_dot(between, b->normal)) > slack;
-}
-
-/* Whether two corners that differ are on surfaces that touch. */
-static bool are_adjacent(const struct corner *a, const struct corner *b, float focal) {
-    if (a->segment == NO_SURFACE || b->segment == NO_SURFACE)
-        return a->segment == b->segment;
-    return vec3_length(vec3_sub(b->point, a->point)) < a->distance_m * SEAM_FOOTPRINTS / focal;
-}
-
-/* 8-bit hash of a segment. */
-static uint8_t owner_mark(uint32_t segment) { return (uint8_t)(rng_mix32(segment) >> 24); }
 
 void views_use(const struct views *v, uint32_t train, size_t at, size_t count) {
     struct spill *spill = v->scene->spill;
@@ -108,71 +37,6 @@ static void use_part(const struct views *v, uint32_t train, long column, long ro
     right = right < (long)camera->width ? right : (long)camera->width;
     for (long y = row > 0 ? row : 0; left < right && y < row + rows && y < (long)camera->height; y++)
         views_use(v, train, (size_t)(y * (long)camera->width + left), (size_t)(right - left));
-}
-
-/* One row of pixels, given the corners above them, [width + 1], in whose place it leaves those below. */
-static void mark_row(const struct edge_job *job, uint32_t y, struct corner *corners) {
-    const struct photograph *photo = &job->views->scene->photograph[job->views->train[job->train]];
-    const struct camera *camera = &photo->camera;
-    uint8_t *out = job->views->shows[job->train] + (size_t)y * camera->width;
-    uint8_t *owner = job->views->owner[job->train] + (size_t)y * camera->width;
-    views_use(job->views, job->train, (size_t)y * camera->width, camera->width);
-    struct corner left_top = corners[0], left_low = trace_corner(job, camera, 0, y + 1);
-    corners[0] = left_low;
-    for (uint32_t x = 0; x < camera->width; x++) {
-        struct corner top = corners[x + 1];
-        struct corner low = trace_corner(job, camera, x + 1, y + 1);
-        bool mixed = differ(&left_top, &top, camera->fx) || differ(&left_top, &left_low, camera->fx) ||
-                     differ(&left_top, &low, camera->fx) || differ(&top, &left_low, camera->fx);
-        bool seam = mixed && are_adjacent(&left_top, &top, camera->fx) &&
-                    are_adjacent(&left_top, &left_low, camera->fx) && are_adjacent(&left_top, &low, camera->fx) &&
-                    are_adjacent(&top, &left_low, camera->fx);
-        out[x] = seam ? VIEWS_SEAM : mixed ? VIEWS_MIXED : VIEWS_SURFACE;
-        owner[x] = owner_mark(low.segment);
-        /* geometry thinner than a pixel may hide between the corners */
-        if (!mixed && low.segment == NO_SURFACE)
-            out[x] = centre_meets(job, camera, x, y) ? VIEWS_MIXED : VIEWS_OPEN;
-        corners[x + 1] = low;
-        left_top = top;
-        left_low = low;
-    }
-}
-
-/* BAND rows. Threads share no corners: those between two bands are traced twice. */
-static void mark_band(void *user, size_t band, int thread) {
-    (void)thread;
-    const struct edge_job *job = user;
-    const struct camera *camera = &job->views->scene->photograph[job->views->train[job->train]].camera;
-    struct corner *corners = mem_array((size_t)camera->width + 1, sizeof *corners);
-    uint32_t first = (uint32_t)band * BAND;
-    for (uint32_t x = 0; x <= camera->width; x++)
-        corners[x] = trace_corner(job, camera, x, first);
-    for (uint32_t y = first; y < first + BAND && y < camera->height; y++)
-        mark_row(job, y, corners);
-    mem_free(corners);
-}
-
-/* Gives the neighbours of pixels of class `of` at least class of - 1. */
-static void spread_class(uint8_t *edge, long width, long height, uint8_t of) {
-    for (long y = 0; y < height; y++) {
-        for (long x = 0; x < width; x++) {
-            if (edge[y * width + x] != of)
-                continue;
-            for (long j = y > 0 ? y - 1 : 0; j <= y + 1 && j < height; j++) {
-                for (long i = x > 0 ? x - 1 : 0; i <= x + 1 && i < width; i++) {
-                    uint8_t *beside = &edge[j * width + i];
-                    *beside = *beside < of - 1 ? (uint8_t)(of - 1) : *beside;
-                }
-            }
-        }
-    }
-}
-
-static void make_edges(uint8_t *edge, const uint8_t *shows, uint32_t width, uint32_t height) {
-    for (size_t i = 0; i < (size_t)width * height; i++)
-        edge[i] = shows[i] == VIEWS_MIXED || shows[i] == VIEWS_SEAM ? VIEWS_EDGE : 0;
-    for (uint8_t of = VIEWS_EDGE; of > 1; of--)
-        spread_class(edge, (long)width, (long)height, of);
 }
 
 void views_update_median(struct views *v) {
@@ -194,14 +58,6 @@ void views_update_median(struct views *v) {
     float median = quantile(value, count, 0.5);
     v->median_radiance = median > 0.0f ? median : 1.0f;
     mem_free(value);
-}
-
-void views_update_edges(struct views *v, uint32_t train, struct parallel *pool) {
-    const struct camera *camera = &v->scene->photograph[v->train[train]].camera;
-    struct edge_job job = {.views = v, .train = train};
-    parallel_for(pool, (camera->height + BAND - 1) / BAND, mark_band, &job);
-    views_use(v, train, 0, (size_t)camera->width * camera->height);
-    make_edges(v->edge[train], v->shows[train], camera->width, camera->height);
 }
 
 void views_update_segments(struct views *v, const struct accel *accel, struct parallel *pool) {
@@ -278,7 +134,7 @@ bool views_sees(const struct views *v, uint32_t train, vec3 point, vec3 normal, 
 int views_edge(const struct views *v, const struct view *view, uint32_t triangle) {
     const struct camera *camera = &v->scene->photograph[v->train[view->train]].camera;
     const uint8_t *edge = v->edge[view->train], *owner = v->owner[view->train];
-    uint8_t own = owner_mark(v->segments->of_triangle[triangle]);
+    uint8_t own = views_owner_mark(v->segments->of_triangle[triangle]);
     long x0 = (long)floorf(view->x - 0.5f), y0 = (long)floorf(view->y - 0.5f);
     int nearest = 0;
     if (spill_has_file(v->scene->spill))

@@ -2,7 +2,8 @@
  *
  * A pixel whose four corner rays meet another segment or a depth edge mixes two surfaces and is not clean; it is used
  * only where no photograph of a point is clean. A pixel whose corner rays and centre ray meet no surface shows distant
- * light (environment.h). Held-out photographs are never used. */
+ * light (environment.h). In photographs above 1.6 megapixels that is asked of cells of some pixels each
+ * (view_edges.c). Held-out photographs are never used. */
 #ifndef UNBAKE_CAPTURE_VIEWS_H
 #define UNBAKE_CAPTURE_VIEWS_H
 
@@ -11,6 +12,7 @@
 #include <stdint.h>
 
 #include "common/parallel.h"
+#include "common/rng.h"
 #include "server/render/accel.h"
 #include "server/scene/scene.h"
 #include "server/scene/segment.h"
@@ -25,6 +27,9 @@ enum { VIEWS_SURFACE, VIEWS_MIXED, VIEWS_OPEN, VIEWS_SEAM };
 
 /* The class of a pixel that mixes surfaces in views.edge. */
 #define VIEWS_EDGE 3
+
+/* 8-bit hash of a segment, in views.owner. */
+static inline uint8_t views_owner_mark(uint32_t segment) { return (uint8_t)(rng_mix32(segment) >> 24); }
 
 struct views {
     const struct scene *scene;       /* borrowed */

@@ -179,10 +179,10 @@ static void render_view(struct reconstruction *r, struct photograph *photo, stru
     move_pixels(&view->render, r->scene->spill);
 }
 
-/* Compares a photograph with its view, at the size of held_out_size.h; its exposure and gain are set where they are fitted. */
+/* Compares a photograph with its view, at the size of camera_step; its exposure and gain are set where they are fitted. */
 static void compare_view(struct reconstruction *r, struct photograph *photo, struct held_out *view, uint32_t samples,
                          double median, size_t views, const struct reconstruct_hooks *hooks) {
-    uint32_t step = held_out_step(&photo->camera);
+    uint32_t step = camera_step(&photo->camera);
     struct photograph smaller;
     view->name = photo->name;
     view->step = step;

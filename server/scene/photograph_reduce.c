@@ -6,6 +6,11 @@
 #include "common/image.h"
 #include "common/mem.h"
 
+uint32_t camera_step(const struct camera *camera) {
+    double width = (double)camera->width, height = (double)camera->height;
+    return (uint32_t)fmin(fmax(ceil(sqrt(width * height / REDUCED_MAX_PIXELS)), 1.0), fmin(width, height));
+}
+
 struct camera camera_reduced(const struct camera *camera, uint32_t step) {
     struct camera reduced = *camera;
     float share = 1.0f / (float)step;

@@ -1,18 +1,13 @@
 /* held_out_size.c -- see held_out_size.h. */
 #include "server/state/held_out_size.h"
 
-#include <math.h>
-
-uint32_t held_out_step(const struct camera *camera) {
-    double width = (double)camera->width, height = (double)camera->height;
-    return (uint32_t)fmin(fmax(ceil(sqrt(width * height / HELD_OUT_MAX_PIXELS)), 1.0), fmin(width, height));
-}
+#include "server/scene/photograph_reduce.h"
 
 static double pixels_of(const struct scene *scene, bool held_out_only) {
     double pixels = 0.0;
     for (size_t i = 0; i < scene->photograph_count; i++) {
         const struct photograph *photo = &scene->photograph[i];
-        uint32_t step = held_out_step(&photo->camera);
+        uint32_t step = camera_step(&photo->camera);
         if (photo->is_test || !held_out_only)
             pixels += (double)(photo->camera.width / step) * (double)(photo->camera.height / step);
     }

@@ -25,7 +25,7 @@
 /* A held-out photograph and its re-render. */
 struct held_out {
     const char *name;                           /* borrowed from the scene */
-    uint32_t step;                              /* see held_out_size.h */
+    uint32_t step;                              /* camera_step */
     struct camera camera;                       /* of the view: the photograph's, or a smaller one */
     struct image photograph, render;            /* linear radiance, R G B, of one size; owned */
     uint32_t samples;                           /* paths for each pixel */

@@ -1,4 +1,4 @@
-/* held_out_size.h: a large photograph that is held out is compared at a fraction of its size, and
+/* photograph_reduce.h: a large photograph that is held out is compared at a fraction of its size, and
  * with its camera. */
 #include "server/reconstruct/reconstruct.h"
 #include "server/scene/photograph_reduce.h"

@@ -1,11 +1,10 @@
-/* A photograph at a fraction of its size: means, what is left out, the camera; and the size of held-out views. */
+/* A photograph at a fraction of its size: means, what is left out, the camera, the step. */
 #include "server/scene/photograph_reduce.h"
 
 #include <math.h>
 
 #include "common/image.h"
 #include "common/mem.h"
-#include "server/state/held_out_size.h"
 #include "tests/check.h"
 
 /* 7 x 5, red = column, green = row, blue = 0; with a lens. */
@@ -83,19 +82,19 @@ static void test_camera(void) {
     photograph_release(&p);
 }
 
-static void test_held_out_size(void) {
-    CHECK(held_out_step(&(struct camera){.width = 320, .height = 240}) == 1);
-    CHECK(held_out_step(&(struct camera){.width = 1440, .height = 1080}) == 1);
-    CHECK(held_out_step(&(struct camera){.width = 1920, .height = 1080}) == 2);
-    CHECK(held_out_step(&(struct camera){.width = 4000, .height = 3000}) == 3);
-    CHECK(held_out_step(&(struct camera){.width = 30000, .height = 2}) == 1);
-    CHECK(held_out_step(&(struct camera){.width = 300000000, .height = 2}) == 2);
+static void test_step(void) {
+    CHECK(camera_step(&(struct camera){.width = 320, .height = 240}) == 1);
+    CHECK(camera_step(&(struct camera){.width = 1440, .height = 1080}) == 1);
+    CHECK(camera_step(&(struct camera){.width = 1920, .height = 1080}) == 2);
+    CHECK(camera_step(&(struct camera){.width = 4000, .height = 3000}) == 3);
+    CHECK(camera_step(&(struct camera){.width = 30000, .height = 2}) == 1);
+    CHECK(camera_step(&(struct camera){.width = 300000000, .height = 2}) == 2);
 }
 
 int main(void) {
     test_means();
     test_left_out();
     test_camera();
-    test_held_out_size();
+    test_step();
     return check_result();
 }
