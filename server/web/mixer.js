@@ -52,7 +52,7 @@ export class Mixer {
       this.say([`Job ${newest.id} has ${newest.state === "failed" ? "failed" : "been cancelled"}`, newest.reason].filter(Boolean).join(": "));
     }
     this.at("save").hidden = this.at("saves").hidden = me.role === "viewer";
-    if (this.root.hidden || !this.isSeen) return;
+    if (this.root.hidden || !(this.isSeen || this.isAsked)) return; // what is asked for may be out of sight when it is done
     if (isRoom && this.frames.length === 0) this.listViews();
     if (base && base.id !== this.base?.id) this.open(base);
   }
@@ -76,6 +76,7 @@ export class Mixer {
 
   async make(isSmall) {
     const { value } = this.at("view"), isOwn = value === "room", frame = isOwn ? this.camera() : this.frames[Number(value)];
+    this.isAsked = true;
     this.at("small").disabled = this.at("large").disabled = true;
     try {
       if (!frame) throw new Error(isOwn ? "The room is not shown yet." : "There is no photograph to look from.");

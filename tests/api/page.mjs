@@ -137,6 +137,14 @@ async function openMixer() {
   return page;
 }
 
+// Lights are loaded once the mixer is in sight, and what comes to stand above it may move it out of that.
+async function untilMixed(page) {
+  await page.waitForFunction(() => {
+    document.querySelector("#job .mixer").scrollIntoView();
+    return !document.querySelector("#job .mixer-desk").hidden;
+  }, { timeout: 90000, polling: 200 });
+}
+
 // Where no light was rendered alone, the page offers it, shows how it goes on, and opens the mixer when it is done.
 async function makeLights() {
   const page = await openMixer();
@@ -151,7 +159,7 @@ async function makeLights() {
 // Lights are mixed, and the render that is saved shows what the mixer shows.
 async function mixLights() {
   const page = await openMixer();
-  await page.waitForSelector("#job .mixer-desk:not([hidden])");
+  await untilMixed(page);
   const lights = await page.$$eval("#job .mixer-lights fieldset", (rows) => rows.map((row) => row.querySelector("legend").textContent));
   check(lights.length >= 3, `lights: ${lights}`);
   const before = await meanShown(page);
@@ -184,7 +192,7 @@ async function mixLights() {
 // Renders of each light that fail say why, also where older ones are mixed, which they stay.
 async function failLights() {
   const page = await openMixer();
-  await page.waitForSelector("#job .mixer-desk:not([hidden])");
+  await untilMixed(page);
   await fetch(`${url}/v1/jobs`, { method: "POST", headers: { "Content-Type": "application/json" },
     body: JSON.stringify({ kind: "render", source: 1, settings: { per_light: true, lights: "off", size: "8x8", spp: 4 } }) });
   await page.waitForFunction(() => document.querySelector("#job .mixer-state").textContent.includes("Nothing shines"), { timeout: 30000 })
