@@ -22,14 +22,15 @@ api/test_backup api/test_axe api/test_page api/test_webhook_library
 chaos/test_start_faults chaos/test_worker_calls chaos/test_worker_kill chaos/test_node api/test_node_site chaos/test_slurm
 api/test_render api/test_retention render/test_calibrate_light unit/test_atlas unit/test_inverse_uv
 unit/test_worker_faults chaos/test_disk_faults unit/test_attempt_faults api/test_client_sweep chaos/test_daemon_kill
-chaos/test_power_cut"
+chaos/test_power_cut unit/test_scheduler_faults unit/test_scheduler_retries unit/test_delivery render/test_detail
+api/test_client_commands api/test_client_scripts"
 # The thread sanitizer has nothing to find in one thread either, nor in whole reconstructions what those of
 # api/test_webhooks, of a small room, do not tell.
 slow_tsan="$slow_asan render/test_relight_forms render/test_sampling render/test_sun_caustics
 unit/test_checkpoint_faults unit/test_checkpoint_parts unit/test_export unit/test_store_faults
-api/test_one_job api/test_older_data unit/test_scheduler_faults unit/test_corrections unit/test_checkpoint unit/test_captures api/test_client_check unit/test_many_photographs unit/test_bundle unit/test_segment
-render/test_detail unit/test_evaluate api/test_metrics api/test_client_scripts
-api/test_http_durable api/test_http_threads api/test_client_commands
+api/test_one_job api/test_older_data render/test_gather unit/test_corrections unit/test_checkpoint unit/test_captures api/test_client_check unit/test_many_photographs unit/test_bundle unit/test_segment
+unit/test_evaluate api/test_metrics
+api/test_http_durable api/test_http_threads
 chaos/test_memory_faults
 $(cd tests && echo fuzz/test_*.c | sed 's/\.c//g')"
 

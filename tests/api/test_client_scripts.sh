@@ -36,13 +36,18 @@ background=
 run 3 wait 1 99
 run 2 wait
 run 2 wait one
-# A job that fails: its worker cannot use what the memory limit leaves.
 daemon_end TERM
-daemon_start --set worker_memory_mib=16
-run 0 submit "$work/room" $tiny --name fails -q
-run 1 wait last 1
-has "$out" "job 4 failed"
-daemon_end TERM
+# A job that fails: its worker cannot use what the memory limit leaves. (Sanitizers take memory without asking.)
+case $build in
+*/asan | */tsan) ;;
+*)
+    daemon_start --set worker_memory_mib=16
+    run 0 submit "$work/room" $tiny --name fails -q
+    run 1 wait last 1
+    has "$out" "job 4 failed"
+    daemon_end TERM
+    ;;
+esac
 run 5 wait 1 --retry 0.2
 daemon_start
 
