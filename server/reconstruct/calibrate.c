@@ -8,7 +8,7 @@
 #include "common/mem.h"
 #include "server/capture/calibrate_blur.h"
 #include "server/capture/calibrate_light.h"
-#include "server/capture/calibrate_poses.h"
+#include "server/capture/poses/calibrate_poses.h"
 
 static void log_light(const struct reconstruction *r, const struct light_found *found,
                       const struct reconstruct_hooks *hooks) {

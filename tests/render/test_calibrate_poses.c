@@ -1,6 +1,6 @@
 /* calibrate_poses.h: cameras are moved by some pixels and found again, held-out ones, too; a capture whose poses are right
  * is left alone. */
-#include "server/capture/calibrate_poses.h"
+#include "server/capture/poses/calibrate_poses.h"
 
 #include "server/scene/rgb_half.h"
 #include "tests/render/painted_room.h"

@@ -4,13 +4,13 @@
  * and offsets at once, since one photograph at a time would hardly move where many are wrong together. What the
  * observations leave open is decided by a prior that grows linearly with the size of a correction, not quadratically:
  * it prefers few photographs moved far to all moved a little. */
-#include "server/capture/pose_solver.h"
+#include "server/capture/poses/pose_solver.h"
 
 #include <string.h>
 
 #include "common/mem.h"
 #include "server/capture/conjugate.h"
-#include "server/capture/pose_walk.h"
+#include "server/capture/poses/pose_walk.h"
 
 /* Standard deviation of the offsets' prior, in logarithms: what is left of vignettes and reflections. */
 #define OFFSET_SIGMA 0.3 /* +25 %: no change */

@@ -1,5 +1,5 @@
 /* pose_walk.c -- see pose_walk.h. */
-#include "server/capture/pose_walk.h"
+#include "server/capture/poses/pose_walk.h"
 
 #include <string.h>
 

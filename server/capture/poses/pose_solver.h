@@ -10,8 +10,8 @@
  * vignette and slowly varying reflections. Both w and v are in pixels: w times the focal length, v times the focal
  * length over the mean depth. grad I is the mean slope over all photographs of the track: noise in slopes would make
  * steps too short. */
-#ifndef UNBAKE_CAPTURE_POSE_SOLVER_H
-#define UNBAKE_CAPTURE_POSE_SOLVER_H
+#ifndef UNBAKE_CAPTURE_POSES_POSE_SOLVER_H
+#define UNBAKE_CAPTURE_POSES_POSE_SOLVER_H
 
 #include <assert.h>
 #include <math.h>

@@ -1,11 +1,11 @@
 /* held_out_poses.c -- see held_out_poses.h. */
-#include "server/capture/held_out_poses.h"
+#include "server/capture/poses/held_out_poses.h"
 
 #include <math.h>
 
 #include "common/mem.h"
 #include "common/quantile.h"
-#include "server/capture/pose_walk.h"
+#include "server/capture/poses/pose_walk.h"
 
 /* An occluder is nearer than the point by this share of its distance: 2 cm at 2 m. Poses are not known well yet. */
 #define OCCLUSION_MARGIN 0.01f /* +25 %: no change */

@@ -3,11 +3,11 @@
  * Each is aligned on its own to the consensus of the training photographs at the tracks (pose_solver.h), which stays as
  * it is. A held-out photograph influences neither the consensus nor anything else that is reconstructed: only the place
  * at which it is compared with the room changes. */
-#ifndef UNBAKE_CAPTURE_HELD_OUT_POSES_H
-#define UNBAKE_CAPTURE_HELD_OUT_POSES_H
+#ifndef UNBAKE_CAPTURE_POSES_HELD_OUT_POSES_H
+#define UNBAKE_CAPTURE_POSES_HELD_OUT_POSES_H
 
 #include "common/parallel.h"
-#include "server/capture/pose_solver.h"
+#include "server/capture/poses/pose_solver.h"
 #include "server/scene/scene.h"
 
 /* Moves the cameras of held-out photographs where that is significantly better; where the others drift, each starts

@@ -8,12 +8,12 @@
  * The two variances are those of greatest evidence, by expectation-maximisation (Dempster, Laird and Rubin 1977) with
  * photographs taken for independent given their neighbours' means: the expected square of a step is that of the
  * difference of both means plus both variances. */
-#ifndef UNBAKE_CAPTURE_POSE_WALK_H
-#define UNBAKE_CAPTURE_POSE_WALK_H
+#ifndef UNBAKE_CAPTURE_POSES_POSE_WALK_H
+#define UNBAKE_CAPTURE_POSES_POSE_WALK_H
 
 #include <stddef.h>
 
-#include "server/capture/pose_solver.h"
+#include "server/capture/poses/pose_solver.h"
 
 /* A photograph's correction in world axes: rotation vector, radians, and translation, metres. */
 struct pose_drift {

@@ -5,8 +5,8 @@
  * mesh stays fixed. A correction is kept only when it is large enough to matter and the photograph agrees significantly
  * better at held-out tracks; otherwise the pose stays exactly as it was. Where many are moved and their corrections are
  * common to neighbours in the order of the photographs, those that show too little follow (pose_walk.h). */
-#ifndef UNBAKE_CAPTURE_CALIBRATE_POSES_H
-#define UNBAKE_CAPTURE_CALIBRATE_POSES_H
+#ifndef UNBAKE_CAPTURE_POSES_CALIBRATE_POSES_H
+#define UNBAKE_CAPTURE_POSES_CALIBRATE_POSES_H
 
 #include "common/parallel.h"
 #include "server/capture/tracks.h"

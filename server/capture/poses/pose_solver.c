@@ -1,5 +1,5 @@
 /* pose_solver.c -- see pose_solver.h: cameras, observations, their derivatives and weights. */
-#include "server/capture/pose_solver.h"
+#include "server/capture/poses/pose_solver.h"
 
 #include <string.h>
 

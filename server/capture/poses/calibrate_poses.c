@@ -1,13 +1,13 @@
 /* calibrate_poses.c -- see calibrate_poses.h; the equations are pose_solver.h's. */
-#include "server/capture/calibrate_poses.h"
+#include "server/capture/poses/calibrate_poses.h"
 
 #include <math.h>
 #include <string.h>
 
 #include "common/mem.h"
-#include "server/capture/held_out_poses.h"
-#include "server/capture/pose_solver.h"
-#include "server/capture/pose_walk.h"
+#include "server/capture/poses/held_out_poses.h"
+#include "server/capture/poses/pose_solver.h"
+#include "server/capture/poses/pose_walk.h"
 
 /* Steps at the finest level after the first judgement, which put back the photographs that did not gain; the others
  * have had POSE_ROUNDS there. */
