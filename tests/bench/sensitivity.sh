@@ -6,7 +6,7 @@
 # room does not exercise it), "broken" where nothing came out. Some ten seconds a constant; a run that was stopped goes
 # on where it was.
 #
-# SENSITIVITY           folders ("server/capture server/capture/poses server/gather server/material server/refine")
+# SENSITIVITY           folders ("server/capture server/gather server/material server/refine")
 # SENSITIVITY_ROOM      a room with its truth instead: server/light wants lamps, sky and sun (make rooms), of which the demo
 #                       room has none that is hidden
 # SENSITIVITY_SETTINGS  of the job; refine moves little in two iterations, and its listing1 wants method=listing1
@@ -14,7 +14,7 @@
 # usage: sensitivity.sh BUILD
 set -u
 build=$(realpath "$1")
-folders=${SENSITIVITY:-server/capture server/capture/poses server/gather server/material server/refine}
+folders=${SENSITIVITY:-server/capture server/gather server/material server/refine}
 tree=$build/sensitivity/tree
 room=${SENSITIVITY_ROOM:-$build/sensitivity/room}
 table=$build/sensitivity.tsv
