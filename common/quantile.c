@@ -20,48 +20,42 @@ static size_t index_of(size_t count, double share) {
     return at < count ? at : count - 1;
 }
 
-static void swap(float *a, float *b) {
-    float kept = *a;
-    *a = *b;
-    *b = kept;
-}
-
 static float median_of_three(float a, float b, float c) {
     return a < b ? (b < c ? b : a < c ? c : a) : (a < c ? a : b < c ? c : b);
 }
 
-/* Moves values below the pivot to the front and those above it to the back; those equal to it end up in
- * value[*from, *to). */
-static void partition(float *value, size_t count, float pivot, size_t *from, size_t *to) {
-    size_t below = 0, above = count;
-    for (size_t i = 0; i < above;) {
-        if (value[i] < pivot)
-            swap(&value[i++], &value[below++]);
-        else if (value[i] > pivot)
-            swap(&value[i], &value[--above]);
-        else
-            i++;
+/* Moves the values below the bound (not above it, where `inclusive`) to the front; returns how many. No branch depends on
+ * a value: of a random sample half of them would be predicted wrongly, which takes longer than all else. */
+static size_t partition(float *value, size_t count, float bound, bool inclusive) {
+    size_t below = 0;
+    for (size_t i = 0; i < count; i++) {
+        float here = value[i];
+        value[i] = value[below];
+        value[below] = here;
+        below += inclusive ? here <= bound : here < bound;
     }
-    *from = below;
-    *to = above;
+    return below;
 }
 
 /* The value that would be at index `at` in ascending order (Hoare 1961, Algorithm 65: Find). Samples on which the
  * halving fails, which only somebody who wants it can make, are sorted. */
 static float select_value(float *value, size_t count, size_t at) {
     for (int step = 0; step < STEPS_MAX; step++) {
-        size_t from, to;
         float pivot = median_of_three(value[0], value[count / 2], value[count - 1]);
-        partition(value, count, pivot, &from, &to);
-        if (at >= from && at < to)
-            return pivot;
-        if (at < from) {
-            count = from;
-        } else {
-            value += to;
-            at -= to;
-            count -= to;
+        size_t below = partition(value, count, pivot, false);
+        if (at < below) {
+            count = below;
+            continue;
         }
+        value += below;
+        at -= below;
+        count -= below;
+        size_t equal = partition(value, count, pivot, true);
+        if (at < equal)
+            return pivot;
+        value += equal;
+        at -= equal;
+        count -= equal;
     }
     qsort(value, count, sizeof *value, ascending);
     return value[at];
