@@ -255,12 +255,6 @@ static void check_precision(struct setting_faults *f, const cJSON *object) {
          "layers of one file are float");
 }
 
-static void check_units(struct setting_faults *f, const cJSON *object) {
-    bool is_absolute = render_settings_number(object, "luminance_per_unit") > 0.0;
-    need(f, object, "unit", is_absolute || render_settings_is(object, "unit", "radiance"),
-         "nits are known only with luminance_per_unit");
-}
-
 /* "lamp.3.radius": whether the settings of lamp 3 belong to its kind; the same of things that are inserted. */
 static void check_lamp(struct setting_faults *f, const cJSON *object, uint32_t number) {
     static const struct {
@@ -282,9 +276,6 @@ static void check_lamp(struct setting_faults *f, const cJSON *object, uint32_t n
         if (render_settings_has(object, name) ? !belongs : belongs && of_kind[i].is_needed)
             setting_faults_add(f, name, reason, "");
     }
-    snprintf(name, sizeof name, "lamp.%u.lumen", number);
-    need(f, object, name, render_settings_number(object, "luminance_per_unit") > 0.0,
-         "lumen are understood only with luminance_per_unit");
 }
 
 static void check_families(struct setting_faults *f, const cJSON *object) {
@@ -329,7 +320,6 @@ enum status render_settings_check(const cJSON *object, enum render_files files, 
         check_sky(&faults, object);
         check_cameras(&faults, object);
         check_precision(&faults, object);
-        check_units(&faults, object);
         check_families(&faults, object);
     }
     return setting_faults_status(&faults, err);

@@ -59,6 +59,9 @@ static const struct setting table[] = {
      "optimiser steps; 0: as many as refine_looks or listing1_looks take"},
     {"listing1_looks", SETTING_INT, "looks", 1, 1000000000, NULL, "4000", "listing1",
      "listing1: ends when so many looks were taken at each part of the texture; with iterations: goes on to the end"},
+    {"luminance_per_unit", SETTING_REAL, "cd/m2", 0, 1e9, NULL, "0", NULL,
+     "luminance of radiance 1, by which scene.usda is in nits; 0: by the photographs' EXIF where it has exposure time, "
+     "f-number and ISO, else unknown"},
     {"max_depth", SETTING_INT, "segments", 2, 32, NULL, "16", NULL,
      "longest path from the camera; light that takes more segments is missing from renders, most of all in white rooms"},
     {"measure_stride", SETTING_INT, "texels", 1, 8, NULL, "1", "solve",

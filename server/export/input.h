@@ -67,6 +67,7 @@ struct export_input {
     struct export_sun sun;
     size_t camera_count;
     const struct export_camera *camera; /* of all photographs */
+    double luminance_per_unit;          /* cd/m2 of radiance 1; 0: unknown */
 };
 
 #endif

@@ -116,6 +116,11 @@ static void put_mesh(struct sink *out, const struct export_input *in, const stru
     sink_printf(out, "] (\n                interpolation = \"vertex\"\n            )\n        }\n");
 }
 
+/* What radiance is multiplied by: lights are in nits where their luminance is known (UsdLux: intensity 1 is 1 nit). */
+static double unit_of(const struct export_input *in) {
+    return in->luminance_per_unit > 0.0 ? in->luminance_per_unit : 1.0;
+}
+
 /* --- materials --------------------------------------------------------------------------------- */
 
 static void put_texture(struct sink *out, const char *material, const char *shader, const char *file, double scale) {
@@ -161,11 +166,11 @@ static void put_material(struct sink *out, const struct export_input *in, uint32
                 "                float inputs:roughness = " SINK_FLOAT "\n"
                 "                float inputs:ior = " SINK_FLOAT "\n",
                 name, name, name, (double)m->roughness[segment], (1.0 + root) / (1.0 - root));
-    put_emission(out, name, m->emission[segment], scale > 0.0);
+    put_emission(out, name, rgb_scale(m->emission[segment], (float)unit_of(in)), scale > 0.0);
     sink_printf(out, "                token outputs:surface\n            }\n");
     put_texture(out, name, "base_color", textures->base_color, 1.0);
     if (scale > 0.0)
-        put_texture(out, name, "emission", textures->emission, scale);
+        put_texture(out, name, "emission", textures->emission, scale * unit_of(in));
     sink_printf(out, "            def Shader \"st\"\n            {\n"
                      "                uniform token info:id = \"UsdPrimvarReader_float2\"\n"
                      "                string inputs:varname = \"st\"\n"
@@ -185,7 +190,7 @@ static void put_matrix(struct sink *out, const char *indent, double axis[3][3], 
 }
 
 /* It shines along -z, with an irradiance of intensity times colour where it is normalized. */
-static void put_sun(struct sink *out, const struct export_sun *sun) {
+static void put_sun(struct sink *out, const struct export_sun *sun, double unit) {
     vec3 across, up;
     float most = rgb_max(sun->irradiance);
     rgb color = rgb_scale(sun->irradiance, 1.0f / most);
@@ -200,7 +205,7 @@ static void put_sun(struct sink *out, const struct export_sun *sun) {
                 "            float inputs:intensity = " SINK_FLOAT "\n"
                 "            bool inputs:normalize = 1\n",
                 2.0 * (double)sun->radius_rad * 180.0 / PI, (double)color.r, (double)color.g, (double)color.b,
-                (double)most);
+                (double)most * unit);
     put_matrix(out, "            ", axis, (const double[3]){0.0, 0.0, 0.0});
     sink_printf(out, "        }\n");
 }
@@ -211,13 +216,13 @@ static void put_lights(struct sink *out, const struct export_input *in, const st
     sink_printf(out,
                 "    def Xform \"Lights\"\n    {\n"
                 "        def DomeLight \"Sky\"\n        {\n"
-                "            float inputs:intensity = 1\n"
+                "            float inputs:intensity = " SINK_FLOAT "\n"
                 "            asset inputs:texture:file = @./%s@\n"
                 "            token inputs:texture:format = \"latlong\"\n"
                 "        }\n",
-                textures->sky);
+                unit_of(in), textures->sky);
     if (in->sun.is_there && rgb_max(in->sun.irradiance) > 0.0f)
-        put_sun(out, &in->sun);
+        put_sun(out, &in->sun, unit_of(in));
     sink_printf(out, "    }\n");
 }
 
@@ -269,8 +274,7 @@ static void put_head(struct sink *out, const struct export_input *in) {
                 "#usda 1.0\n(\n"
                 "    customLayerData = {\n"
                 "        string creator = \"unbake " UNBAKE_VERSION "\"\n"
-                "        string radianceUnit = \"relative, not nits: a photograph of exposure 1 shows radiance 1 "
-                "as pixel value 1\"\n"
+                "        string radianceUnit = \"%s\"\n"
                 "        int cleanMipLevel = %d\n"
                 "        double atlasUtilisation = %.6g\n"
                 "    }\n"
@@ -279,6 +283,9 @@ static void put_head(struct sink *out, const struct export_input *in) {
                 "    upAxis = \"Y\"\n"
                 ")\n\n"
                 "def Xform \"Room\" (\n    kind = \"component\"\n    displayName = ",
+                in->luminance_per_unit > 0.0
+                    ? "nits"
+                    : "relative, not nits: a photograph of exposure 1 shows radiance 1 as pixel value 1",
                 atlas_clean_level(in->atlas->padding), in->atlas->utilisation);
     put_string(out, in->title);
     sink_printf(out, "\n)\n{\n");

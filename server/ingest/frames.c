@@ -177,3 +177,7 @@ double frame_exposure(double time_sec, double iso, double f_number) {
         return 0.0;
     return time_sec * (iso > 0.0 ? iso / 100.0 : 1.0) / (f_number > 0.0 ? f_number * f_number : 1.0);
 }
+
+double frame_settings_exposure(double time_sec, double iso, double f_number) {
+    return iso > 0.0 && f_number > 0.0 ? frame_exposure(time_sec, iso, f_number) : 0.0;
+}

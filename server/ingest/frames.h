@@ -42,7 +42,8 @@ struct frame {
     struct lens lens;
     struct exact_pose world_from_camera;
     enum exposure_source exposure_source;
-    double exposure; /* 0 if unknown */
+    double exposure;          /* 0 if unknown */
+    double settings_exposure; /* frame_exposure where all three settings are told; else 0 */
 };
 
 struct frames {
@@ -81,5 +82,7 @@ enum status frame_camera(const struct frame *frame, uint32_t width, uint32_t hei
 /* Pixel value per radiance from the camera's settings: seconds x ISO / 100 / f-number^2. Missing (0) factors except
  * the time count as 1. */
 double frame_exposure(double time_sec, double iso, double f_number);
+/* The same where none is missing; else 0. */
+double frame_settings_exposure(double time_sec, double iso, double f_number);
 
 #endif

@@ -71,6 +71,10 @@ static void set_exposure(const struct frame *frame, const struct image_info *inf
     float single = (float)exposure;
     photo->exposure_known = single > 0.0f && isfinite(single) && isfinite(1.0f / single);
     photo->exposure = photo->exposure_known ? single : 1.0f;
+    double settings = frame->settings_exposure;
+    if (settings <= 0.0)
+        settings = frame_settings_exposure(info->exposure_time_sec, info->iso, info->f_number);
+    photo->settings_exposure = isfinite((float)settings) ? (float)settings : 0.0f;
 }
 
 /* Sets the camera, by the size of the picture. */

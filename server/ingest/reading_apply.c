@@ -84,7 +84,7 @@ void reading_apply_frames(const struct reading *r, struct frames *t) {
             lens_straighten(&frame->lens);
         if (r->ignores_exposures) {
             frame->exposure_source = EXPOSURE_UNKNOWN;
-            frame->exposure = 0.0;
+            frame->exposure = frame->settings_exposure = 0.0;
         }
     }
     shift_poses(t, r->shift);

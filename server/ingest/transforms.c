@@ -89,6 +89,7 @@ static void read_exposure(struct frame_context *c, struct frame *frame) {
     double iso = frame_context_positive(c, "iso"), f_number = frame_context_positive(c, "f_number");
     frame->exposure = !isnan(factor) ? factor : isnan(time_sec) ? 0.0 : frame_exposure(time_sec, iso, f_number);
     frame->exposure_source = !isnan(factor) ? EXPOSURE_FACTOR : isnan(time_sec) ? EXPOSURE_UNKNOWN : EXPOSURE_CAMERA;
+    frame->settings_exposure = frame_settings_exposure(time_sec, iso, f_number); /* NAN: not told */
 }
 
 static bool is_listed(const cJSON *list, const char *clean) {

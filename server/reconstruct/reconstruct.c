@@ -136,6 +136,7 @@ static enum status report(struct stage_run *run, struct error *err) {
     report_emitters(run->r);
     light_report(run->r);
     report_grey_card(run->r, run->hooks);
+    report_luminance(run->r, run->hooks);
     enum status status = report_held_out(run->r, &run->views, &run->pace, err);
     plan_close(&run->r->plan, PLAN_REPORT);
     if (status == STATUS_OK)

@@ -2,10 +2,12 @@
 #include "server/reconstruct/report.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "common/mem.h"
 #include "common/quantile.h"
+#include "server/capture/luminance_unit.h"
 #include "server/reconstruct/held_render.h"
 #include "server/reconstruct/metrics.h"
 #include "server/render/path.h"
@@ -329,6 +331,28 @@ void report_grey_card(struct reconstruction *r, const struct reconstruct_hooks *
                    found, card->pixel.value, 1.0 / ratio);
     hooks->warning(hooks->user, text);
     mem_free(text);
+}
+
+void report_luminance(struct reconstruction *r, const struct reconstruct_hooks *hooks) {
+    struct luminance_unit unit = luminance_unit_find(r->scene);
+    double told = settings_number(r->settings, "luminance_per_unit");
+    char line[160];
+    if (!(told > 0.0) && unit.cd_per_m2 == 0.0)
+        return;
+    cJSON *object = cJSON_AddObjectToObject(r->report, "luminance_per_unit");
+    r->luminance_per_unit = told > 0.0 ? told : unit.cd_per_m2;
+    json_add_number(object, "cd_per_m2", r->luminance_per_unit);
+    json_add_string(object, "source", told > 0.0 ? "setting" : "camera settings");
+    if (unit.cd_per_m2 == 0.0)
+        return;
+    json_add_number(object, "by_camera_settings", unit.cd_per_m2);
+    json_add_number(object, "within_factor", unit.within_factor);
+    json_add_int(object, "photographs", (int64_t)unit.photographs);
+    snprintf(
+        line, sizeof line,
+        "calibration: radiance 1 is %.3g cd/m2 by the camera settings of %zu photographs, within a factor of %.2g%s",
+        unit.cd_per_m2, unit.photographs, unit.within_factor, told > 0.0 ? "; the setting says otherwise" : "");
+    hooks->log(hooks->user, line);
 }
 
 void report_emitters(struct reconstruction *r) {

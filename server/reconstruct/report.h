@@ -18,6 +18,9 @@ void report_release_held_out(struct reconstruction *r);
 /* Adds "grey_card" to r->report, where one is given: what base colour came out there; warns where it is not the card's. */
 void report_grey_card(struct reconstruction *r, const struct reconstruct_hooks *hooks);
 
+/* Adds "luminance_per_unit" to r->report where it is told, or known by the photographs; in cd/m2. */
+void report_luminance(struct reconstruction *r, const struct reconstruct_hooks *hooks);
+
 /* Adds "emitters" to r->report: the segments that emit or nearly do, with their evidence. */
 void report_emitters(struct reconstruction *r);
 

@@ -7,4 +7,7 @@
 /* Path of a file that a setting names; the caller's (mem_free). */
 char *files_path(const struct relight_job *job, const char *name);
 
+/* The reconstruction's report.json, or an empty object where it cannot be read; the caller's (cJSON_Delete). */
+cJSON *files_report(const struct relight_job *job);
+
 #endif

@@ -17,6 +17,7 @@
 #include "server/relight/output.h"
 #include "server/relight/picture.h"
 #include "server/relight/relit.h"
+#include "server/relight/unit.h"
 #include "server/render/film.h"
 
 #define ROULETTE_DEPTH 5
@@ -358,9 +359,14 @@ static enum status finish(struct relight_state *r, uint64_t pictures, struct err
 enum status relight_run(const struct relight_job *job, const struct relight_watch *watch, struct parallel *pool,
                         struct error *err) {
     static const struct relight_watch nobody = {0};
-    struct relight_state r = {.job = job, .watch = watch ? watch : &nobody, .pool = pool};
+    struct relight_job resolved = *job;
+    struct relight_state r = {.job = &resolved, .watch = watch ? watch : &nobody, .pool = pool};
+    cJSON *settings;
+    enum status status = unit_resolve(job, r.watch, &settings, err);
+    resolved.settings = settings;
     read_settings(&r);
-    enum status status = run_open(&r, err);
+    if (status == STATUS_OK)
+        status = run_open(&r, err);
     uint64_t pictures = (uint64_t)r.views.count * r.suns, last = pictures;
     if (status == STATUS_OK && job->view_count > 0 && job->view_count < pictures - job->first_view)
         last = job->first_view + job->view_count;
@@ -374,6 +380,7 @@ enum status relight_run(const struct relight_job *job, const struct relight_watc
     if (status == STATUS_OK)
         status = finish(&r, pictures, err);
     run_close(&r);
+    cJSON_Delete(settings);
     return status;
 }
 

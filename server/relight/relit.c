@@ -6,13 +6,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "common/file.h"
 #include "common/mem.h"
 #include "server/relight/environment.h"
+#include "server/relight/files.h"
 #include "server/relight/recovered.h"
 #include "server/relight/things.h"
-
-#define REPORT_MAX_BYTES ((size_t)256 << 20)
 
 /* --- settings of segments --------------------------------------------------------------------------------------- */
 
@@ -124,12 +122,9 @@ static enum status mark_one(const char *word, const cJSON *report, bool *removed
 static enum status mark_removed(const struct relight_job *job, bool *removed, size_t count, struct error *err) {
     const char *which = render_settings_text(job->settings, "remove");
     enum status status = STATUS_OK;
-    cJSON *report = NULL;
     if (*which == '\0')
         return STATUS_OK;
-    char *path = file_join(job->outputs, "report.json");
-    if (json_read(path, REPORT_MAX_BYTES, &report, NULL) != STATUS_OK)
-        report = cJSON_CreateObject(); /* then there are no names */
+    cJSON *report = files_report(job); /* for names */
     for (const char *at = which; status == STATUS_OK;) {
         size_t length = strcspn(at, ",");
         char *word = mem_strndup(at, length);
@@ -140,7 +135,6 @@ static enum status mark_removed(const struct relight_job *job, bool *removed, si
         at += length + 1;
     }
     cJSON_Delete(report);
-    mem_free(path);
     return status;
 }
 

@@ -30,22 +30,23 @@ struct photograph {
     bool is_test; /* held out: never used to reconstruct */
     bool is_hdr;
     bool exposure_known;
-    float exposure;       /* pixel value per radiance; 1 until it is solved where not known */
-    rgb gain;             /* per channel, 1 by default */
-    float vignette[3];    /* v0 v1 v2 of the falloff; 0: none */
-    float blur_px;        /* motion blur in excess of the neighbouring frames', standard deviation; 0: none */
-    float black;          /* a stored 0 reads as minus this value; 0 until the noise is known, and for HDR */
-    float clip;           /* saturation value; INFINITY for HDR */
-    uint16_t (*pixel)[3]; /* [height][width] linear, half precision; owned */
-    uint8_t *saturated;   /* [height][width] bit c: channel c is saturated, judged with its neighbourhood
+    float exposure;          /* pixel value per radiance; 1 until it is solved where not known */
+    float settings_exposure; /* seconds ISO / 100 / f-number^2 of the camera, where all three are told; else 0 */
+    rgb gain;                /* per channel, 1 by default */
+    float vignette[3];       /* v0 v1 v2 of the falloff; 0: none */
+    float blur_px;           /* motion blur in excess of the neighbouring frames', standard deviation; 0: none */
+    float black;             /* a stored 0 reads as minus this value; 0 until the noise is known, and for HDR */
+    float clip;              /* saturation value; INFINITY for HDR */
+    uint16_t (*pixel)[3];    /* [height][width] linear, half precision; owned */
+    uint8_t *saturated;      /* [height][width] bit c: channel c is saturated, judged with its neighbourhood
                                  * (clip.h); NULL: where the value is at the clip; owned */
-    bool *firefly;        /* [height][width] isolated bright pixel of Monte Carlo or sensor noise; NULL: not
+    bool *firefly;           /* [height][width] isolated bright pixel of Monte Carlo or sensor noise; NULL: not
                                * detected; owned */
-    uint8_t *clipped;     /* [height][width] bit c: channel c had its largest value in the file; NULL: where the
+    uint8_t *clipped;        /* [height][width] bit c: channel c had its largest value in the file; NULL: where the
                              * value is at the clip. In a file of primaries wider than Rec. 709, unclipped values may
                              * exceed the clip; owned */
-    char *color_space;    /* name of the file's colour space if it was converted ("Display P3"), else NULL; owned */
-    uint8_t *mask;        /* [height][width] 0: the pixel is excluded; NULL: none is; owned */
+    char *color_space;       /* name of the file's colour space if it was converted ("Display P3"), else NULL; owned */
+    uint8_t *mask;           /* [height][width] 0: the pixel is excluded; NULL: none is; owned */
 };
 
 struct photograph_sample {

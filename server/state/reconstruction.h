@@ -55,6 +55,7 @@ struct reconstruction {
     bool exposures_drift, colors_drift; /* given exposures, white balance (calibrate.h) */
     bool sky_is_fitted;                 /* unobserved sky was fitted to surfaces (unseen_light.h), not filled in */
     struct grey_card grey_card;         /* a point of known reflectance */
+    double luminance_per_unit;          /* cd/m2 of radiance 1, once reported; 0: unknown */
     struct noise noise;                 /* of the photographs' pixels */
     uint16_t (*radiance_preview)[3]; /* [height][width] a first picture of that (radiance_preview.h), or NULL; owned */
     struct fused fused;              /* observed radiance of each texel */

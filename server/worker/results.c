@@ -21,6 +21,7 @@ struct export_input results_so_far(const struct reconstruction *r, const char *t
         .environment_confidence = e->map.pixel ? &e->confidence : NULL,
         .report = r->report,
         .up = scene_up(r->scene),
+        .luminance_per_unit = r->luminance_per_unit,
         .sun = {r->sun.is_there, r->sun.direction, r->sun.radius_rad, r->sun.irradiance},
     };
 }

@@ -108,6 +108,28 @@ static double rendered(const char *dir, const char *lamp) {
     return mean;
 }
 
+/* Lumen and nits where the reconstruction's report knows how bright radiance 1 is, and where nothing does. */
+static void test_unit(const char *dir, double area) {
+    static const char report[] = "{\"luminance_per_unit\":{\"cd_per_m2\":100,\"source\":\"camera settings\","
+                                 "\"within_factor\":1.5}}";
+    static const char lamp[] = "\"lamp.1.kind\":\"area\",\"lamp.1.position\":\"0,1,0\",\"lamp.1.direction\":\"0,-1,0\","
+                               "\"lamp.1.size\":\"0.5,0.25\",\"lamp.1.lumen\":39.26991,\"unit\":\"nits\"";
+    struct error err;
+    struct image image;
+    char *path = file_join(dir, "report.json"), *nits = mem_printf("%s,\"luminance_per_unit\":200", lamp),
+         *whole = mem_printf("{\"format\":\"exr\",%s}", lamp);
+    CHECK(relit_picture(dir, whole, pool, &image, &err) == STATUS_INPUT && strstr(err.hint, "luminance_per_unit"));
+    CHECK(file_replace(path, report, strlen(report), NULL) == STATUS_OK);
+    double found = rendered(dir, lamp);
+    CHECK_THAT(fabs(found / (100.0 * area) - 1.0) < 0.01, "nits: %g, not %g", found, 100.0 * area);
+    found = rendered(dir, nits); /* told: half the radiance, of twice the luminance */
+    CHECK_THAT(fabs(found / (100.0 * area) - 1.0) < 0.01, "nits of a unit told: %g, not %g", found, 100.0 * area);
+    CHECK(remove(path) == 0);
+    mem_free(whole);
+    mem_free(nits);
+    mem_free(path);
+}
+
 static void test_lamps(void) {
     const struct relit_quad plane = {{-5, 0, -5}, {0, 0, 10}, {10, 0, 0}, {0.5f, 0.5f, 0.5f}, {0, 0, 0}, 0.5f, 0.0f};
     char *dir = relit_outputs(&plane, 1,
@@ -142,6 +164,7 @@ static void test_lamps(void) {
                           "\"lamp.1.size\":\"0.5,0.25\",\"luminance_per_unit\":"
                           "100,\"lamp.1.lumen\":39.26991");
     CHECK_THAT(fabs(found / area - 1.0) < 0.01, "lumen: %g, not %g", found, area);
+    test_unit(dir, area);
     CHECK_NEAR(things_spot_flux((struct emission_cone){0.5f, 0.5f}), PI, 1e-6);
     relit_remove(dir);
 }

@@ -50,7 +50,8 @@ static void write_outputs(const char *dir, const struct reconstruction *r) {
                               NULL,
                               {0},
                               0,
-                              NULL};
+                              NULL,
+                              0.0};
     CHECK_THAT(export_outputs(dir, &in, NULL, NULL, &err) == STATUS_OK, "%s", err.message);
 }
 

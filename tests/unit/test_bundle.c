@@ -154,6 +154,8 @@ static void test_exif(void) {
     const struct photograph *b = &scene.photograph[1];
     CHECK(b->exposure_known && b->camera.width == 8);
     CHECK_NEAR(b->exposure, 1.0 / 50.0 * 4.0 / 4.0, 1e-8);
+    CHECK_NEAR(b->settings_exposure, 1.0 / 50.0 * 4.0 / 4.0, 1e-8);
+    CHECK(scene.photograph[0].settings_exposure == 0.0f);
     CHECK(has_warning(&scene, "EXIF orientation of 1"));
     scene_release(&scene);
     cJSON_Delete(problems);
@@ -187,6 +189,7 @@ static void test_variants(void) {
     CHECK(a->camera.cx == 4.0f && a->camera.cy == 3.0f);
     CHECK_NEAR(a->camera.world_from_camera.rotation[0][0], 1.0, 1e-7);
     CHECK_NEAR(a->exposure, 0.01 * 2.0 / 4.0, 1e-9);
+    CHECK(a->settings_exposure == a->exposure && b->settings_exposure == 0.0f);
     CHECK(b->exposure == 0.25f && b->camera.fx == 9.0f && b->camera.fy == 9.0f && b->camera.cx == 3.5f);
     CHECK(b->camera.model == CAMERA_OPENCV_FISHEYE && b->camera.k[3] == 0.001f);
     CHECK(b->mask && b->mask[0] == 0 && b->mask[47] == 0 && !a->mask);

@@ -159,7 +159,8 @@ static void export_room(const char *dir, const struct room *room) {
                               NULL,
                               {0},
                               0,
-                              NULL};
+                              NULL,
+                              0.0};
     enum status status = export_outputs(dir, &in, NULL, NULL, &err);
     CHECK_THAT(status == STATUS_OK, "%s", err.message);
     cJSON_Delete(report);

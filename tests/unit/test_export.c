@@ -453,7 +453,8 @@ int main(void) {
                               NULL,
                               {0},
                               0,
-                              NULL};
+                              NULL,
+                              0.0};
 
     struct announced heard = {.dir = dir};
     CHECK(export_preview(dir, &in, hear, &heard, &err) == STATUS_OK);

@@ -47,6 +47,7 @@ static void test_good(void) {
         "{\"environment\":\"sky\",\"date\":\"2024-02-29\",\"latitude\":47,\"longitude\":8.5,\"suns\":24}",
         "{\"environment\":\"sky.hdr\",\"environment_turn\":90,\"insert.1.file\":\"chair.glb\"}",
         "{\"luminance_per_unit\":120,\"unit\":\"nits\"}",
+        "{\"unit\":\"nits\"}", /* the reconstruction may know */
     };
     for (size_t i = 0; i < sizeof good / sizeof *good; i++)
         CHECK_THAT(check_text(good[i], RENDER_FILES_ATTACHED, NULL) == STATUS_OK, "%s", good[i]);
@@ -77,9 +78,7 @@ static void test_faults(void) {
         {"{\"lamp.0.kind\":\"sphere\"}", "lamp.0.kind"},
         {"{\"lamp.1.kind\":\"sphere\",\"lamp.1.position\":\"0,0,0\",\"lamp.1.size\":\"1,1\"}", "lamp.1.size"},
         {"{\"lamp.1.kind\":\"area\",\"lamp.1.position\":\"0,0,0\"}", "lamp.1.direction"},
-        {"{\"lamp.1.kind\":\"sphere\",\"lamp.1.position\":\"0,0,0\",\"lamp.1.lumen\":800}", "lamp.1.lumen"},
         {"{\"insert.1.scale\":2}", "insert.1.file"},
-        {"{\"unit\":\"nits\"}", "unit"},
         {"{\"path\":\"0,1\",\"view\":\"0\"}", "view"},
         {"{\"path_count\":9}", "path_count"},
         {"{\"multilayer\":true}", "multilayer"},

@@ -94,6 +94,27 @@ static void test_left_out(const char *dir, const struct export_input *in, const 
     mem_free(layer);
 }
 
+/* Lights in nits are those of relative radiance times the luminance of its unit. */
+static void test_nits(const char *dir, struct export_input *in, const struct parts *parts) {
+    struct error err;
+    char *layer = file_join(dir, FORMATS_USD_LAYER);
+    for (int pass = 0; pass < 2; pass++) {
+        struct buf text;
+        in->luminance_per_unit = pass ? 100.0 : 0.0;
+        CHECK(formats[FORMATS_COUNT - 2].write(dir, in, parts, &err) == STATUS_OK);
+        read_file(dir, FORMATS_USD_LAYER, &text);
+        const char *at = buf_text(&text);
+        CHECK((strstr(at, "radianceUnit = \"nits\"") != NULL) == pass);
+        CHECK(strstr(at, pass ? "intensity = 300\n" : "intensity = 3\n") != NULL); /* the sun */
+        CHECK(strstr(at, pass ? "intensity = 100\n" : "intensity = 1\n") != NULL); /* the sky */
+        CHECK(strstr(at, pass ? "emissiveColor = (1650, 1500, 1275)" : "emissiveColor = (16.5, 15, 12.75)") != NULL);
+        CHECK(strstr(at, pass ? "inputs:scale = (2430.0" : "inputs:scale = (24.3") != NULL); /* a pattern */
+        buf_release(&text);
+    }
+    in->luminance_per_unit = 0.0;
+    mem_free(layer);
+}
+
 static void set_pattern(struct room *room) {
     materials_start_emission_pattern(&room->materials);
     for (size_t i = 0; i < room->inverse.valid_count; i++) {
@@ -148,6 +169,8 @@ static void test_files(const char *dir, struct room *room, struct export_input *
     write_picture(dir, FORMATS_SKY, &sky);
     write_formats(dir, in, parts);
     test_archive(dir);
+    if (!is_kept)
+        test_nits(dir, in, parts);
     if (!is_kept)
         test_left_out(dir, in, parts);
     room->mesh.name = NULL;
