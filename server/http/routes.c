@@ -210,7 +210,7 @@ static struct response *too_large(const struct request *r, uint64_t limit) {
     json_add_int(members, "limit_bytes", (int64_t)limit);
     char detail[128];
     snprintf(detail, sizeof detail, "the body is larger than %llu bytes", (unsigned long long)limit);
-    bool is_option = limit != ROUTES_BODY_MAX;
+    bool is_option = limit != ROUTES_BODY_MAX && limit != NODE_FILE_MAX;
     return problem_full(r, 413, detail, is_option ? "an administrator can raise the option max_upload_mib" : "",
                         members);
 }
@@ -228,6 +228,12 @@ struct response *routes_find(struct request *r) {
     return NULL;
 }
 
+static uint64_t body_max(const struct api *api, enum route_body body) {
+    if (body == ROUTE_BODY_FILE) /* outputs and checkpoints are as large as the job makes them */
+        return NODE_FILE_MAX;
+    return is_stored(body) ? api->config.max_upload_bytes : ROUTES_BODY_MAX;
+}
+
 static struct response *begin(struct api *api, struct request *r) {
     struct response *refusal = auth_check(api, r);
     if (!refusal)
@@ -241,7 +247,7 @@ static struct response *begin(struct api *api, struct request *r) {
     enum route_body body = body_of(r);
     if (body == ROUTE_BODY_PATCH)
         return upload_body_begin(api, r); /* the upload's length is the limit */
-    uint64_t limit = is_stored(body) ? api->config.max_upload_bytes : ROUTES_BODY_MAX;
+    uint64_t limit = body_max(api, body);
     if (r->content_length > 0 && (uint64_t)r->content_length > limit)
         return too_large(r, limit);
     buf_init(&r->body, ROUTES_BODY_MAX);
@@ -260,8 +266,9 @@ struct response *routes_begin(struct api *api, struct request *r) {
 
 static struct response *take(struct api *api, struct request *r, const void *data, size_t length) {
     if (r->upload) {
-        if (upload_bytes(r->upload) + length > api->config.max_upload_bytes)
-            return too_large(r, api->config.max_upload_bytes);
+        uint64_t limit = body_max(api, r->route->body);
+        if (upload_bytes(r->upload) + length > limit)
+            return too_large(r, limit);
         return r->route->body == ROUTE_BODY_FILE ? node_body_data(api, r, data, length)
                                                  : whole_body_data(api, r, data, length);
     }

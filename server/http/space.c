@@ -9,12 +9,19 @@ static struct response *refuse(const struct request *r, const struct error *err,
     return err->status == if_full ? problem_full(r, 507, err->message, err->hint, NULL) : problem_from(r, err);
 }
 
-struct response *space_check_room(struct api *api, const struct request *r, uint64_t bytes) {
+static struct response *check_room(struct api *api, const struct request *r, uint64_t keep, uint64_t bytes) {
     struct error err;
+    enum status status = folder_check_room(&api->folder, keep, bytes, &err);
+    return status == STATUS_OK ? NULL : refuse(r, &err, STATUS_NO_SPACE);
+}
+
+struct response *space_check_room(struct api *api, const struct request *r, uint64_t bytes) {
     uint64_t keep = api->config.min_free_bytes + (limits_bind(r) ? api->config.admin_free_bytes : 0);
-    if (folder_check_room(&api->folder, keep, bytes, &err) != STATUS_OK)
-        return refuse(r, &err, STATUS_NO_SPACE);
-    return NULL;
+    return check_room(api, r, keep, bytes);
+}
+
+struct response *space_check_job(struct api *api, const struct request *r, uint64_t bytes) {
+    return check_room(api, r, 0, bytes);
 }
 
 struct response *space_check_share(struct api *api, const struct request *r, const char *but_scene, uint64_t bytes) {

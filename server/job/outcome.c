@@ -69,7 +69,7 @@ static void judge_exit(const struct attempt *a, struct verdict *v) {
     case PROGRESS_EXIT_MEMORY: say(v, OUTCOME_MEMORY, "out of memory", HINT_MEMORY); return;
     case PROGRESS_EXIT_NO_SPACE:
         snprintf(text, sizeof text, "disk full: %.900s", message[0] ? message : a->end.reason);
-        say(v, OUTCOME_BLOCKED, text, "Free some space, then resume the job.");
+        say(v, OUTCOME_BLOCKED, text, hint && hint[0] ? hint : "Free some space, then resume the job.");
         return;
     case PROGRESS_EXIT_STOPPED:
         if (a->stopping)

@@ -53,6 +53,8 @@ struct attempt_link {
     bool is_put_off;    /* it was answered, but not entered: the daemon's disk is full. It is sent again */
     double next_report; /* clock_sec */
     int failures;       /* reports in a row that were not answered */
+    bool is_full_there; /* the last file that was sent met the daemon's full disk */
+    double full_until;  /* how long such a file is tried; clock_sec, 0: none has met one */
     uint64_t sent_bytes, fetched_bytes; /* of files */
 };
 
@@ -89,7 +91,9 @@ enum status link_end(struct attempt_link *l, const struct link_end *end, double 
 enum status link_list(struct attempt_link *l, const char *what, cJSON **list, struct error *err);
 /* Appends to the open file what is missing of the daemon's: "scene", "images/1.png". STATUS_NO_SPACE: the disk here. */
 enum status link_fetch(struct attempt_link *l, const char *what, const char *name, int fd, struct error *err);
-/* Sends the whole open file, whose SHA-256 is `hex`; `query` is "" or "?first=1". STATUS_NO_SPACE: the disk there. */
+/* Sends the whole open file, whose SHA-256 is `hex`; `query` is "" or "?first=1". While the disk there is full it is tried
+ * again for a while, in which the daemon finds room or asks to stop. STATUS_NO_SPACE: it did neither, and is_full_there is
+ * set; STATUS_CANCELLED: it has asked. */
 enum status link_send(struct attempt_link *l, const char *what, const char *name, const char *query, int fd,
                       const char *hex, struct error *err);
 

@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "common/clock.h"
 #include "common/file.h"
 #include "common/mem.h"
 #include "server/net/field.h"
@@ -15,6 +16,10 @@
 #define SEND_SILENCE_SEC 60.0
 #define FETCH_SILENCE_SEC 20.0
 #define TRIES_MAX 40 /* of one file while reports are answered: some three minutes */
+/* A daemon looks at its disk every 2 s and then asks attempts to stop; a node hears of it with its next report. */
+#define FULL_SEC 15.0
+
+#define HTTP_NO_SPACE 507
 
 struct transfer {
     struct attempt_link *link;
@@ -45,6 +50,13 @@ static char *path_of(const struct attempt_link *l, const char *what, const char 
     return buf_detach(&path);
 }
 
+/* Whether a file that has met the daemon's full disk is sent again. */
+static bool waits_for_room(struct attempt_link *l) {
+    if (l->full_until == 0.0)
+        l->full_until = clock_sec() + FULL_SEC;
+    return l->wish < LINK_STOP && clock_sec() < l->full_until;
+}
+
 /* Runs the call until it succeeds, is refused, or the link is no longer open. `begin` (may be NULL) prepares each try;
  * `member` (likewise) is one that the answer has. */
 static enum status run(struct attempt_link *l, struct request_call *call, struct transfer *t, const char *member,
@@ -68,7 +80,9 @@ static enum status run(struct attempt_link *l, struct request_call *call, struct
         link_note(l, status, reply, err);
         if (t->status != STATUS_OK)
             return t->status;
-        if (status != STATUS_UNAVAILABLE || tries == TRIES_MAX || !link_pause(l, tries))
+        bool is_again =
+            status == STATUS_UNAVAILABLE ? tries < TRIES_MAX : reply->code == HTTP_NO_SPACE && waits_for_room(l);
+        if (!is_again || !link_pause(l, tries))
             return status;
     }
 }
@@ -186,10 +200,15 @@ enum status link_send(struct attempt_link *l, const char *what, const char *name
                                 .same_twice = true};
     reply_init(&reply);
     enum status status = run(l, &call, &t, NULL, NULL, &reply, err);
-    if (status == STATUS_OK)
+    l->is_full_there = status == STATUS_NO_SPACE && reply.code == HTTP_NO_SPACE;
+    if (status == STATUS_OK) {
         l->sent_bytes += (uint64_t)info.st_size;
-    else if (status == STATUS_NO_SPACE && reply.code == 507)
-        error_prefix(err, "at the daemon's");
+        l->full_until = 0.0;
+    } else if (l->is_full_there) {
+        error_prefix(err, "at the daemon");
+        if (l->wish >= LINK_STOP)
+            status = err->status = STATUS_CANCELLED;
+    }
     reply_release(&reply);
     mem_free(path);
     return status;

@@ -161,6 +161,7 @@ static void say_no_space(struct relay *r, const struct error *why) {
     json_add_string(line, "type", "end");
     json_add_string(line, "status", status_name(STATUS_NO_SPACE));
     json_add_string(line, "message", why->message);
+    json_add_string(line, "hint", why->hint);
     char *text = json_text(line);
     link_say(&r->link, text, strlen(text));
     mem_free(text);
@@ -187,9 +188,11 @@ static struct link_end judge(struct relay *r, enum status status, const struct e
     } else if (was_taken_back(r, has_run)) {
         end.way = "preempted";
         end.reason = "its machine was taken back";
-    } else if (status == STATUS_CANCELLED) { /* before it began, as the daemon wished */
-        end.way = r->has_killed ? "signal" : "exit";
-        end.code = r->has_killed ? SIGKILL : PROGRESS_EXIT_STOPPED;
+    } else if (status ==
+               STATUS_CANCELLED) { /* as the daemon wished, before it began or while a file could not be sent */
+        bool is_cancelled = r->link.wish == LINK_CANCEL;
+        end.way = is_cancelled ? "signal" : "exit";
+        end.code = is_cancelled ? SIGKILL : PROGRESS_EXIT_STOPPED;
     } else if (status != STATUS_OK) {
         end.way = status == STATUS_INPUT ? "refused" : "lost";
         end.reason = why->message;
@@ -247,6 +250,7 @@ static int run(struct node *n) {
         .url = n->url, .token = n->token, .ca = n->ca, .job_id = (int64_t)n->job_id, .number = (int)n->number};
     relay_init(&n->relay, &config);
     gethostname(host, sizeof host - 1);
+    n->relay.host = host;
     enum status status = link_claim(&n->relay.link, host, (int)n->threads, &order, &err);
     int code = EXIT_FAILURE;
     if (status != STATUS_OK) {
@@ -260,6 +264,8 @@ static int run(struct node *n) {
             status = begin(n, order, &err);
         if (status == STATUS_OK)
             status = relay_follow(&n->relay, &err);
+        if (status == STATUS_NO_SPACE && !n->relay.link.is_full_there)
+            relay_name_disk(&n->relay, &err);
         code = finish(n, status, &err);
     }
     cJSON_Delete(order);

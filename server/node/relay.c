@@ -199,9 +199,33 @@ static enum status send_part(struct relay *r, const cJSON *line, struct error *e
     return status;
 }
 
+void relay_name_disk(const struct relay *r, struct error *err) {
+    error_prefix(err, "on the node %s", r->host);
+    error_hint(err, "Free some space on %.64s, or keep attempts from it, then resume the job.", r->host);
+}
+
+/* The last line of a worker that has met a full disk, with the machine whose disk that is; the caller's. NULL: it is
+ * another line. */
+static char *say_where(const struct relay *r, cJSON *line) {
+    const char *ending, *message;
+    struct error err;
+    if (json_string(line, "status", "a line", "", &ending, NULL) != STATUS_OK ||
+        strcmp(ending, status_name(STATUS_NO_SPACE)) != 0 ||
+        json_string(line, "message", "a line", "", &message, NULL) != STATUS_OK)
+        return NULL;
+    error_set(&err, STATUS_NO_SPACE, "%s", message);
+    relay_name_disk(r, &err);
+    cJSON_DeleteItemFromObjectCaseSensitive(line, "message");
+    cJSON_DeleteItemFromObjectCaseSensitive(line, "hint");
+    json_add_string(line, "message", err.message);
+    json_add_string(line, "hint", err.hint);
+    return json_text(line);
+}
+
 /* Passes on the oldest line that was heard, or keeps it where its file cannot be sent. */
 static enum status pass_on(struct relay *r, struct error *err) {
     const char *text = r->heard[0];
+    char *changed = NULL;
     cJSON *line = NULL;
     const char *type = "";
     bool is_passed = true;
@@ -213,12 +237,16 @@ static enum status pass_on(struct relay *r, struct error *err) {
     } else if (strcmp(type, "part") == 0) {
         status = send_part(r, line, err);
         is_passed = false;
+    } else if (strcmp(type, "end") == 0) {
+        changed = say_where(r, line);
+        text = changed ? changed : text;
     }
     cJSON_Delete(line);
     if (status != STATUS_OK)
         return status;
     if (is_passed)
-        link_say(&r->link, r->heard[0], strlen(r->heard[0]));
+        link_say(&r->link, text, strlen(text));
+    mem_free(changed);
     mem_free(r->heard[0]);
     memmove(r->heard, r->heard + 1, --r->heard_count * sizeof *r->heard);
     return STATUS_OK;

@@ -21,6 +21,7 @@ struct relay {
     struct attempt_link link;
     struct run *run;      /* owned; NULL before its start */
     const char *data_dir; /* in which it works; borrowed */
+    const char *host;     /* of this machine; borrowed */
     int64_t job_id;
     int number;
     bool has_ended; /* the run */
@@ -44,8 +45,11 @@ void relay_beat(void *relay);
 /* Whether the attempt should still begin: STATUS_CANCELLED, with why, where it was stopped, cancelled or given up. */
 enum status relay_may_begin(struct relay *r, struct error *err);
 /* Follows the run to its end, and passes everything on. STATUS_OK: the end may be told. Otherwise the run was killed:
- * STATUS_CANCELLED where the link is not open any more; else a file could not be sent, and *err says why. */
+ * STATUS_CANCELLED where the link is not open any more, or the daemon has asked to stop while a file could not be sent;
+ * else a file could not be sent, and *err says why. */
 enum status relay_follow(struct relay *r, struct error *err);
+/* Adds to the error of a full disk that it is this machine's, and what its users can do. */
+void relay_name_disk(const struct relay *r, struct error *err);
 /* Sends the end of the worker's log. A failure is logged: nothing depends on it. */
 void relay_send_log(struct relay *r);
 /* Reports all that the link has to say; false when it is not open any more. */

@@ -62,6 +62,8 @@ static enum status fetch_once(const char *part, const char *name, uint64_t bytes
         status = error_set_errno(err, errno, "cannot empty %s", part);
     if (status == STATUS_OK && bytes > 0 && (uint64_t)info.st_size != bytes)
         status = source->fetch(source->user, name, fd, err);
+    if (status == STATUS_NO_SPACE)
+        error_prefix(err, "%s", part);
     if (status == STATUS_OK && fstat(fd, &info) != 0)
         status = error_set_errno(err, errno, "cannot look at %s", part);
     *size = (uint64_t)info.st_size;
@@ -205,6 +207,15 @@ static enum status complete(struct cached_scene *scene, const char *cache_dir, u
     return status;
 }
 
+/* The scene's two locks and its folder; what an earlier call has locked stays so. */
+static enum status begin(struct cached_scene *scene, const char *use, const char *fetching,
+                         const struct scene_source *source, int *fetch_fd, struct error *err) {
+    enum status status = scene->use_fd < 0 ? lock(use, LOCK_SH, source, &scene->use_fd, err) : STATUS_OK;
+    if (status == STATUS_OK && *fetch_fd < 0)
+        status = lock(fetching, LOCK_EX, source, fetch_fd, err);
+    return status == STATUS_OK ? file_make_dirs(scene->files, err) : status;
+}
+
 enum status scene_cache_take(struct cached_scene *scene, const char *cache_dir, uint64_t cache_bytes,
                              const char *scene_id, const cJSON *list, const struct scene_source *source,
                              struct error *err) {
@@ -213,11 +224,9 @@ enum status scene_cache_take(struct cached_scene *scene, const char *cache_dir, 
     char *use = mem_printf("%s" CACHE_USE, scene->files), *fetching = mem_printf("%s" CACHE_FETCH, scene->files);
     enum status status = file_make_dirs(cache_dir, err);
     if (status == STATUS_OK)
-        status = lock(use, LOCK_SH, source, &scene->use_fd, err);
-    if (status == STATUS_OK)
-        status = lock(fetching, LOCK_EX, source, &fetch_fd, err);
-    if (status == STATUS_OK)
-        status = file_make_dirs(scene->files, err);
+        status = begin(scene, use, fetching, source, &fetch_fd, err);
+    while (status == STATUS_NO_SPACE && cache_room_give_up(cache_dir)) /* even a name takes space */
+        status = begin(scene, use, fetching, source, &fetch_fd, err);
     if (status == STATUS_OK)
         status = complete(scene, cache_dir, cache_bytes, list, source, err);
     if (status == STATUS_OK)

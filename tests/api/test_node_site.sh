@@ -3,88 +3,17 @@
 # at home, whether nothing happens, or the node is killed, the daemon killed and started again, or stopped for longer than
 # the lease.
 set -u
-. tests/api/client.sh "$@"
+. tests/api/site.sh "$@"
 make_room "$work/room"
-site=$work/site
-mkdir -p "$site" "$work/executors.d"
-
-cat >"$site/submit" <<SH
-#!/bin/bash
-cat >"$site/\$1.sh"
-setsid bash "$site/\$1.sh" >>"$work/nodes.log" 2>&1 &
-echo \$! >"$site/\$1.pid"
-cat "$site/\$1.pid"
-SH
-cat >"$site/status" <<SH
-#!/bin/bash
-for file in "$site"/*.pid; do
-    [ -e "\$file" ] || continue
-    name=\$(basename "\$file" .pid)
-    state=ended
-    [ "\$(ps -o stat= -p "\$(cat "\$file")" | cut -c1)" = Z ] || kill -0 "\$(cat "\$file")" 2>/dev/null && state=running
-    echo "\$(cat "\$file") \$name \$state -"
-done
-SH
-cat >"$site/cancel" <<SH
-#!/bin/bash
-kill -TERM "\$(cat "$site/\$1.pid")"
-SH
-chmod +x "$site"/*
-
 daemon_start
-cat >"$work/executors.d/batch.conf" <<CONF
-url = $url
-node = $build/unbaked
-cache = $work/cache
-submit = $site/submit {name}
-submit_id = {id}
-status = $site/status
-status_line = {id} {name} {state} {reason}
-cancel = $site/cancel {name}
-waiting = waiting
-running = running
-ended = ended
-status_sec = 1
-lease_sec = 6
-[script]
-export UNBAKE_NODE_TOKEN={token} TMPDIR=$work LD_DEBUG=statistics
-exec {command}
-CONF
+site_make batch "export LD_DEBUG=statistics"
 daemon_end TERM
-start() { daemon_start --set executors=process,batch --set executors_dir="$work/executors.d" --set checkpoint_interval_sec=1; }
+# shellcheck disable=SC2086
+start() { daemon_start --set executors=process,batch $site_flags; }
 start
 
-# submit EXECUTOR ITERATIONS: sets $job.
-submit() {
-    # shellcheck disable=SC2086
-    run 0 submit -q "$work/room" ${tiny/iterations=3/iterations=$2} --set executor="$1"
-    job=$out
-}
-is() { [ "$("$build/unbake" show "$job" --json | jq -r "$1")" = "$2" ]; }
-node_pid() { cat "$site/unbake-$job-"*.pid | tail -1; }
-# Seldom, since asking costs more than the job.
-await_success() {
-    local i
-    for i in $(seq 240); do
-        is .state succeeded && return
-        sleep 0.5
-    done
-    fail "job $job does not succeed"
-}
-# What it has made is what was made at home.
-same() {
-    await_success
-    run 0 get "$job" -o "$work/out-$job"
-    for name in base_color.exr roughness.exr emission.exr scene.ply; do
-        cmp -s "$work/home/$name" "$work/out-$job/$name" || fail "job $job, $1: $name differs"
-    done
-    is .attempt "$2" || fail "$1: attempt $(("$build/unbake" show "$job" --json) 2>&1 | jq .attempt), wanted $2"
-}
-# Until the node of the job has sent a checkpoint.
-has_part() { ls "$data/jobs/$job/attempt-1/checkpoint/" | grep -q part-; }
-
 submit process 2500
-await_success
+await succeeded
 run 0 get "$job" -o "$work/home"
 
 submit batch 2500

@@ -2,7 +2,9 @@
  * killed at random, taken back, asked to stop, cut off, and started twice; its cache is damaged. Every job that comes of it has
  * the textures, byte for byte, of one that ran at home. This process plays the scheduler: it begins attempts, reads their
  * lines, ends them. */
+#include <dlfcn.h>
 #include <sys/stat.h>
+#include <sys/statvfs.h>
 
 #include "server/data/attempt_folder.h"
 #include "server/data/layout.h"
@@ -28,6 +30,17 @@ static struct error err;
 static char binary[512], home_sums[WORKER_OUTPUTS][SHA256_HEX_SIZE];
 static unsigned random_;
 static long kill_count, checkpoint_count; /* of a job that nobody disturbed */
+
+/* The rig's disk, as the HTTP side sees it. */
+static atomic_bool disk_is_full;
+int statvfs(const char *path, struct statvfs *info) {
+    int (*real)(const char *, struct statvfs *) = NULL;
+    *(void **)&real = dlsym(RTLD_NEXT, "statvfs");
+    int failed = real(path, info);
+    if (failed == 0 && atomic_load(&disk_is_full))
+        info->f_bavail = 0;
+    return failed;
+}
 
 #define OK(call) CHECK_THAT((call) == STATUS_OK, "%s", err.message)
 
@@ -136,6 +149,11 @@ static int newest_part(const struct remote_attempt *a) {
     mem_free(folder);
     mem_free(dir);
     return newest;
+}
+
+static void wait_for_part(struct remote_attempt *a) {
+    while (newest_part(a) == 0 && listen_to(a) < REMOTE_ENDED)
+        usleep(10000);
 }
 
 /* Until the node has ended: its exit status, or minus the signal's number. It gets the signal `number` after so many
@@ -279,8 +297,7 @@ static void test_wishes(void) {
         begin(&a, rig_job(&rig), 2, ENDLESS);
         OK(store_remote_wish(rig.store, a.job, a.number, REMOTE_PREVIEW, &err));
         a.pid = start_node(&a);
-        while (newest_part(&a) == 0 && listen_to(&a) < REMOTE_ENDED)
-            usleep(10000);
+        wait_for_part(&a);
         OK(store_remote_wish(rig.store, a.job, a.number, t[i].wish, &err));
         int code = follow(&a, -1, 0.0, 0);
         CHECK_THAT(code == t[i].exit_status && strcmp(a.row.end.way, t[i].way) == 0 && a.row.end.code == t[i].code,
@@ -289,17 +306,42 @@ static void test_wishes(void) {
     }
 }
 
-/* The daemon's disk is full: the job waits for room, and says so. */
-static void test_full_disk(void) {
+/* The daemon's disk is full for a moment: the attempt goes on. It stays full, and the daemon asks to stop, as a scheduler
+ * does that stops those at home: it ends as stopped. Where nobody asks, the job is blocked, and says where. */
+static void test_full_disk(bool all) {
     struct remote_attempt a = {.lease_sec = LEASE_SEC};
-    uint64_t before = rig.api->config.min_free_bytes;
-    rig.api->config.min_free_bytes = (uint64_t)1 << 60;
+    begin(&a, rig_job(&rig), 2, ITERATIONS);
+    atomic_store(&disk_is_full, true);
+    a.pid = start_node(&a);
+    while (listen_to(&a) < REMOTE_CLAIMED)
+        usleep(10000);
+    for (double until = clock_sec() + 4.0; clock_sec() < until; usleep(10000))
+        listen_to(&a);
+    CHECK(newest_part(&a) == 0 && a.row.phase == REMOTE_CLAIMED);
+    atomic_store(&disk_is_full, false);
+    CHECK_THAT(follow(&a, -1, 0.0, 0) == 0, "the node has failed");
+    check_equal(&a);
+
     begin(&a, rig_job(&rig), 2, ENDLESS);
     a.pid = start_node(&a);
-    CHECK(follow(&a, -1, 0.0, 0) == 74);
-    CHECK(strcmp(a.row.end.way, "exit") == 0 && a.row.end.code == 74 && a.no_space_count == 1);
-    rig.api->config.min_free_bytes = before;
+    wait_for_part(&a);
+    atomic_store(&disk_is_full, true);
+    usleep(1000000);
+    OK(store_remote_wish(rig.store, a.job, a.number, REMOTE_STOP, &err));
+    int code = follow(&a, -1, 0.0, 0);
+    CHECK_THAT(code == 85 && strcmp(a.row.end.way, "exit") == 0 && a.row.end.code == 85 && a.no_space_count == 0,
+               "%d, %s %d: %s", code, a.row.end.way, a.row.end.code, a.row.end.reason);
     lose(&a);
+
+    if (all) {
+        begin(&a, rig_job(&rig), 2, ENDLESS);
+        a.pid = start_node(&a);
+        CHECK(follow(&a, -1, 0.0, 0) == 74);
+        CHECK(strcmp(a.row.end.way, "exit") == 0 && a.row.end.code == 74 && a.no_space_count == 1);
+        CHECK_THAT(strncmp(a.row.end.reason, "at the daemon: ", 15) == 0, "%s", a.row.end.reason);
+        lose(&a);
+    }
+    atomic_store(&disk_is_full, false);
 }
 
 /* Answers are lost on the way: every request may have been carried out, and nothing is done twice or missed. */
@@ -324,8 +366,7 @@ static void test_cut_off(void) {
     struct remote_attempt a = {.lease_sec = 3};
     begin(&a, rig_job(&rig), 2, ENDLESS);
     a.pid = start_node(&a);
-    while (newest_part(&a) == 0 && listen_to(&a) < REMOTE_ENDED)
-        usleep(10000);
+    wait_for_part(&a);
     listener_quiesce(rig.listener);
     listener_stop(rig.listener);
     int status = 0;
@@ -368,7 +409,7 @@ int main(int argc, char **argv) {
     if (atoi(argv[3]) > 10)
         test_taken_back(SIGTERM);
     test_wishes();
-    test_full_disk();
+    test_full_disk(atoi(argv[3]) > 10);
     test_lost_answers(random_);
     test_cut_off();
     show_log();

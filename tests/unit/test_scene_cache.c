@@ -12,6 +12,7 @@
 #include "server/node/cache_room.h"
 #include "server/node/scene_cache.h"
 #include "tests/check.h"
+#include "tests/system_faults.h"
 
 #define SCENE_A "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa"
 #define SCENE_B "bbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbb"
@@ -177,6 +178,15 @@ static void test_room(void) {
     s = (struct store){.full = 1};
     OK(use(&s, SCENE_A, 0));
     CHECK(has(SCENE_A) && has(SCENE_B) && !has(SCENE_C));
+    /* So full that not even a lock has room. */
+    s = (struct store){0};
+    set_age(SCENE_B, 100);
+    system_faults_arm_only("open", 2, false);
+    OK(use(&s, SCENE_C, 0));
+    CHECK(system_faults_lift() && has(SCENE_A) && !has(SCENE_B) && has(SCENE_C));
+    set_age(SCENE_C, 1000);
+    CHECK(cache_room_give_up(dir));
+    OK(use(&s, SCENE_B, 0));
     s = (struct store){.full = 99};
     CHECK(use(&s, SCENE_C, 0) == STATUS_NO_SPACE);
     CHECK(!has(SCENE_A) && !has(SCENE_B));

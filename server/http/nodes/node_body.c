@@ -22,7 +22,7 @@ struct response *node_body_begin(struct api *api, struct request *r) {
     if (!digest || !field_digest(digest, hex))
         return problem(r, 400, "Repr-Digest must give the file's sha-256");
     uint64_t length = r->content_length > 0 ? (uint64_t)r->content_length : 0;
-    struct response *refusal = space_check_room(api, r, length);
+    struct response *refusal = space_check_job(api, r, length);
     if (!refusal && upload_new(&r->upload, api->arrivals, NOBODY, api->config.data_dir, length, &err) != STATUS_OK)
         refusal = problem_from(r, &err);
     return refusal;
@@ -34,7 +34,7 @@ struct response *node_body_data(struct api *api, struct request *r, const void *
     if (upload_write(r->upload, data, length, &must_check_room, &err) != STATUS_OK)
         return problem_from(r, &err);
     atomic_fetch_add(&api->uploaded_bytes, length);
-    return must_check_room ? space_check_room(api, r, 0) : NULL;
+    return must_check_room ? space_check_job(api, r, 0) : NULL;
 }
 
 /* Makes the folders below the attempt's, which is there as long as it runs, and moves the file to its place. */

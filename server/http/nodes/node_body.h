@@ -7,6 +7,8 @@
 #include "server/http/nodes/node.h"
 #include "server/transport/message.h"
 
+#define NODE_FILE_MAX ((uint64_t)1 << 40) /* bytes; the disk is what limits it */
+
 /* Start of the body of r: sets r->upload, or refuses with a reply. The request's key has been checked. */
 struct response *node_body_begin(struct api *api, struct request *r);
 /* The next bytes; NULL, or a reply that ends the request. */
