@@ -293,7 +293,8 @@ static enum status transport_failed(struct request_try *a, CURLcode code, const 
         return advise(STATUS_INPUT, advice->url, err);
     }
     error_set(err, STATUS_UNAVAILABLE, "cannot reach %s: %s", a->request->server, why);
-    if (code == CURLE_PEER_FAILED_VERIFICATION || code == CURLE_SSL_CACERT_BADFILE)
+    a->reply->is_untrusted = code == CURLE_PEER_FAILED_VERIFICATION || code == CURLE_SSL_CACERT_BADFILE;
+    if (a->reply->is_untrusted)
         return advise(STATUS_UNAVAILABLE, advice->ca, err);
     if (code == CURLE_SSL_CONNECT_ERROR)
         return error_hint(err, "does it speak https, or should the URL begin with http://?");

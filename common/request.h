@@ -55,6 +55,7 @@ struct reply {
     int64_t range_first;    /* of Content-Range; -1: absent */
     char location[256];     /* "": absent */
     int64_t upload_offset;  /* -1: absent */
+    bool is_untrusted;      /* code 0: the server's certificate, or the file of those to trust, cannot be used */
 };
 void reply_init(struct reply *reply);
 void reply_release(struct reply *reply);

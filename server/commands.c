@@ -34,8 +34,9 @@ static const struct server_command table[] = {
     {"executor", "list|test NAME", "list where jobs run, or try a cluster's scheduler",
      "`executor test` submits a job of some seconds by the commands of NAME.conf in executors_dir, says each\n"
      "step and what it took, and cancels a second one. NAME need not be used by the daemon yet. With `shared`\n"
-     "in the file, also whether the nodes have the same version, and their clocks the same time. (`executor\n"
-     "probe` is what that job runs.)\n",
+     "in the file, also whether the nodes have the same version, whether their clocks agree, and whether they\n"
+     "reach the daemon at `url`, which must run, and trust its certificate. (`executor probe` is what that\n"
+     "job runs.)\n",
      "  unbaked executor test slurm\n", executor_flags, executor_command},
     {"usage", "", "print the CPU hours of users' jobs by month, as CSV",
      "A line for each month (UTC) and user: month, user, cpu_hours. The user is empty for jobs that were\n"

@@ -8,17 +8,17 @@
 
 #include "common/file.h"
 #include "common/mem.h"
-#include "common/request.h"
 #include "server/executor/command.h"
 #include "server/executor/listed.h"
 #include "server/executor/sites.h"
 #include "server/executor/try.h"
 
-#define URL_SEC 5.0
 #define WAIT_SEC "600"
 
 const struct flag executor_flags[] = {
     {"--wait", "SEC", "how long a test waits for its job to begin (" WAIT_SEC ")"},
+    {"--url", "URL", "of probe: the daemon that this machine should reach"},
+    {"--ca", "FILE", "of probe: certificates to trust instead of the system's"},
     INVOCATION_FLAGS,
     COMMAND_HELP_FLAG,
     {0},
@@ -75,19 +75,13 @@ static void examine_status(const struct site *site, void (*tell)(void *, bool, c
 }
 
 static void examine_url(const struct site *site, void (*tell)(void *, bool, const char *), void *user) {
-    struct http_request *request = request_new(site->url, 0.0, -1);
-    const struct request_call call = {.path = "/readyz", .silence_sec = URL_SEC, .once = true};
-    struct reply reply;
     struct error err;
-    reply_init(&reply);
-    enum status status = request_run(request, &call, &reply, &err);
-    bool is_good = status == STATUS_OK || reply.code > 0;
-    char *text = mem_printf("%s: %s %s%s", site->name, site->url,
-                            is_good ? "answers" : "does not answer from here: ", is_good ? "" : err.message);
+    const char *ca = *site->ca && access(site->ca, R_OK) == 0 ? site->ca : NULL; /* it lies on the nodes, maybe here */
+    bool is_good = probe_url(site->url, ca, &err) == STATUS_OK;
+    char *text = is_good ? mem_printf("%s: %s answers", site->name, site->url)
+                         : mem_printf("%s: from here, %s", site->name, err.message);
     tell(user, is_good, text);
     mem_free(text);
-    reply_release(&reply);
-    request_free(request);
 }
 
 void executor_examine(const struct site *site, void (*tell)(void *user, bool is_good, const char *text), void *user) {
@@ -160,7 +154,10 @@ int executor_command(int argc, char **argv) {
     else if (code < 0 && strcmp(word, "test") == 0 && a->word_count == 2)
         code = test(&in.config, a->words[1], wait_sec);
     else if (code < 0 && strcmp(word, "probe") == 0 && a->word_count <= 2) {
-        code = probe_run(a->word_count == 2 ? a->words[1] : NULL, &err) == STATUS_OK ? EXIT_SUCCESS : EXIT_FAILURE;
+        const struct node_probe probe = {.file = a->word_count == 2 ? a->words[1] : NULL,
+                                         .url = invocation_value(&in, "--url", NULL),
+                                         .ca = invocation_value(&in, "--ca", NULL)};
+        code = probe_run(&probe, &err) == STATUS_OK ? EXIT_SUCCESS : EXIT_FAILURE;
         if (code != EXIT_SUCCESS)
             fprintf(stderr, "unbaked: %s\n", err.message);
     } else if (code < 0)

@@ -293,7 +293,9 @@ static void judge_silent(struct remote_run *r) {
     else if (r->unknown_count >= REMOTE_UNKNOWN_MAX && is_claimed)
         remote_decide(r, RUN_LOST, 0, "%s is silent, and %s does not run it any more", host, name);
     else if (r->unknown_count >= REMOTE_UNKNOWN_MAX)
-        remote_decide(r, RUN_LOST, 0, "%s has ended it before its node reported", name);
+        remote_decide(r, RUN_LOST, 0,
+                      "%s has ended it before its node reported; do its nodes have %.60s, and reach %.80s?", name,
+                      r->remote->parts.site->node, r->remote->parts.site->url);
 }
 
 void remote_judge(struct remote *m) {

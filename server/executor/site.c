@@ -45,6 +45,7 @@ static const struct key {
     STATES(memory, SITE_MEMORY, ""),
     STATES(preempted, SITE_PREEMPTED, ""),
     TEXT(url, NULL),                /* of the daemon, as nodes reach it */
+    TEXT(ca, ""),                   /* file on the nodes: certificates to trust instead of the system's */
     TEXT(node, "unbaked"),          /* the program on the nodes */
     TEXT(cache, "/var/tmp/unbake"), /* folder of scenes on the nodes */
     TEXT(partition, ""),
@@ -235,12 +236,16 @@ static void check_all(const struct site *s, const bool *seen, struct buf *proble
     check_pattern(s, "status_line", s->status_line, "{name}", problems);
     check_pattern(s, "status_line", s->status_line, "{state}", problems);
     check_plain(s, "url", s->url, problems);
+    check_plain(s, "ca", s->ca, problems);
     check_plain(s, "node", s->node, problems);
     check_plain(s, "cache", s->cache, problems);
     check_plain(s, "partition", s->partition, problems);
     check_plain(s, "shared", s->shared, problems);
-    if (s->url && strncmp(s->url, "http://", 7) != 0 && strncmp(s->url, "https://", 8) != 0)
-        buf_printf(problems, "%s: url must begin with http:// or https://, not \"%s\"\n", s->where, s->url);
+    if (s->url && strncmp(s->url, "http://", 7) != 0 && strncmp(s->url, "https://", 8) != 0 &&
+        strncmp(s->url, "unix:/", 6) != 0)
+        buf_printf(problems, "%s: url must begin with http://, https:// or unix:/, not \"%s\"\n", s->where, s->url);
+    if (*s->ca && s->url && strncmp(s->url, "https://", 8) != 0)
+        buf_printf(problems, "%s: ca is for a url that begins with https://\n", s->where);
 }
 
 enum status site_read(struct site *site, const char *name, const char *path, struct buf *problems, struct error *err) {
@@ -299,8 +304,8 @@ long site_memory_mib(const struct site *s, double memory_bytes) {
 
 /* The command line that a script runs, of plain words; the caller's. */
 static char *node_command(const struct site *s, const struct site_job *job) {
-    return mem_printf("%s node %s --job %lld --attempt %d --cache %s", s->node, s->url, (long long)job->job_id,
-                      job->attempt, s->cache);
+    return mem_printf("%s node %s --job %lld --attempt %d --cache %s%s%s", s->node, s->url, (long long)job->job_id,
+                      job->attempt, s->cache, *s->ca ? " --ca " : "", s->ca);
 }
 
 static char *filled(const struct site *s, const char *text, const struct site_job *given) {

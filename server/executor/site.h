@@ -36,7 +36,7 @@ struct site {
     char *submit_id;                           /* pattern of the line of submit's output that has the id; "": none */
     char *status_line;                         /* pattern of the lines of status' output */
     char *states[SITE_PREEMPTED + 1];          /* words, separated by blanks */
-    char *url, *node, *cache, *partition, *shared, *script;
+    char *url, *ca, *node, *cache, *partition, *shared, *script;
     double max_running, threads, memory_mib, memory_percent, time_min, status_sec, deadline_sec, lease_sec;
 };
 

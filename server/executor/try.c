@@ -12,9 +12,11 @@
 #include "common/json.h"
 #include "common/mem.h"
 #include "common/protocol.h"
+#include "common/request.h"
 #include "server/executor/command.h"
 #include "server/executor/listed.h"
 
+#define URL_SEC 5.0
 #define LOOK_SEC 1.0
 #define END_SEC 120.0 /* for a job to be seen to end, or to go once it is cancelled */
 #define CLOCK_SEC 2.0 /* by which clocks may differ; leases do not depend on them, times of files and logs do */
@@ -34,16 +36,42 @@ static void sleep_sec(double seconds) {
 
 /* --- on the node ----------------------------------------------------------------------------- */
 
-enum status probe_run(const char *file, struct error *err) {
+enum status probe_url(const char *url, const char *ca, struct error *err) {
+    static const struct request_advice advice = {.ca = "the key ca names the certificates to trust"};
+    struct http_request *request = request_new(url, 0.0, -1);
+    const struct request_call call = {.path = "/readyz", .silence_sec = URL_SEC, .once = true};
+    struct reply reply;
+    reply_init(&reply);
+    request_set_advice(request, &advice);
+    if (ca)
+        request_set_ca(request, ca);
+    enum status status = request_run(request, &call, &reply, err);
+    if (reply.code > 0)
+        status = STATUS_OK;
+    reply_release(&reply);
+    request_free(request);
+    return status;
+}
+
+enum status probe_run(const struct node_probe *probe, struct error *err) {
     char host[64] = "";
+    struct error why = {0};
+    enum status status = probe->url ? probe_url(probe->url, probe->ca, &why) : STATUS_OK;
     sleep_sec(TRY_JOB_SEC);
-    if (!file)
-        return STATUS_OK;
+    if (!probe->file) {
+        *err = why;
+        return status;
+    }
     gethostname(host, sizeof host - 1);
-    char *text = mem_printf("{\"host\":\"%s\",\"version\":\"%s\",\"unix_ms\":%lld}\n", host, UNBAKE_VERSION,
-                            (long long)clock_unix_ms());
-    enum status status = file_replace(file, text, strlen(text), err);
+    cJSON *said = cJSON_CreateObject();
+    json_add_string(said, "host", host);
+    json_add_string(said, "version", UNBAKE_VERSION);
+    json_add_int(said, "unix_ms", clock_unix_ms());
+    json_add_string(said, "url_error", status == STATUS_OK ? "" : why.message);
+    char *text = json_text(said);
+    status = file_replace(probe->file, text, strlen(text), err);
     mem_free(text);
+    cJSON_Delete(said);
     return status;
 }
 
@@ -170,7 +198,7 @@ static void follow(struct attempt_at *t, double wait_sec) {
 static void try_shared(struct attempt_at *t, const char *file) {
     cJSON *probe;
     struct error err;
-    const char *host = "", *version = "";
+    const char *host = "", *version = "", *url_error = "it does not say";
     double unix_ms = 0.0;
     char text[256];
     begin(t);
@@ -180,6 +208,7 @@ static void try_shared(struct attempt_at *t, const char *file) {
     }
     (void)json_string(probe, "host", "probe", "", &host, NULL);
     (void)json_string(probe, "version", "probe", "", &version, NULL);
+    (void)json_string(probe, "url_error", "probe", url_error, &url_error, NULL);
     (void)json_number(probe, "unix_ms", "probe", 0.0, &unix_ms, NULL);
     struct stat info;
     double apart = stat(file, &info) == 0 ? 1e-3 * unix_ms - (double)info.st_mtim.tv_sec : 0.0;
@@ -187,6 +216,9 @@ static void try_shared(struct attempt_at *t, const char *file) {
     say(t, strcmp(version, UNBAKE_VERSION) == 0, "shared", text);
     snprintf(text, sizeof text, "the clock of %s and that of the folder are %.1f s apart", host, apart);
     say(t, apart < CLOCK_SEC && apart > -CLOCK_SEC, "clocks", text);
+    snprintf(text, sizeof text, *url_error ? "%.60s: %.180s" : "%.60s reaches %.180s", host,
+             *url_error ? url_error : t->site->url);
+    say(t, !*url_error, "url", text);
     cJSON_Delete(probe);
     unlink(file);
 }
@@ -219,9 +251,12 @@ static void try_cancel(struct attempt_at *t, const char *random, const char *com
 bool try_site(const struct site *site, double wait_sec) {
     struct attempt_at t = {.site = site};
     char random[32];
+    if (!*site->shared)
+        printf("note: without a folder `shared`, whether nodes reach %s is not tried\n", site->url);
     snprintf(random, sizeof random, "%lx-%x", (unsigned long)clock_unix_ms(), (unsigned)getpid());
     char *file = *site->shared ? mem_printf("%s/" NAME_PREFIX "probe-%s", site->shared, random) : NULL;
-    char *command = mem_printf("%s executor probe%s%s", site->node, file ? " " : "", file ? file : "");
+    char *command = mem_printf("%s executor probe --url %s%s%s%s%s", site->node, site->url, *site->ca ? " --ca " : "",
+                               site->ca, file ? " " : "", file ? file : "");
     try_info(&t);
     if (!t.failed && try_submit(&t, random, command)) {
         follow(&t, wait_sec);

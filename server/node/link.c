@@ -41,7 +41,8 @@ static void draw_claimant(char field[128]) {
 }
 
 static const struct request_advice advice = {.url = "an example: unbaked node https://lab.example.org:7117",
-                                             .ca = "--ca FILE names the certificates to trust",
+                                             .ca = "--ca FILE (the key ca of the executor's file) names the"
+                                                   " certificates to trust",
                                              .any = "can this machine reach the daemon's?"};
 
 static struct http_request *connect_to(const struct link_config *config) {
@@ -145,7 +146,9 @@ enum status link_claim(struct attempt_link *l, const char *host, int threads, cJ
     reply_init(&reply);
     *order = NULL;
     enum status status = post(l, "claim", body, "order", &reply, &sent, err);
-    for (int tries = 0; (status == STATUS_UNAVAILABLE || status == STATUS_NO_SPACE) && link_pause(l, tries); tries++)
+    for (int tries = 0;
+         (status == STATUS_UNAVAILABLE || status == STATUS_NO_SPACE) && !reply.is_untrusted && link_pause(l, tries);
+         tries++)
         status = post(l, "claim", body, "order", &reply, &sent, err);
     if (status == STATUS_OK) {
         *order = cJSON_DetachItemFromObjectCaseSensitive(reply.json, "order");

@@ -63,7 +63,7 @@ void link_release(struct attempt_link *l);
 /* Looks at the clock, too. */
 enum link_state link_state(struct attempt_link *l);
 
-/* Claims the attempt; tries for as long as a lease is. *order is the caller's. STATUS_CONFLICT: another has it, it is
+/* Claims the attempt; tries for as long as a lease is, but only once where the daemon's certificate is not trusted. *order is the caller's. STATUS_CONFLICT: another has it, it is
  * over, or the versions differ; the message says so. */
 enum status link_claim(struct attempt_link *l, const char *host, int threads, cJSON **order, struct error *err);
 

@@ -56,7 +56,9 @@ static void test_faults(void) {
     expect("submit_id = nothing\nstatus_line = {name}{state}\nurl = ftp://x\n" SCRIPT,
            "submit_id must have the placeholder {id}");
     expect("status_line = {name}{state}\n" SCRIPT, "two placeholders with nothing between them");
-    expect("url = ftp://x\n" SCRIPT, "url must begin with http:// or https://");
+    expect("url = ftp://x\n" SCRIPT, "url must begin with http://, https:// or unix:/");
+    expect(GOOD "ca = /a b\n" SCRIPT, "ca may only have letters");
+    expect(GOOD "ca = /lab.pem\n" SCRIPT, "ca is for a url that begins with https://");
     CHECK(site_name_is_good("slurm-2") && !site_name_is_good("process") && !site_name_is_good("a/b") &&
           !site_name_is_good("") && !site_name_is_good("-x"));
 }
