@@ -15,6 +15,8 @@
 #define TEXT_MAX_LENGTH 255
 
 static const struct setting table[] = {
+    {"bake_uv", SETTING_CHOICE, "", 0, 0, "auto|off", "auto", NULL,
+     "textures also in the mesh's own texture coordinates (uv_base_color.exr and so on), where it has some, of one picture, that do not overlap"},
     {"base_color_rate", SETTING_REAL, "", 1e-5, 1, NULL, "0.03", "listing1",
      "listing1: first step size of base colour; it falls over the run"},
     {"calibrate", SETTING_BOOL, "", 0, 0, NULL, "true", NULL,
@@ -47,6 +49,8 @@ static const struct setting table[] = {
      "a scene whose mesh and photographs do not fit, as its check found, is refused; or reconstructed all the same"},
     {"gather_samples", SETTING_INT, "rays", 16, 1048576, NULL, "512", "solve",
      "solve: directions from which light is gathered at each point where it is"},
+    {"glb_textures", SETTING_CHOICE, "", 0, 0, "atlas|input", "atlas", NULL,
+     "textures of scene.glb: those of the atlas, or in the mesh's own texture coordinates where bake_uv could make them"},
     {"gloss_passes", SETTING_INT, "", 1, 2, NULL, "2", "solve",
      "solve: how many times roughness and specular are fitted, each in light that is better known"},
     {"grey_card", SETTING_PIXEL, "", 1e-3, 1, NULL, "", NULL,

@@ -122,9 +122,7 @@ static size_t turn(struct mesh *mesh, const long *balance) {
         turned[t] = sum[piece[t]] < 0;
         if (!turned[t])
             continue;
-        uint32_t *v = mesh->index[t], second = v[1];
-        v[1] = v[2];
-        v[2] = second;
+        mesh_turn_triangle(mesh, t);
         count++;
     }
     if (mesh->normal && count > 0)

@@ -9,6 +9,7 @@
 #define MIB 1048576.0
 #define BASE_BYTES (40.0 * MIB) /* program and libraries */
 #define TRIANGLE_BYTES 200.0    /* mesh, acceleration structure, adjacency, charts */
+#define UV_BYTES 24.0           /* of a triangle of a mesh with texture coordinates */
 #define PIXEL_BYTES 25.0        /* 11 to 13 of a photograph with what is found of it, 14 while detail is solved */
 
 double estimate_memory_bytes(const struct scene *scene, double side) {
@@ -18,7 +19,8 @@ double estimate_memory_bytes(const struct scene *scene, double side) {
     double pixel_bytes = PIXEL_BYTES * pixels;
     if (scene->spill)
         pixel_bytes = fmin(pixel_bytes, (double)spill_memory_bytes(scene->spill));
-    return BASE_BYTES + pixel_bytes + TRIANGLE_BYTES * (double)scene->mesh.triangle_count +
+    return BASE_BYTES + pixel_bytes +
+           (TRIANGLE_BYTES + (scene->mesh.uv ? UV_BYTES : 0.0)) * (double)scene->mesh.triangle_count +
            ESTIMATE_TEXEL_BYTES * side * side;
 }
 

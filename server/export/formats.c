@@ -10,8 +10,10 @@
 
 static enum status write_glb(const char *dir, const struct export_input *input, const struct parts *parts,
                              struct error *err) {
-    char *path = file_join(dir, "scene.glb"), *base_color = file_join(dir, FORMATS_BASE_COLOR);
-    char *emission = file_join(dir, FORMATS_EMISSION);
+    bool own = glb_shown(input) != input;
+    char *path = file_join(dir, "scene.glb");
+    char *base_color = file_join(dir, own ? FORMATS_BAKED FORMATS_BASE_COLOR : FORMATS_BASE_COLOR);
+    char *emission = file_join(dir, own ? FORMATS_BAKED FORMATS_EMISSION : FORMATS_EMISSION);
     enum status status = glb_write(path, input, parts, base_color, emission, err);
     mem_free(emission);
     mem_free(base_color);

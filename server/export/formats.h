@@ -9,6 +9,7 @@
  * where there is distant light, the last (sky.h) where there is also a sun. */
 #define FORMATS_BASE_COLOR "base_color.png"
 #define FORMATS_EMISSION "emission.png"
+#define FORMATS_BAKED "uv_" /* begins the names of both in the input's own layout (uv_bake.h) */
 #define FORMATS_ENVIRONMENT "environment.exr"
 #define FORMATS_SKY "sky.exr"
 

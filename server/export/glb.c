@@ -32,13 +32,24 @@
 #define CAMERAS_MAX 100 /* of held-out views */
 #define NEAR_M 0.01
 
-/* Buffer views, in order. Without normals there is no NORMAL, without emission patterns no EMISSION. */
-enum buffer_view { VIEW_POSITION, VIEW_NORMAL, VIEW_UV, VIEW_INDEX, VIEW_BASE_COLOR, VIEW_EMISSION, VIEW_COUNT };
+/* Buffer views, in order. Without normals there is no NORMAL, without texture coordinates of the input no INPUT_UV,
+ * without emission patterns no EMISSION. */
+enum buffer_view {
+    VIEW_POSITION,
+    VIEW_NORMAL,
+    VIEW_UV,
+    VIEW_INPUT_UV,
+    VIEW_INDEX,
+    VIEW_BASE_COLOR,
+    VIEW_EMISSION,
+    VIEW_COUNT
+};
 
 struct glb {
     const struct export_input *in;
     const struct parts *parts;
-    const float *scales; /* [segment_count] see emission_texture.h; NULL: no emission pattern */
+    const struct export_input *shown; /* whose textures it has: the atlas's or those in the input's layout */
+    const float *scales;              /* [segment_count] see emission_texture.h; NULL: no emission pattern */
     struct {
         uint64_t offset, length;
         int number;
@@ -48,6 +59,8 @@ struct glb {
     int accessor_count, node_count;
 };
 
+static bool shows_input_uv(const struct glb *g) { return g->shown != g->in; }
+
 static uint64_t padded(uint64_t length) { return (length + 3) / 4 * 4; }
 
 static void lay_out(struct glb *g, uint64_t base_color_bytes, uint64_t emission_bytes) {
@@ -56,6 +69,7 @@ static void lay_out(struct glb *g, uint64_t base_color_bytes, uint64_t emission_
         [VIEW_POSITION] = 12 * vertices,
         [VIEW_NORMAL] = g->in->mesh->normal ? 12 * vertices : 0,
         [VIEW_UV] = 8 * vertices,
+        [VIEW_INPUT_UV] = g->in->mesh->uv ? 8 * vertices : 0,
         [VIEW_INDEX] = 12 * (uint64_t)g->in->mesh->triangle_count,
         [VIEW_BASE_COLOR] = base_color_bytes,
         [VIEW_EMISSION] = emission_bytes,
@@ -94,7 +108,8 @@ static void add_views(struct glb *g) {
         json_add_int(view, "byteOffset", (int64_t)g->view[v].offset);
         json_add_int(view, "byteLength", (int64_t)g->view[v].length);
         if (v < VIEW_INDEX)
-            json_add_int(view, "byteStride", v == VIEW_UV ? 8 : 12); /* shared by several accessors */
+            json_add_int(view, "byteStride",
+                         v == VIEW_UV || v == VIEW_INPUT_UV ? 8 : 12); /* shared by several accessors */
         if (v < VIEW_BASE_COLOR)
             json_add_int(view, "target", v == VIEW_INDEX ? TARGET_INDICES : TARGET_VERTICES);
     }
@@ -122,8 +137,9 @@ static void add_pictures(struct glb *g) {
     if (g->scales)
         add_picture(images, textures, "emission", g->view[VIEW_EMISSION].number);
     cJSON *extras = add_object(sampler, "extras");
-    json_add_int(extras, "clean_mip_level", atlas_clean_level(g->in->atlas->padding));
-    json_add_number(extras, "atlas_utilisation", g->in->atlas->utilisation);
+    if (!shows_input_uv(g)) /* of the input's layout nobody knows */
+        json_add_int(extras, "clean_mip_level", atlas_clean_level(g->in->atlas->padding));
+    json_add_number(extras, "atlas_utilisation", g->shown->atlas->utilisation);
 }
 
 /* Returns its index. */
@@ -152,6 +168,8 @@ static void add_mesh(struct glb *g, cJSON *mesh, size_t i, const char *name) {
     if (g->in->mesh->normal)
         json_add_int(attributes, "NORMAL", add_accessor(g, VIEW_NORMAL, first, count, "VEC3", 12, NULL));
     json_add_int(attributes, "TEXCOORD_0", add_accessor(g, VIEW_UV, first, count, "VEC2", 8, NULL));
+    if (g->in->mesh->uv)
+        json_add_int(attributes, "TEXCOORD_1", add_accessor(g, VIEW_INPUT_UV, first, count, "VEC2", 8, NULL));
     json_add_int(primitive, "indices",
                  add_accessor(g, VIEW_INDEX, 3 * part->first_triangle, 3 * part->triangle_count, "SCALAR", 4, NULL));
     json_add_int(primitive, "material", (int64_t)i);
@@ -165,12 +183,19 @@ static void add_emission(cJSON *material, cJSON *extensions, rgb emission) {
     json_add_number(add_object(extensions, "KHR_materials_emissive_strength"), "emissiveStrength", (double)strength);
 }
 
+static void add_texture(const struct glb *g, cJSON *parent, const char *key, int number) {
+    cJSON *use = add_object(parent, key);
+    json_add_int(use, "index", number);
+    if (shows_input_uv(g))
+        json_add_int(use, "texCoord", 1);
+}
+
 static void add_material(const struct glb *g, cJSON *material, uint32_t s, const char *name) {
     const struct materials *m = g->in->materials;
     bool varies = g->scales && g->scales[s] > 0.0f, emits = rgb_max(m->emission[s]) > 0.0f;
     json_add_string(material, "name", name);
     cJSON *model = add_object(material, "pbrMetallicRoughness");
-    json_add_int(add_object(model, "baseColorTexture"), "index", 0);
+    add_texture(g, model, "baseColorTexture", 0);
     json_add_number(model, "metallicFactor", 0.0);
     json_add_number(model, "roughnessFactor", (double)m->roughness[s]);
     json_add_bool(material, "doubleSided", !emits);
@@ -181,7 +206,7 @@ static void add_material(const struct glb *g, cJSON *material, uint32_t s, const
     if (emits)
         add_emission(material, extensions, varies ? rgb_gray(g->scales[s]) : m->emission[s]);
     if (varies)
-        json_add_int(add_object(material, "emissiveTexture"), "index", 1);
+        add_texture(g, material, "emissiveTexture", 1);
     json_add_number(add_object(material, "extras"), "specular", (double)m->specular[s]);
 }
 
@@ -315,6 +340,11 @@ static void put_bytes(const struct glb *g, struct sink *out, const char *base_co
         sink_float(out, uv.x);
         sink_float(out, uv.y);
     }
+    for (size_t v = 0; v < seams->vertex_count && mesh->uv; v++) {
+        vec2 uv = seams_input_uv(seams, mesh, v);
+        sink_float(out, uv.x);
+        sink_float(out, 1.0f - uv.y);
+    }
     for (size_t p = 0; p < g->parts->count; p++) {
         const struct part *part = &g->parts->part[p];
         for (size_t i = part->first_triangle; i < part->first_triangle + part->triangle_count; i++)
@@ -331,6 +361,10 @@ static void put_chunk_head(struct sink *out, uint64_t length, uint32_t type) {
     sink_u32(out, type);
 }
 
+const struct export_input *glb_shown(const struct export_input *input) {
+    return input->options.glb_has_uv && input->baked ? input->baked : input;
+}
+
 enum status glb_write(const char *path, const struct export_input *input, const struct parts *parts,
                       const char *base_color, const char *emission, struct error *err) {
     struct stat info, emission_info = {.st_size = 0};
@@ -339,8 +373,9 @@ enum status glb_write(const char *path, const struct export_input *input, const 
         return error_set_errno(err, errno, "cannot look at %s", base_color);
     if (input->materials->emission_pattern && stat(emission, &emission_info) != 0)
         return error_set_errno(err, errno, "cannot look at %s", emission);
-    float *scales = emission_texture_scales(input);
-    struct glb g = {.in = input, .parts = parts, .scales = scales};
+    const struct export_input *shown = glb_shown(input);
+    float *scales = emission_texture_scales(shown);
+    struct glb g = {.in = input, .parts = parts, .shown = shown, .scales = scales};
     lay_out(&g, (uint64_t)info.st_size, (uint64_t)emission_info.st_size);
     char *json = describe(&g);
     uint64_t json_length = strlen(json);

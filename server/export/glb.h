@@ -19,6 +19,9 @@
  * - F (Schlick), ours does not. Glossy surfaces are a few percent darker in glTF, and rooms of them more. Emitters
  * are single-sided, since ours emit from the front; everything else is double-sided.
  *
+ * TEXCOORD_0 are the atlas's coordinates, TEXCOORD_1 those of the input, where it has some. Textures are those of the
+ * atlas, or on request those in the input's own layout, looked up by TEXCOORD_1 (glb_shown).
+ *
  * glTF has no ratified environment light: the extras of node "room" name environment.exr, with the layout of
  * outputs.h in the room's axes. */
 #ifndef UNBAKE_EXPORT_GLB_H
@@ -26,6 +29,9 @@
 
 #include "server/export/input.h"
 #include "server/export/parts.h"
+
+/* Whose textures the file shows: the input, or its `baked`. */
+const struct export_input *glb_shown(const struct export_input *input);
 
 /* `base_color` and `emission` (used when an emitter has a pattern) are the PNG files to embed. The same input gives
  * the same bytes; STATUS_LIMIT for 4 GiB or more. */

@@ -8,6 +8,7 @@
 
 #include "common/image.h"
 #include "common/json.h"
+#include "common/parallel.h"
 #include "server/scene/atlas.h"
 #include "server/scene/camera.h"
 #include "server/scene/inverse_uv.h"
@@ -41,6 +42,12 @@ struct export_camera {
     bool is_held_out;
 };
 
+/* What the user chose of the files. */
+struct export_options {
+    bool bakes_uv;   /* also writes textures in the input's own texture coordinates, see uv_bake.h */
+    bool glb_has_uv; /* scene.glb shows these, where they could be made */
+};
+
 /* All borrowed. */
 struct export_input {
     const char *title; /* the job's or the scene's name */
@@ -68,6 +75,10 @@ struct export_input {
     size_t camera_count;
     const struct export_camera *camera; /* of all photographs */
     double luminance_per_unit;          /* cd/m2 of radiance 1; 0: unknown */
+    struct export_options options;
+    struct parallel *pool;            /* for uv_bake.h */
+    const struct export_input *baked; /* set by outputs.c: with atlas, inverse and materials in the input's own layout;
+                                       * NULL: not made */
 };
 
 #endif

@@ -5,6 +5,8 @@
  * those of the mesh, so connectivity is preserved; texture coordinates have their origin at the lower left. Metres,
  * in the room's axes.
  *
+ * The format has one set of texture coordinates: those of the input are in the other files.
+ *
  * MTL cannot express our specular lobe exactly. Ks is `specular`, which readers such as Blender take for a level with
  * 0.5 = an index of refraction of 1.5 (Ni). Ns is 1000 (1 - roughness)^2, which Blender inverts. Pr is roughness, Ke
  * radiance (for emitters with a pattern the scale of map_Ke); map_Kd and map_Ke are the pictures beside it, in sRGB. */

@@ -8,17 +8,18 @@ static void put_header(struct sink *out, const struct mesh *mesh, size_t vertex_
     sink_printf(out, "ply\nformat binary_little_endian 1.0\n");
     sink_offset(out, "comment", mesh->offset, "\n");
     sink_printf(out,
-                "comment s t: atlas coordinates, origin lower left\n"
+                "comment s t: atlas coordinates, origin lower left\n%s"
                 "comment TextureFile base_color.png\n" /* as MeshLab and Blender read it */
                 "element vertex %zu\n"
                 "property float x\nproperty float y\nproperty float z\n%s"
-                "property float s\nproperty float t\n"
+                "property float s\nproperty float t\n%s"
                 "element face %zu\n"
                 "property list uchar int vertex_indices\n"
                 "property int segment\nproperty int face\n"
                 "end_header\n",
-                vertex_count, mesh->normal ? "property float nx\nproperty float ny\nproperty float nz\n" : "",
-                mesh->triangle_count);
+                mesh->uv ? "comment s1 t1: texture coordinates of the input, origin lower left\n" : "", vertex_count,
+                mesh->normal ? "property float nx\nproperty float ny\nproperty float nz\n" : "",
+                mesh->uv ? "property float s1\nproperty float t1\n" : "", mesh->triangle_count);
 }
 
 enum status mesh_ply_write(const char *path, const struct mesh *mesh, const struct segments *segments,
@@ -37,6 +38,11 @@ enum status mesh_ply_write(const char *path, const struct mesh *mesh, const stru
         vec2 uv = seams_uv(&seams, atlas, v);
         sink_float(&out, uv.x);
         sink_float(&out, 1.0f - uv.y);
+        if (mesh->uv) {
+            vec2 own = seams_input_uv(&seams, mesh, v);
+            sink_float(&out, own.x);
+            sink_float(&out, own.y);
+        }
     }
     for (size_t t = 0; t < mesh->triangle_count; t++) {
         sink_bytes(&out, "\3", 1);

@@ -9,13 +9,14 @@
 #include "common/file.h"
 #include "common/mem.h"
 #include "common/protocol.h"
-#include "server/export/emission_texture.h"
 #include "server/export/formats.h"
 #include "server/export/mesh_ply.h"
 #include "server/export/pictures.h"
 #include "server/export/report_html.h"
 #include "server/export/segments_json.h"
 #include "server/export/sky.h"
+#include "server/export/texture_files.h"
+#include "server/export/uv_bake.h"
 #include "server/export/views_json.h"
 
 #define MIME_PLY "model/ply"
@@ -24,34 +25,12 @@
 #define PAGE_LIMIT ((size_t)1 << 29) /* bytes */
 #define PAGE_COMPARISONS 24          /* side-by-sides embedded in the page; files of all are written */
 
-#define RADIANCE_UNIT "radiance of which a photograph of exposure 1 shows 1 as pixel value 1"
-
-struct output_kind {
-    enum picture_kind kind;
-    const char *stem;
-    enum image_exr_type type;
-    const char *title, *unit, *about; /* `about` is for report.json and the page */
-};
-
-static const struct output_kind kinds[] = {
-    {PICTURE_BASE_COLOR, "base_color", IMAGE_HALF, "Base colour", "reflectance",
-     "linear Rec. 709 reflectance by texel"},
-    {PICTURE_EMISSION, "emission", IMAGE_HALF, "Emission", RADIANCE_UNIT,
-     "radiance of each emitter's front side, exactly 0 elsewhere; compressed by 1 / (1 + maximum) "
-     "in the preview"},
-    {PICTURE_ROUGHNESS, "roughness", IMAGE_HALF, "Roughness", "1",
-     "by segment, 0 to 1; the microfacet width is its square"},
-    {PICTURE_SPECULAR, "specular", IMAGE_HALF, "Specular", "1",
-     "by segment, 0 to 1; 0.5 is an index of refraction of 1.5"},
-    {PICTURE_CONFIDENCE, "confidence", IMAGE_FLOAT, "Confidence",
-     "standard deviation of base_color.exr, in reflectance",
-     "standard deviation of base colour by texel; in the preview from yellow (.01 and less) to blue (.2 and more)"},
-};
-#define KIND_COUNT (sizeof kinds / sizeof *kinds)
-
 struct export {
     const struct export_input *input;
     struct output_files files;
+    struct uv_bake bake;
+    struct export_input with_baked; /* the input with `baked`, where that is made */
+    cJSON *input_uv;                /* for the report; NULL: the input has no texture coordinates */
 };
 
     /* --- distant light ------------------------------------------------------------------------ */
@@ -108,73 +87,43 @@ static enum status put_radiance_preview(struct export *e, struct error *err) {
     return status;
 }
 
-/* Whether the deviation of base colour is known: not before it was measured, nor where a resumed job was measured by an
- * older version. */
-static bool knows_deviation(const struct export_input *in) {
-    for (size_t i = 0; i < in->inverse->valid_count; i++)
-        if (!rgb_is_black(materials_deviation(in->materials, in->inverse->valid[i])))
-            return true;
-    return false;
-}
-
 /* --- previews and textures ---------------------------------------------------------------- */
 
 static enum status put_previews(struct export *e, struct error *err) {
     enum status status = output_files_folder(&e->files, "preview", err);
     if (status == STATUS_OK)
         status = put_radiance_preview(e, err);
-    for (size_t k = 0; e->input->has_materials && k < KIND_COUNT && status == STATUS_OK; k++) {
-        struct image image;
-        char name[64];
-        if (kinds[k].kind == PICTURE_CONFIDENCE && !knows_deviation(e->input))
-            continue;
-        snprintf(name, sizeof name, "preview/%s.png", kinds[k].stem);
-        picture_preview(e->input, kinds[k].kind, &image);
-        status = output_files_image(&e->files, EVENT_PREVIEW, name, &image, OUTPUT_PNG, NULL, kinds[k].about, err);
-        image_release(&image);
-    }
+    if (status == STATUS_OK && e->input->has_materials)
+        status = texture_files_preview(&e->files, e->input, err);
     return status == STATUS_OK ? put_environment_preview(e, err) : status;
 }
 
-/* Of rooms in which an emitter has a pattern. */
-static enum status put_emission_png(struct export *e, const uint32_t *source, struct error *err) {
-    float *scales = emission_texture_scales(e->input);
-    struct image image;
-    if (!scales)
-        return STATUS_OK;
-    emission_texture(e->input, source, scales, &image);
-    enum status status =
-        output_files_image(&e->files, EVENT_OUTPUT, FORMATS_EMISSION, &image, OUTPUT_PNG, NULL,
-                           "what emitters show that are not equally bright all over, each over the brightest of "
-                           "it, in 8 bits, sRGB",
-                           err);
-    image_release(&image);
-    mem_free(scales);
-    return status;
+/* What became of the input's own texture coordinates, for the report. */
+static void say_bake(struct export *e, const struct uv_bake *bake) {
+    e->input_uv = cJSON_CreateObject();
+    json_add_number(e->input_uv, "share_of_area", bake->uv_share);
+    json_add_bool(e->input_uv, "baked", bake->is_made);
+    if (bake->is_made) {
+        json_add_int(e->input_uv, "texture_size", bake->atlas.width);
+        json_add_number(e->input_uv, "utilisation", bake->atlas.utilisation);
+        json_add_number(e->input_uv, "overlap", bake->overlap_share);
+    } else {
+        json_add_string(e->input_uv, "reason", bake->reason);
+    }
 }
 
-static enum status put_textures(struct export *e, struct error *err) {
-    uint32_t *source = picture_margin(e->input->inverse);
-    enum status status = STATUS_OK;
-    for (size_t k = 0; k < KIND_COUNT && status == STATUS_OK; k++) {
-        struct image image;
-        char name[64];
-        if (kinds[k].kind == PICTURE_CONFIDENCE && !knows_deviation(e->input))
-            continue;
-        snprintf(name, sizeof name, "%s.exr", kinds[k].stem);
-        picture_texture(e->input, kinds[k].kind, source, &image);
-        status = output_files_image(&e->files, EVENT_OUTPUT, name, &image,
-                                    kinds[k].type == IMAGE_HALF ? OUTPUT_EXR_HALF : OUTPUT_EXR_FLOAT, kinds[k].unit,
-                                    kinds[k].about, err);
-        if (kinds[k].kind == PICTURE_BASE_COLOR && status == STATUS_OK)
-            status = output_files_image(&e->files, EVENT_OUTPUT, FORMATS_BASE_COLOR, &image, OUTPUT_PNG, NULL,
-                                        "the same in 8 bits, sRGB", err);
-        image_release(&image);
-    }
-    if (status == STATUS_OK)
-        status = put_emission_png(e, source, err);
-    mem_free(source);
-    return status;
+/* Textures in the input's own layout, where it has one; e->baked is what they were made of. */
+static enum status put_baked(struct export *e, struct error *err) {
+    if (!e->input->mesh->uv)
+        return STATUS_OK;
+    uv_bake_make(&e->bake, e->input);
+    say_bake(e, &e->bake);
+    if (!e->bake.is_made)
+        return STATUS_OK;
+    e->with_baked = *e->input;
+    e->with_baked.baked = &e->bake.input;
+    e->input = &e->with_baked;
+    return texture_files_write(&e->files, &e->bake.input, FORMATS_BAKED, err);
 }
 
 static enum status put_mesh(struct export *e, const char *type, struct error *err) {
@@ -265,14 +214,8 @@ static enum status put_comparisons(struct export *e, struct error *err) {
 /* --- the report --------------------------------------------------------------------------- */
 
 /* The previews that put_previews has written; returns their number. Their paths are the caller's. */
-static size_t list_textures(const struct export *e, struct report_picture texture[KIND_COUNT + 1]) {
-    size_t count = 0;
-    for (size_t k = 0; k < KIND_COUNT; k++) {
-        if (kinds[k].kind == PICTURE_CONFIDENCE && !knows_deviation(e->input))
-            continue;
-        char *path = mem_printf("%s/preview/%s.png", e->files.dir, kinds[k].stem);
-        texture[count++] = (struct report_picture){path, kinds[k].title, kinds[k].about};
-    }
+static size_t list_textures(const struct export *e, struct report_picture texture[TEXTURE_FILES_MAX + 1]) {
+    size_t count = texture_files_list(e->files.dir, e->input, texture);
     if (e->input->environment)
         texture[count++] = (struct report_picture){file_join(e->files.dir, "preview/environment.png"),
                                                    ENVIRONMENT_TITLE, ENVIRONMENT_ABOUT};
@@ -283,7 +226,7 @@ static enum status put_page(struct export *e, const cJSON *report, struct error 
     size_t shown = e->input->comparison_count;
     if (shown > PAGE_COMPARISONS)
         shown = PAGE_COMPARISONS;
-    struct report_picture texture[KIND_COUNT + 1];
+    struct report_picture texture[TEXTURE_FILES_MAX + 1];
     size_t texture_count = list_textures(e, texture);
     struct report_picture *comparison = mem_array(shown, sizeof *comparison);
     for (size_t i = 0; i < shown; i++) {
@@ -314,6 +257,8 @@ static enum status put_report(struct export *e, struct error *err) {
     bool is_known = up.x != 0.0f || up.y != 0.0f || up.z != 0.0f;
     double axis[3] = {(double)up.x, is_known ? (double)up.y : 1.0, (double)up.z};
     json_add(report, "up", cJSON_CreateDoubleArray(axis, 3));
+    if (e->input_uv)
+        json_add(report, "input_uv", cJSON_Duplicate(e->input_uv, true));
     json_add(report, "segments", segments_json(e->input));
     json_add(report, "files", cJSON_Duplicate(e->files.written, true));
     if (e->files.left_out->child)
@@ -340,7 +285,7 @@ static enum status put_early_mesh(struct export *e, struct error *err) {
 
 enum status export_preview(const char *dir, const struct export_input *input, export_announce *announce, void *user,
                            struct error *err) {
-    struct export e = {input, {.dir = dir, .announce = announce, .user = user}};
+    struct export e = {.input = input, .files = {.dir = dir, .announce = announce, .user = user}};
     enum status status = put_early_mesh(&e, err);
     return status == STATUS_OK ? put_previews(&e, err) : status;
 }
@@ -351,8 +296,12 @@ static void add_note(struct export *e, const char *name, const char *text) {
 
 enum status export_outputs(const char *dir, const struct export_input *input, export_announce *announce, void *user,
                            struct error *err) {
-    struct export e = {input,
-                       {.dir = dir, .announce = announce, .user = user, cJSON_CreateArray(), cJSON_CreateArray()}};
+    struct export e = {.input = input,
+                       .files = {.dir = dir,
+                                 .announce = announce,
+                                 .user = user,
+                                 .written = cJSON_CreateArray(),
+                                 .left_out = cJSON_CreateArray()}};
     const cJSON *seed = cJSON_GetObjectItem(cJSON_GetObjectItem(input->report, "settings"), "seed");
     char number[32];
     snprintf(number, sizeof number, "%.17g", cJSON_IsNumber(seed) ? seed->valuedouble : 0.0);
@@ -362,7 +311,9 @@ enum status export_outputs(const char *dir, const struct export_input *input, ex
         add_note(&e, "seed", number);
     enum status status = put_previews(&e, err);
     if (status == STATUS_OK)
-        status = put_textures(&e, err);
+        status = texture_files_write(&e.files, input, "", err);
+    if (status == STATUS_OK)
+        status = put_baked(&e, err);
     if (status == STATUS_OK)
         status = put_environment(&e, err);
     if (status == STATUS_OK)
@@ -375,6 +326,8 @@ enum status export_outputs(const char *dir, const struct export_input *input, ex
         status = put_cameras(&e, err);
     if (status == STATUS_OK)
         status = put_report(&e, err);
+    uv_bake_release(&e.bake);
+    cJSON_Delete(e.input_uv);
     cJSON_Delete(e.files.left_out);
     cJSON_Delete(e.files.written);
     return status;

@@ -18,6 +18,8 @@
  *                    at most EXPORT_PREVIEW_SIZE texels a side
  *   base_color.png   the same as base_color.exr in 8-bit sRGB
  *   emission.png     where an emitter has a pattern: 8-bit sRGB, see emission_texture.h
+ *   uv_base_color.exr uv_base_color.png uv_roughness.exr ...   the same in the input's own texture coordinates, where
+ *                    it has some of one picture that do not overlap (uv_bake.h)
  *   scene.ply        the mesh with its atlas coordinates (mesh_ply.h)
  *   scene.glb        all of it but distant light, as glTF (glb.h)
  *   scene.obj scene.mtl   the mesh, with base_color.png (mesh_obj.h)

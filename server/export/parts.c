@@ -3,11 +3,20 @@
 
 #include <stdbool.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "common/mem.h"
 #include "common/rng.h"
 
 #define NONE UINT32_MAX
+
+/* The bits of the input's texture coordinates at a corner; 0: none. */
+static uint64_t uv_key(const struct mesh *mesh, uint32_t corner) {
+    uint64_t bits = 0;
+    if (mesh_has_uv(mesh, corner / 3))
+        memcpy(&bits, &mesh->uv[corner / 3][corner % 3], sizeof bits);
+    return bits;
+}
 
 void seams_make(struct seams *s, const struct mesh *mesh, const struct atlas *atlas, const uint32_t *order) {
     size_t corner_count = 3 * mesh->triangle_count, size = 16;
@@ -22,10 +31,12 @@ void seams_make(struct seams *s, const struct mesh *mesh, const struct atlas *at
     for (size_t i = 0; i < corner_count; i++) {
         size_t t = order ? order[i / 3] : i / 3, c = i % 3;
         uint32_t vertex = mesh->index[t][c], chart = atlas->chart_of_triangle[t];
-        size_t slot = rng_key(vertex, chart, 0) & (size - 1);
+        uint64_t uv = uv_key(mesh, (uint32_t)(3 * t + c));
+        size_t slot = rng_key(vertex, chart, uv) & (size - 1);
         for (; table[slot] != NONE; slot = (slot + 1) & (size - 1)) {
             uint32_t other = s->corner[table[slot]];
-            if (mesh->index[other / 3][other % 3] == vertex && atlas->chart_of_triangle[other / 3] == chart)
+            if (mesh->index[other / 3][other % 3] == vertex && atlas->chart_of_triangle[other / 3] == chart &&
+                uv_key(mesh, other) == uv)
                 break;
         }
         if (table[slot] == NONE) {

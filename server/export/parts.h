@@ -1,5 +1,5 @@
-/* parts.h -- the mesh divided for export: vertices split at chart seams, where they have several atlas coordinates,
- * and triangles grouped by segment. */
+/* parts.h -- the mesh divided for export: vertices split where they have several atlas coordinates (at chart seams) or
+ * several texture coordinates of the input, and triangles grouped by segment. */
 #ifndef UNBAKE_EXPORT_PARTS_H
 #define UNBAKE_EXPORT_PARTS_H
 
@@ -64,6 +64,11 @@ static inline vec3 seams_normal(const struct seams *s, const struct mesh *mesh, 
 static inline vec2 seams_uv(const struct seams *s, const struct atlas *atlas, size_t vertex) {
     vec2 place = atlas->corner[s->corner[vertex] / 3][s->corner[vertex] % 3];
     return (vec2){place.x / (float)atlas->width, place.y / (float)atlas->height};
+}
+/* Texture coordinates of the input (the mesh must have some), from the lower left; 0 where a face has none. */
+static inline vec2 seams_input_uv(const struct seams *s, const struct mesh *mesh, size_t vertex) {
+    uint32_t corner = s->corner[vertex];
+    return mesh_has_uv(mesh, corner / 3) ? mesh->uv[corner / 3][corner % 3] : (vec2){0.0f, 0.0f};
 }
 
 #endif

@@ -69,6 +69,17 @@ static void put_faces(struct sink *out, const struct parts *parts, const struct 
     sink_printf(out, "]\n");
 }
 
+static void put_input_uv(struct sink *out, const struct export_input *in, const struct parts *parts,
+                         const struct part *part) {
+    sink_printf(out, "            texCoord2f[] primvars:st1 = [");
+    for (size_t i = 0; i < part->vertex_count; i++) {
+        vec2 uv = seams_input_uv(&parts->seams, in->mesh, part->first_vertex + i);
+        sink_printf(out, "(" SINK_FLOAT ", " SINK_FLOAT ")", (double)uv.x, (double)uv.y);
+        put_separator(out, i, part->vertex_count);
+    }
+    sink_printf(out, "] (\n                interpolation = \"vertex\"\n            )\n");
+}
+
 static void put_mesh(struct sink *out, const struct export_input *in, const struct parts *parts,
                      const struct part *part) {
     bool emits = !rgb_is_black(in->materials->emission[part->segment]);
@@ -113,7 +124,10 @@ static void put_mesh(struct sink *out, const struct export_input *in, const stru
         sink_printf(out, "(" SINK_FLOAT ", " SINK_FLOAT ")", (double)uv.x, (double)(1.0f - uv.y));
         put_separator(out, i, part->vertex_count);
     }
-    sink_printf(out, "] (\n                interpolation = \"vertex\"\n            )\n        }\n");
+    sink_printf(out, "] (\n                interpolation = \"vertex\"\n            )\n");
+    if (in->mesh->uv)
+        put_input_uv(out, in, parts, part);
+    sink_printf(out, "        }\n");
 }
 
 /* What radiance is multiplied by: lights are in nits where their luminance is known (UsdLux: intensity 1 is 1 nit). */

@@ -221,6 +221,8 @@ static void append_mesh(struct mesh *mesh, const struct mesh *more) {
         mem_free(mesh->normal);
         mesh->normal = normal;
     }
+    mem_free(mesh->uv); /* of no use in a render */
+    mesh->uv = NULL;
     mesh->index = mem_realloc_array(mesh->index, triangles, sizeof *mesh->index);
     for (size_t t = 0; t < more->triangle_count; t++)
         for (int k = 0; k < 3; k++)

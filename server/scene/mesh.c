@@ -16,6 +16,7 @@ void mesh_release(struct mesh *mesh) {
     mem_free(mesh->index);
     mem_free(mesh->face);
     mem_free(mesh->object_id);
+    mem_free(mesh->uv);
     for (size_t i = 0; i < mesh->name_count; i++)
         mem_free(mesh->name[i]);
     mem_free(mesh->name);
@@ -195,6 +196,19 @@ void mesh_move_triangle(struct mesh *mesh, size_t from, size_t to) {
     mesh->face[to] = mesh->face[from];
     if (mesh->object_id)
         mesh->object_id[to] = mesh->object_id[from];
+    if (mesh->uv)
+        memmove(mesh->uv[to], mesh->uv[from], sizeof *mesh->uv);
+}
+
+void mesh_turn_triangle(struct mesh *mesh, size_t triangle) {
+    uint32_t *v = mesh->index[triangle], second = v[1];
+    v[1] = v[2];
+    v[2] = second;
+    if (mesh->uv) {
+        vec2 *uv = mesh->uv[triangle], second_uv = uv[1];
+        uv[1] = uv[2];
+        uv[2] = second_uv;
+    }
 }
 
 static void drop_unfit(struct mesh *mesh, struct mesh_report *report) {

@@ -2,6 +2,8 @@
 #ifndef UNBAKE_SCENE_MESH_H
 #define UNBAKE_SCENE_MESH_H
 
+#include <math.h>
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -20,6 +22,9 @@ struct mesh {
     uint32_t *face;       /* [triangle_count] face of the input that the triangle was cut from,
                               * ascending; owned */
     int64_t *object_id;   /* [triangle_count] the input's object_id, or NULL; owned */
+    vec2 (*uv)[3];        /* [triangle_count] the input's own texture coordinates of the corners, from the lower left as
+                              * OBJ has them; not finite: the face has none. NULL: no face has any; owned */
+    size_t picture_count; /* of the input that its faces' base colour is looked up in with these; 0: not known */
     size_t name_count;
     char **name;       /* [name_count] of the object with that object_id in the input; none: NULL; owned */
     size_t face_count; /* faces of the input, the dropped ones included */
@@ -42,7 +47,16 @@ void mesh_release(struct mesh *mesh);
  * adjacent faces'. Fails when no triangle is left. `name` is for messages; report may be NULL. */
 enum status mesh_check(struct mesh *mesh, const char *name, struct mesh_report *report, struct error *err);
 
-/* Copies triangle `from` with its face and object over triangle `to`: to leave some out in place. */
+/* Swaps the second and the third corner. */
+void mesh_turn_triangle(struct mesh *mesh, size_t triangle);
+
+/* Whether the triangle has texture coordinates of the input. */
+static inline bool mesh_has_uv(const struct mesh *mesh, size_t triangle) {
+    const vec2 *c = mesh->uv ? mesh->uv[triangle] : NULL;
+    return c && isfinite(c[0].x + c[0].y + c[1].x + c[1].y + c[2].x + c[2].y);
+}
+
+/* Copies triangle `from` with its face, object and texture coordinates over triangle `to`: to leave some out in place. */
 void mesh_move_triangle(struct mesh *mesh, size_t from, size_t to);
 
 /* Maps each vertex to the lowest-numbered one at the same position (files repeat vertices where

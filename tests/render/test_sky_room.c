@@ -51,7 +51,7 @@ static void write_outputs(const char *dir, const struct reconstruction *r) {
                               {0},
                               0,
                               NULL,
-                              0.0};
+                              .baked = NULL};
     CHECK_THAT(export_outputs(dir, &in, NULL, NULL, &err) == STATUS_OK, "%s", err.message);
 }
 

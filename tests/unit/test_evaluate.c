@@ -160,7 +160,7 @@ static void export_room(const char *dir, const struct room *room) {
                               {0},
                               0,
                               NULL,
-                              0.0};
+                              .baked = NULL};
     enum status status = export_outputs(dir, &in, NULL, NULL, &err);
     CHECK_THAT(status == STATUS_OK, "%s", err.message);
     cJSON_Delete(report);

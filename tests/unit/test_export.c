@@ -454,7 +454,7 @@ int main(void) {
                               {0},
                               0,
                               NULL,
-                              0.0};
+                              .baked = NULL};
 
     struct announced heard = {.dir = dir};
     CHECK(export_preview(dir, &in, hear, &heard, &err) == STATUS_OK);

@@ -24,8 +24,10 @@ static void test_names(void) {
     CHECK(!NUMBERED("a1.jpg", "a1.png") && !NUMBERED("a.jpg", "a.jpg"));
 }
 
+static size_t pictures; /* of the last MTL */
+
 static enum texture_pages by_mtl(const char *mtl) {
-    return texture_pages_by_mtl(mtl, strlen(mtl), TEXT("a", "b c"), 2);
+    return texture_pages_by_mtl(mtl, strlen(mtl), TEXT("a", "b c"), 2, &pictures);
 }
 
 static void test_mtl(void) {

@@ -36,6 +36,22 @@ void faces_reserve(struct faces *f, size_t wanted) {
     mesh->face = mem_realloc_array(mesh->face, f->capacity, sizeof *mesh->face);
     if (f->has_object_id)
         mesh->object_id = mem_realloc_array(mesh->object_id, f->capacity, sizeof *mesh->object_id);
+    if (mesh->uv)
+        mesh->uv = mem_realloc_array(mesh->uv, f->capacity, sizeof *mesh->uv);
+}
+
+/* Those of the polygon's triangle `made`, for triangle `at`. The array begins with the first face that has some. */
+static void put_uv(struct faces *f, size_t made, size_t at) {
+    struct mesh *mesh = f->mesh;
+    if (!mesh->uv && !f->has_uv)
+        return;
+    if (!mesh->uv) {
+        mesh->uv = mem_array(f->capacity, sizeof *mesh->uv);
+        for (size_t i = 0; i < 3 * at; i++)
+            mesh->uv[i / 3][i % 3] = (vec2){NAN, NAN};
+    }
+    for (int k = 0; k < 3; k++)
+        mesh->uv[at][k] = f->has_uv ? f->uv[f->triangle[made][k]] : (vec2){NAN, NAN};
 }
 
 /* Corners in single precision: as they are or, where its steps are too coarse, relative to the first. */
@@ -54,6 +70,7 @@ enum status faces_add(struct faces *f, int64_t object_id, struct error *err) {
     uint32_t face = (uint32_t)mesh->face_count++;
     if (f->corner_count < 3) {
         f->report.small_count++;
+        f->has_uv = false;
         return STATUS_OK;
     }
     f->report.polygon_count += f->corner_count > 4;
@@ -70,6 +87,8 @@ enum status faces_add(struct faces *f, int64_t object_id, struct error *err) {
         mesh->face[at] = face;
         if (f->has_object_id)
             mesh->object_id[at] = object_id;
+        put_uv(f, i, at);
     }
+    f->has_uv = false;
     return STATUS_OK;
 }

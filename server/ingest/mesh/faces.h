@@ -30,6 +30,8 @@ struct faces {
     size_t corner_count;                     /* the polygon to be added: */
     uint32_t corner[POLYGON_MAX_CORNERS];    /* its vertices */
     double position[POLYGON_MAX_CORNERS][3]; /* and where the file has them */
+    bool has_uv;                             /* faces_add clears it */
+    vec2 uv[POLYGON_MAX_CORNERS];            /* with has_uv: texture coordinates, as in struct mesh */
     vec3 single[POLYGON_MAX_CORNERS];        /* work space of faces_add, with triangle */
     uint32_t triangle[POLYGON_MAX_CORNERS][3];
 };

@@ -12,6 +12,7 @@
 #include "server/ingest/mesh/gltf_node.h"
 #include "server/ingest/mesh/gltf_objects.h"
 #include "server/ingest/mesh/gltf_primitive.h"
+#include "server/ingest/mesh/gltf_uv.h"
 
 #define MAX_DEPTH 256 /* of nodes */
 
@@ -19,7 +20,9 @@ struct gltf_reader {
     struct gltf_file file;
     struct gltf_surface surface;
     struct gltf_objects objects;
-    bool *visited;                      /* [nodes.count]; owned */
+    bool *visited; /* [nodes.count]; owned */
+    bool *shown;   /* [images] whether one is a base colour; owned */
+    int image_count;
     size_t skinned_count, hidden_count; /* nodes */
     struct error *err;
 };
@@ -47,6 +50,9 @@ static enum status add_mesh(struct gltf_reader *r, size_t node, size_t mesh, con
         is_first = false;
         material = number;
         r->surface.object_id = (int64_t)r->objects.count - 1;
+        int picture = gltf_uv_picture(&r->file, item);
+        if (picture >= 0 && picture < r->image_count)
+            r->shown[picture] = true;
         status = gltf_surface_add(&r->surface, item, where, (int)kind, t);
         if (status != STATUS_OK)
             return status;
@@ -175,6 +181,9 @@ static void take_notes(struct gltf_reader *r) {
                    r->skinned_count);
     if (r->surface.morphed_count > 0)
         faces_note(report, "%zu primitives have morph targets, which were left out", r->surface.morphed_count);
+    if (r->surface.no_uv_count > 0)
+        faces_note(report, "%zu primitives have texture coordinates that cannot be read and were left out",
+                   r->surface.no_uv_count);
     if (r->hidden_count > 0)
         faces_note(report, "%zu nodes are hidden and were left out", r->hidden_count);
 }
@@ -189,6 +198,8 @@ static void finish(struct gltf_reader *r) {
         mesh->normal = NULL;
     }
     gltf_objects_settle(&r->objects, mesh, &surface->faces->report);
+    for (int i = 0; i < r->image_count; i++)
+        mesh->picture_count += r->shown[i];
     take_notes(r);
 }
 
@@ -203,6 +214,8 @@ enum status gltf_parse(const void *data, size_t size, const char *name, const ch
         status = gltf_extensions_check(&r.file, err);
     if (status == STATUS_OK) {
         gltf_objects_init(&r.objects, &r.file);
+        r.image_count = cJSON_GetArraySize(cJSON_GetObjectItemCaseSensitive(r.file.json, "images"));
+        r.shown = mem_calloc((size_t)r.image_count + 1, sizeof *r.shown);
         status = read_scene(&r);
     }
     if (status == STATUS_OK && mesh->triangle_count == 0)
@@ -217,6 +230,7 @@ enum status gltf_parse(const void *data, size_t size, const char *name, const ch
     gltf_file_release(&r.file);
     positions_release(&r.surface.position);
     mem_free(r.visited);
+    mem_free(r.shown);
     mem_free(r.surface.faces);
     return status;
 }

@@ -7,6 +7,7 @@
 #include "common/mem.h"
 #include "common/rng.h"
 #include "server/ingest/mesh/gltf_accessor.h"
+#include "server/ingest/mesh/gltf_uv.h"
 
 #define NONE UINT32_MAX
 
@@ -32,6 +33,7 @@ struct primitive {
     double normal_matrix[3][3]; /* inverse transpose of the transform, for normals */
     bool mirrored, has_normal, is_indexed;
     struct gltf_span position, normal, indices;
+    struct gltf_uv uv;
     size_t table_size;
     uint32_t (*table)[2]; /* [table_size] index in the file, and in the mesh or NONE; owned */
 };
@@ -100,7 +102,10 @@ static enum status add_triangles(struct gltf_surface *r, const struct primitive 
                                  p->where, vertex, p->position.count);
             f->corner[k] = vertex_of(r, p, vertex);
             memcpy(f->position[k], r->position.at[f->corner[k]], sizeof f->position[k]);
+            if (p->uv.is_there)
+                f->uv[k] = gltf_uv_read(&p->uv, vertex);
         }
+        f->has_uv = p->uv.is_there;
         enum status status = faces_add(f, r->object_id, r->err);
         if (status != STATUS_OK)
             return status;
@@ -134,6 +139,8 @@ static enum status open_primitive(struct gltf_surface *r, const cJSON *object, s
     if (status == STATUS_OK && p->has_normal && p->normal.count != p->position.count)
         status = error_set(r->err, STATUS_INPUT, "%s: %s has %zu positions and %zu normals", r->file->name, p->where,
                            p->position.count, p->normal.count);
+    if (status == STATUS_OK) /* geometry does not need them */
+        r->no_uv_count += gltf_uv_open(&p->uv, r->file, object, p->where, p->position.count, NULL) != STATUS_OK;
     return status;
 }
 
@@ -141,6 +148,7 @@ static void release_primitive(struct primitive *p) {
     gltf_span_release(&p->position);
     gltf_span_release(&p->normal);
     gltf_span_release(&p->indices);
+    gltf_uv_release(&p->uv);
 }
 
 enum status gltf_surface_add(struct gltf_surface *r, const cJSON *object, const char *where, int mode,

@@ -20,6 +20,7 @@ struct gltf_surface {
     size_t normal_capacity;
     bool lacks_normals;   /* a primitive without normals */
     size_t morphed_count; /* primitives with morph targets, which are left out */
+    size_t no_uv_count;   /* primitives whose texture coordinates are damaged, which are left out */
     int64_t object_id;    /* of the triangles being added */
     struct error *err;
 };

@@ -2,6 +2,7 @@
  * trusted. */
 #include "server/ingest/mesh/obj.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -23,7 +24,7 @@ struct obj_reader {
     size_t size, at, line_end; /* `at` is within the line */
     size_t line, next_line;    /* numbers, from 1; a continued line counts as several */
     uint8_t newline;           /* '\r' in files of old Macintosh programs */
-    struct positions position, normal;
+    struct positions position, normal, texture;
     struct faces *faces;
     bool lacks_normals;  /* a corner without normal */
     size_t absent_count; /* corners that name a normal which the file does not have */
@@ -101,6 +102,17 @@ static enum status read_vec3(struct obj_reader *r, struct positions *points) {
     return STATUS_OK;
 }
 
+/* A vt of one to three numbers; what cannot be read stands for none. */
+static void read_texture(struct obj_reader *r) {
+    char token[MAX_TOKEN], *end;
+    double value[3] = {0.0, 0.0, 0.0};
+    for (int i = 0; i < 2 && next_token(r, token) > 0; i++) {
+        double number = strtod(token, &end);
+        value[i] = *end == '\0' && !strpbrk(token, "xX(") ? number : (double)NAN;
+    }
+    positions_append(&r->texture, value);
+}
+
 /* --- labels --------------------------------------------------------------------------------- */
 
 /* The rest of the line, without blanks around it. */
@@ -150,15 +162,16 @@ static uint32_t resolve_spare(const char *text, char **end, size_t count) {
     return (uint32_t)(value > 0 ? value - 1 : (long)count + value);
 }
 
-/* "v", "v/vt", "v//vn", "v/vt/vn", the last of which may be empty: position and normal (or NONE). */
-static enum status read_corner(struct obj_reader *r, char *token, uint32_t pair[2]) {
+/* "v", "v/vt", "v//vn", "v/vt/vn", the last of which may be empty: position and normal (or NONE), texture coordinate (or
+ * NONE). */
+static enum status read_corner(struct obj_reader *r, char *token, uint32_t pair[2], uint32_t *texture) {
     char *end;
-    pair[1] = NONE;
+    pair[1] = *texture = NONE;
     enum status status = resolve(r, token, &end, r->position.count, &pair[0]);
     if (status != STATUS_OK)
         return status;
-    if (*end == '/') /* a texture coordinate */
-        resolve_spare(end + 1, &end, 0);
+    if (*end == '/')
+        *texture = resolve_spare(end + 1, &end, r->texture.count);
     if (*end == '/') {
         const char *normal = end + 1;
         pair[1] = resolve_spare(normal, &end, r->normal.count);
@@ -184,17 +197,23 @@ static enum status read_face(struct obj_reader *r) {
     char token[MAX_TOKEN];
     struct faces *f = r->faces;
     f->corner_count = 0;
+    bool has_uv = true;
     while (next_token(r, token) > 0 && token[0] != '#') {
-        uint32_t pair[2];
+        uint32_t pair[2], texture;
         if (f->corner_count == POLYGON_MAX_CORNERS)
             return line_error(r, "the face has more than 1024 corners");
-        enum status status = read_corner(r, token, pair);
+        enum status status = read_corner(r, token, pair, &texture);
         if (status != STATUS_OK)
             return status;
         r->lacks_normals = r->lacks_normals || pair[1] == NONE;
         f->corner[f->corner_count] = vertex_of(r, pair);
+        const double *uv = texture != NONE ? r->texture.at[texture] : NULL;
+        has_uv = has_uv && uv;
+        if (uv)
+            f->uv[f->corner_count] = (vec2){(float)uv[0], (float)uv[1]};
         memcpy(f->position[f->corner_count++], r->position.at[pair[0]], sizeof *f->position);
     }
+    f->has_uv = has_uv;
     return faces_add(f, obj_objects_current(&r->objects), r->err);
 }
 
@@ -215,7 +234,9 @@ static enum status read_line(struct obj_reader *r) {
         return read_vec3(r, &r->position);
     if (strcmp(word, "vn") == 0)
         return read_vec3(r, &r->normal);
-    if (strcmp(word, "f") == 0 || strcmp(word, "fo") == 0)
+    if (strcmp(word, "vt") == 0)
+        read_texture(r);
+    else if (strcmp(word, "f") == 0 || strcmp(word, "fo") == 0)
         return read_face(r);
     if (strcmp(word, "#") == 0)
         read_comment(r);
@@ -289,6 +310,7 @@ enum status obj_parse(const void *data, size_t size, const char *name, const cha
     mem_free(r->pair);
     positions_release(&r->position);
     positions_release(&r->normal);
+    positions_release(&r->texture);
     mem_free(r->faces);
     mem_free(r);
     return status;

@@ -67,7 +67,7 @@ static size_t list_names(const struct obj_objects *o, enum obj_label kind, const
 }
 
 static enum texture_pages ask_library(const struct obj_objects *o, const char *folder, const char *const *name,
-                                      size_t count) {
+                                      size_t count, size_t *picture_count) {
     struct mapping file = {0};
     char *clean = NULL;
     enum texture_pages answer = TEXTURE_PAGES_UNKNOWN;
@@ -77,7 +77,7 @@ static enum texture_pages ask_library(const struct obj_objects *o, const char *f
         char *path = file_join(folder, clean);
         if (mapping_open(&file, path, clean, "a library of materials", NULL) == STATUS_OK &&
             file.size <= MAX_LIBRARY_BYTES)
-            answer = texture_pages_by_mtl((const char *)file.data, file.size, name, count);
+            answer = texture_pages_by_mtl((const char *)file.data, file.size, name, count, picture_count);
         mapping_close(&file);
         mem_free(path);
     }
@@ -147,8 +147,9 @@ static char *name_of(const struct obj_objects *o, size_t object) {
 void obj_objects_settle(struct obj_objects *o, const char *folder, struct mesh *mesh, struct faces_report *report) {
     const char **name = mem_array(o->objects.count + 1, sizeof *name);
     size_t count = list_names(o, OBJ_MATERIAL, name);
-    enum texture_pages pages = count > 1 ? ask_library(o, folder, name, count) : TEXTURE_PAGES_NO;
-    if (pages == TEXTURE_PAGES_YES || (pages == TEXTURE_PAGES_UNKNOWN && texture_pages_by_name(name, count))) {
+    enum texture_pages pages = ask_library(o, folder, name, count, &mesh->picture_count);
+    if (pages == TEXTURE_PAGES_YES ||
+        (pages == TEXTURE_PAGES_UNKNOWN && count > 1 && texture_pages_by_name(name, count))) {
         faces_note(report, "its %zu materials (%.40s, ...) are pages of a texture: they do not divide it into segments",
                    count, name[0]);
         drop_materials(o, mesh);

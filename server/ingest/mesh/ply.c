@@ -1,5 +1,5 @@
-/* ply.c -- see ply.h; ply_header.c reads the header, ply_values.c numbers, this file
- * elements.
+/* ply.c -- see ply.h; ply_header.c reads the header, ply_values.c numbers, ply_vertices.c
+ * vertices, this file faces.
  *
  * The file is read in place. Counts in the header are checked against the file's size before memory is allocated. */
 #include "server/ingest/mesh/ply.h"
@@ -15,28 +15,19 @@
 #include "common/mem.h"
 #include "server/ingest/mapping.h"
 #include "server/ingest/mesh/ply_values.h"
-#include "server/ingest/mesh/positions.h"
+#include "server/ingest/mesh/ply_vertices.h"
+
+#define PLY_TEXCOORD_MAX (2 * POLYGON_MAX_CORNERS)
 
 struct ply_reader {
     struct ply_values in;
-    struct positions position;
+    struct ply_vertices vertices;
+    double texcoord[PLY_TEXCOORD_MAX]; /* of the face being read */
+    uint64_t texcoord_count;
     struct error *err;
 };
 
 /* --- elements ---------------------------------------------------------------------------- */
-
-/* The property of that name; else one of that name in other letters of it. */
-static size_t find_property(const struct ply_reader *r, const struct ply_element *e, const char *name) {
-    size_t found = SIZE_MAX;
-    for (size_t i = 0; i < e->property_count; i++) {
-        const char *own = r->in.header.property[e->first + i].name;
-        if (strcmp(own, name) == 0)
-            return i;
-        if (found == SIZE_MAX && strcasecmp(own, name) == 0)
-            found = i;
-    }
-    return found;
-}
 
 static enum status skip_element(struct ply_reader *r, const struct ply_element *e) {
     enum status status = ply_begin_element(&r->in, e);
@@ -52,55 +43,6 @@ static enum status skip_element(struct ply_reader *r, const struct ply_element *
     return status;
 }
 
-static enum status read_vertices(struct ply_reader *r, const struct ply_element *e, struct mesh *mesh) {
-    static const char *const wanted[6] = {"x", "y", "z", "nx", "ny", "nz"};
-    signed char target[PLY_MAX_PROPERTIES]; /* index of the wanted property among six; -1: none */
-    memset(target, -1, sizeof target);
-    bool has_normal = true, is_single[6] = {false};
-    for (int i = 0; i < 6; i++) {
-        size_t k = find_property(r, e, wanted[i]);
-        bool usable = k != SIZE_MAX && !r->in.header.property[e->first + k].is_list;
-        if (usable) {
-            target[k] = (signed char)i;
-            is_single[i] = r->in.header.format != PLY_ASCII && r->in.header.property[e->first + k].type == PLY_FLOAT32;
-        } else if (i < 3) {
-            return error_set(r->err, STATUS_INPUT, "%s: its vertices have no property %s", r->in.cursor.name,
-                             wanted[i]);
-        } else {
-            has_normal = false;
-        }
-    }
-    enum status status = ply_begin_element(&r->in, e);
-    if (status != STATUS_OK)
-        return status;
-    if (e->count >= UINT32_MAX)
-        return error_set(r->err, STATUS_LIMIT, "%s has %" PRIu64 " vertices, more than fit", r->in.cursor.name,
-                         e->count);
-    mesh->vertex_count = r->position.capacity = (size_t)e->count;
-    r->position.at = mem_array(mesh->vertex_count, sizeof *r->position.at);
-    if (has_normal)
-        mesh->normal = mem_array(mesh->vertex_count, sizeof *mesh->normal);
-    for (size_t i = 0; i < mesh->vertex_count; i++) {
-        double v[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
-        status = ply_begin_record(&r->in, i);
-        for (size_t k = 0; status == STATUS_OK && k < e->property_count; k++) {
-            const struct ply_property *p = &r->in.header.property[e->first + k];
-            status =
-                target[k] >= 0 ? ply_read_value(&r->in, p->type, &v[(int)target[k]]) : ply_skip_property(&r->in, p);
-        }
-        if (status == STATUS_OK)
-            status = ply_end_record(&r->in);
-        if (status != STATUS_OK)
-            return status;
-        positions_append(&r->position, v);
-        for (int k = 0; k < 3; k++)
-            r->position.single = is_single[k] ? fmax(r->position.single, fabs(v[k])) : r->position.single;
-        if (has_normal)
-            mesh->normal[i] = vec3_make((float)v[3], (float)v[4], (float)v[5]);
-    }
-    return STATUS_OK;
-}
-
 static enum status check_vertex(struct ply_reader *r, const struct faces *faces, double value) {
     size_t count = faces->mesh->vertex_count;
     char what[128];
@@ -112,7 +54,10 @@ static enum status check_vertex(struct ply_reader *r, const struct faces *faces,
 
 static void set_corner(const struct ply_reader *r, struct faces *faces, size_t corner, double vertex) {
     faces->corner[corner] = (uint32_t)vertex;
-    memcpy(faces->position[corner], r->position.at[faces->corner[corner]], sizeof faces->position[corner]);
+    memcpy(faces->position[corner], r->vertices.position.at[faces->corner[corner]], sizeof faces->position[corner]);
+    faces->has_uv = r->vertices.uv != NULL;
+    if (r->vertices.uv)
+        faces->uv[corner] = r->vertices.uv[faces->corner[corner]];
 }
 
 static enum status read_corners(struct ply_reader *r, const struct ply_property *p, struct faces *faces) {
@@ -132,10 +77,30 @@ static enum status read_corners(struct ply_reader *r, const struct ply_property 
     return status;
 }
 
+/* Two numbers a corner, as MeshLab writes them; a list of another length says nothing. */
+static enum status read_texcoord(struct ply_reader *r, const struct ply_property *p) {
+    enum status status = ply_read_list_count(&r->in, p, &r->texcoord_count);
+    for (uint64_t i = 0; status == STATUS_OK && i < r->texcoord_count; i++) {
+        double value;
+        status = ply_read_value(&r->in, p->type, &value);
+        if (i < PLY_TEXCOORD_MAX)
+            r->texcoord[i] = value;
+    }
+    return status;
+}
+
+static void set_texcoord(const struct ply_reader *r, struct faces *faces) {
+    if (r->texcoord_count == 0 || r->texcoord_count != 2 * faces->corner_count)
+        return;
+    for (size_t i = 0; i < faces->corner_count; i++)
+        faces->uv[i] = (vec2){(float)r->texcoord[2 * i], (float)r->texcoord[2 * i + 1]};
+    faces->has_uv = true;
+}
+
 static enum status find_indices(struct ply_reader *r, const struct ply_element *e, size_t *list) {
-    *list = find_property(r, e, "vertex_indices");
+    *list = ply_find_property(&r->in.header, e, "vertex_indices");
     if (*list == SIZE_MAX)
-        *list = find_property(r, e, "vertex_index");
+        *list = ply_find_property(&r->in.header, e, "vertex_index");
     if (*list == SIZE_MAX || !r->in.header.property[e->first + *list].is_list ||
         r->in.header.property[e->first + *list].type >= PLY_FLOAT32)
         return error_set(r->err, STATUS_INPUT, "%s: its %ss have no list vertex_indices of an integer type",
@@ -143,12 +108,21 @@ static enum status find_indices(struct ply_reader *r, const struct ply_element *
     return STATUS_OK;
 }
 
-static enum status find_face_properties(struct ply_reader *r, const struct ply_element *e, size_t *list, size_t *id) {
-    enum status status = find_indices(r, e, list);
+/* Numbers of its properties; SIZE_MAX: none. */
+struct face_layout {
+    size_t list, id, texcoord;
+};
+
+static enum status find_face_properties(struct ply_reader *r, const struct ply_element *e, struct face_layout *layout) {
+    *layout = (struct face_layout){SIZE_MAX, SIZE_MAX, SIZE_MAX};
+    enum status status = find_indices(r, e, &layout->list);
     if (status != STATUS_OK)
         return status;
-    *id = find_property(r, e, "object_id");
-    const struct ply_property *p = *id != SIZE_MAX ? &r->in.header.property[e->first + *id] : NULL;
+    layout->id = ply_find_property(&r->in.header, e, "object_id");
+    layout->texcoord = ply_find_property(&r->in.header, e, "texcoord");
+    if (layout->texcoord != SIZE_MAX && !r->in.header.property[e->first + layout->texcoord].is_list)
+        layout->texcoord = SIZE_MAX;
+    const struct ply_property *p = layout->id != SIZE_MAX ? &r->in.header.property[e->first + layout->id] : NULL;
     if (p && (p->is_list || p->type >= PLY_FLOAT32))
         return error_set(r->err, STATUS_INPUT, "%s: the faces' object_id must be one integer per face",
                          r->in.cursor.name);
@@ -156,8 +130,8 @@ static enum status find_face_properties(struct ply_reader *r, const struct ply_e
 }
 
 static enum status read_faces(struct ply_reader *r, const struct ply_element *e, struct faces *faces) {
-    size_t list = SIZE_MAX, id = SIZE_MAX;
-    enum status status = find_face_properties(r, e, &list, &id);
+    struct face_layout layout;
+    enum status status = find_face_properties(r, e, &layout);
     if (status == STATUS_OK)
         status = ply_begin_element(&r->in, e);
     if (status != STATUS_OK)
@@ -165,17 +139,19 @@ static enum status read_faces(struct ply_reader *r, const struct ply_element *e,
     if (e->count > faces->limit)
         return error_set(r->err, STATUS_LIMIT, "%s has %" PRIu64 " faces, more than the limit of %zu",
                          r->in.cursor.name, e->count, faces->limit);
-    faces->has_object_id = id != SIZE_MAX;
+    faces->has_object_id = layout.id != SIZE_MAX;
     faces_reserve(faces, (size_t)e->count);
     for (size_t i = 0; i < e->count; i++) {
         double object_id = 0.0;
         status = ply_begin_record(&r->in, i);
         for (size_t k = 0; status == STATUS_OK && k < e->property_count; k++) {
             const struct ply_property *p = &r->in.header.property[e->first + k];
-            if (k == list)
+            if (k == layout.list)
                 status = read_corners(r, p, faces);
-            else if (k == id)
+            else if (k == layout.id)
                 status = ply_read_value(&r->in, p->type, &object_id);
+            else if (k == layout.texcoord)
+                status = read_texcoord(r, p);
             else
                 status = ply_skip_property(&r->in, p);
         }
@@ -186,6 +162,7 @@ static enum status read_faces(struct ply_reader *r, const struct ply_element *e,
         /* ASCII values are unbounded, and the conversion would be undefined out of range */
         if (!(fabs(object_id) < 0x1p53) || object_id != floor(object_id))
             return ply_value_error(&r->in, "has an object_id that is no integer");
+        set_texcoord(r, faces);
         status = faces_add(faces, (int64_t)object_id, r->err);
         if (status != STATUS_OK)
             return status;
@@ -259,7 +236,7 @@ static enum status read_body(struct ply_reader *r, struct faces *faces) {
         enum status status;
         if (!has_vertices && strcasecmp(e->name, "vertex") == 0) {
             has_vertices = true;
-            status = read_vertices(r, e, faces->mesh);
+            status = ply_read_vertices(&r->in, e, &r->vertices, faces->mesh);
         } else if (e == surface && has_vertices) {
             status = read_surface(r, e, faces);
         } else {
@@ -292,15 +269,17 @@ static enum status parse(const void *data, size_t size, const char *name, size_t
     r->in.cursor = (struct ply_cursor){.name = name, .data = data, .size = size};
     r->err = r->in.err = err;
     enum status status = ply_header_parse(&r->in.cursor, &r->in.header, err);
-    memcpy(r->position.offset, r->in.header.offset, sizeof r->position.offset);
+    memcpy(r->vertices.position.offset, r->in.header.offset, sizeof r->vertices.position.offset);
     if (status == STATUS_OK)
         status = read_body(r, faces);
-    faces->report.step_m = positions_step(r->position.single);
+    faces->report.step_m = positions_step(r->vertices.position.single);
     if (status == STATUS_OK)
-        positions_settle(&r->position, mesh);
+        positions_settle(&r->vertices.position, mesh);
+    if (status == STATUS_OK)
+        mesh->picture_count = r->in.header.picture_count;
     else
         mesh_release(mesh);
-    positions_release(&r->position);
+    ply_vertices_release(&r->vertices);
     if (report)
         *report = faces->report;
     *is_broken = status == STATUS_INPUT && r->in.header.format == PLY_ASCII && r->in.has_extra && !is_stream;

@@ -2,7 +2,8 @@
  *
  * ASCII and binary of either byte order; properties in any order and of any type, in capitals or not; unused elements,
  * properties and lists are skipped. Uses of `vertex` x y z and nx ny nz if all three exist; of `face` the list
- * vertex_indices (or vertex_index) and an integer property object_id; where there are no faces, the same list of
+ * vertex_indices (or vertex_index) and an integer property object_id; texture coordinates from the
+ * list `texcoord` of faces, else the pair s t, u v or texture_u texture_v of vertices; where there are no faces, the same list of
  * `tristrips` (triangle strips with -1 between them). Damage is STATUS_INPUT with the line or byte offset. */
 #ifndef UNBAKE_INGEST_MESH_PLY_H
 #define UNBAKE_INGEST_MESH_PLY_H

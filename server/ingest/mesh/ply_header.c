@@ -50,6 +50,18 @@ const struct ply_element *ply_find_element(const struct ply_header *header, cons
     return NULL;
 }
 
+size_t ply_find_property(const struct ply_header *header, const struct ply_element *e, const char *name) {
+    size_t found = SIZE_MAX;
+    for (size_t i = 0; i < e->property_count; i++) {
+        const char *own = header->property[e->first + i].name;
+        if (strcmp(own, name) == 0)
+            return i;
+        if (found == SIZE_MAX && strcasecmp(own, name) == 0)
+            found = i;
+    }
+    return found;
+}
+
 static bool parse_type(const char *word, enum ply_type *type) {
     for (size_t i = 0; i < sizeof type_table / sizeof *type_table; i++) {
         if (strcasecmp(word, type_table[i].name) == 0 || strcasecmp(word, type_table[i].alias) == 0) {
@@ -142,6 +154,8 @@ static void parse_comment(struct parser *p, const uint8_t *text, size_t length) 
     memcpy(copy, text, length);
     copy[length] = '\0';
     positions_read_offset(copy, p->header->offset);
+    const char *word = copy + strspn(copy, " \t");
+    p->header->picture_count += strncmp(word, "TextureFile ", 12) == 0;
 }
 
 static enum status parse_header_line(struct parser *p, const uint8_t *line, size_t length, bool *done) {

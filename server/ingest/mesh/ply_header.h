@@ -32,7 +32,8 @@ enum ply_format { PLY_UNKNOWN, PLY_ASCII, PLY_LITTLE_ENDIAN, PLY_BIG_ENDIAN };
 
 struct ply_header {
     enum ply_format format;
-    double offset[3]; /* of the comment "unbake offset X Y Z", see positions.h; 0 without it */
+    double offset[3];     /* of the comment "unbake offset X Y Z", see positions.h; 0 without it */
+    size_t picture_count; /* comments "TextureFile NAME" */
     size_t element_count;
     struct ply_element element[PLY_MAX_ELEMENTS];
     size_t property_count;
@@ -57,6 +58,8 @@ bool ply_next_line(struct ply_cursor *c, const uint8_t **line, size_t *length);
 
 /* The first element of that name, in capitals or not; NULL when there is none. */
 const struct ply_element *ply_find_element(const struct ply_header *header, const char *name);
+/* Number within the element of the property of that name, else of that name in other letters; SIZE_MAX: none. */
+size_t ply_find_property(const struct ply_header *header, const struct ply_element *e, const char *name);
 size_t ply_type_bytes(enum ply_type type);
 
 #endif

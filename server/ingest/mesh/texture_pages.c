@@ -8,6 +8,7 @@
 #include <strings.h>
 
 #include "common/mem.h"
+#include "server/ingest/mesh/intern.h"
 
 /* --- names ---------------------------------------------------------------------------------- */
 
@@ -160,12 +161,25 @@ static enum texture_pages judge(const struct mtl_material *list, size_t count) {
     return result;
 }
 
-enum texture_pages texture_pages_by_mtl(const char *text, size_t length, const char *const *material, size_t count) {
+static size_t count_pictures(const struct mtl_material *list, size_t count) {
+    struct intern pictures;
+    intern_init(&pictures);
+    for (size_t i = 0; i < count; i++)
+        if (list[i].picture)
+            intern_number(&pictures, list[i].picture, strlen(list[i].picture) + 1);
+    size_t found = pictures.count;
+    intern_release(&pictures);
+    return found;
+}
+
+enum texture_pages texture_pages_by_mtl(const char *text, size_t length, const char *const *material, size_t count,
+                                        size_t *picture_count) {
     struct mtl_material *list = mem_calloc(count + 1, sizeof *list);
     for (size_t i = 0; i < count; i++)
         list[i].name = material[i];
     read_mtl(text, length, list, count);
     enum texture_pages result = count < 2 ? TEXTURE_PAGES_NO : judge(list, count);
+    *picture_count = count_pictures(list, count);
     for (size_t i = 0; i < count; i++) {
         mem_free(list[i].picture);
         mem_free(list[i].rest);

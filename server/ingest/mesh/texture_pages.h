@@ -17,8 +17,10 @@ bool texture_pages_by_name(const char *const *name, size_t count);
 /* Whether at least two names differ, and only in digits. */
 bool texture_pages_are_numbered(const char *const *name, size_t count);
 
-/* From an MTL file: text[length], any bytes. TEXTURE_PAGES_UNKNOWN when it does not have all materials. */
+/* From an MTL file: text[length], any bytes. TEXTURE_PAGES_UNKNOWN when it does not have all materials. *picture_count:
+ * distinct pictures of the materials' base colour. */
 enum texture_pages { TEXTURE_PAGES_UNKNOWN, TEXTURE_PAGES_NO, TEXTURE_PAGES_YES };
-enum texture_pages texture_pages_by_mtl(const char *text, size_t length, const char *const *material, size_t count);
+enum texture_pages texture_pages_by_mtl(const char *text, size_t length, const char *const *material, size_t count,
+                                        size_t *picture_count);
 
 #endif
