@@ -19,6 +19,9 @@ static const struct render_setting table[] = {
     {"environment_scale", RENDER_REAL, "", 0, 1e9, 0, NULL, "1", "factor on the radiance of distant light"},
     {"environment_turn", RENDER_REAL, "degrees", -360, 360, 0, NULL, "0",
      "turns a map, or what was found, around the upward axis, counter-clockwise from above"},
+    {"executor", RENDER_TEXT, "", 0, 0, 0, NULL, "",
+     "jobs: where parts are rendered: the name of an executor that the daemon's administrator has set up; empty: where "
+     "there is a place"},
     {"exposure", RENDER_REAL, "", 0, 1e9, 0, NULL, "0",
      "factor on radiance in PNGs; 0: one for all, chosen by the first view"},
     {"format", RENDER_CHOICE, "", 0, 0, 0, "png|exr|both", "png",
@@ -62,6 +65,9 @@ static const struct render_setting table[] = {
      "environment=sky: where north is, clockwise from above, from -z where y or x is up, from +y where z is"},
     {"panorama", RENDER_BOOL, "", 0, 0, 0, NULL, "false",
      "the whole sphere around each camera, equirectangular and level"},
+    {"parts", RENDER_INT, "parts", 0, 1000, 0, NULL, "0",
+     "jobs: in how many parts the pictures are rendered, at once where there are places; 0: as many as the daemon finds "
+     "good; the pictures are the same"},
     {"passes", RENDER_LIST, "", 0, 0, 0,
      "radiance|base_color|roughness|specular|emission|normal|depth|position|segment|direct|indirect", "radiance",
      "what is rendered of each view"},

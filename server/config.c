@@ -53,6 +53,8 @@ static const struct config_option table[] = {
     INT(small_render_threads, "threads", 0, 1024, "0", "Threads shared by the small renders. 0: one a processor."),
     INT(small_render_paths, "paths", 0, 1000000000000, "20000000",
         "Pixels times samples times pictures up to which a render is small."),
+    INT(render_part_paths, "paths", 0, 1000000000000, "1000000000",
+        "Pixels times samples times pictures of a part of a larger render. 0: it is not split."),
     INT(threads, "threads", 0, 1024, "0", "Threads shared by the running jobs. 0: one a processor."),
     INT(max_attempts, "attempts", 1, 100, "3", "Crashes after which a job is given up."),
     INT(queue_limit, "jobs", 1, 1000000, "1000", "Jobs that may wait; more are refused with 429."),

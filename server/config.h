@@ -33,7 +33,7 @@ struct config {
     char *executors, *executors_dir;                                  /* owned */
     char *data_dir, *log_level, *log_format;                          /* owned */
     int64_t max_running, max_checks, threads, max_attempts, queue_limit, worker_memory_mib, jobs_memory_mib;
-    int64_t small_renders, small_render_threads, small_render_paths;
+    int64_t small_renders, small_render_threads, small_render_paths, render_part_paths;
     int64_t photograph_memory_mib;
     int64_t user_max_running, user_queue_limit, user_max_jobs, user_max_mib, user_max_percent;
     int64_t user_max_streams, user_max_uploads, user_max_checks, user_pledge_percent, admin_free_mib;

@@ -34,6 +34,7 @@ struct scheduler_config daemon_options_scheduler(const struct config *c, const s
         .small_renders = (int)c->small_renders,
         .small_render_threads = (int)c->small_render_threads,
         .small_render_cost = (double)c->small_render_paths,
+        .render_part_cost = (double)c->render_part_paths,
         .max_checks = (int)c->max_checks,
         .thread_count = (int)c->threads,
         .user_max_bytes = user_max_bytes(c),

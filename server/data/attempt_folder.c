@@ -11,8 +11,7 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "server/data/layout.h"
-
-#define APPENDED ".jsonl"
+#include "server/data/picture_record.h"
 
 /* The numbers of the attempts that have folders, ascending; *numbers is the caller's. */
 static enum status list_attempts(const char *data_dir, int64_t job_id, int **numbers, size_t *count,
@@ -169,12 +168,8 @@ enum status attempt_folder_list_checkpoint(const char *data_dir, int64_t job_id,
 
 /* --- outputs of earlier attempts --------------------------------------------------------------- */
 
-/* Whether it is the record of what is done, to which lines are appended in place (relight/output.h): like a checkpoint
- * one attempt of the job has it, and it is kept though no row names it. */
-static bool is_appended_to(const char *name) {
-    size_t length = strlen(name), ending = strlen(APPENDED);
-    return length > ending && strcmp(name + length - ending, APPENDED) == 0;
-}
+/* Lines are appended to it in place, so it is not linked; it is kept though no row names it. */
+static bool is_record(const char *name) { return strcmp(name, PICTURE_RECORD) == 0; }
 
 static enum status link_files(const char *from, const char *to, struct error *err) {
     char **names = NULL;
@@ -190,9 +185,8 @@ static enum status link_files(const char *from, const char *to, struct error *er
             status = file_make_dirs(new, err);
             if (status == STATUS_OK)
                 status = link_files(old, new, err);
-        } else if (is_there && S_ISREG(info.st_mode) && is_appended_to(names[i])) {
-            status = move(old, new, err);
-        } else if (is_there && S_ISREG(info.st_mode) && link(old, new) != 0 && errno != EEXIST) {
+        } else if (is_there && S_ISREG(info.st_mode) && !is_record(names[i]) && link(old, new) != 0 &&
+                   errno != EEXIST) {
             log_warning("%s is made again: it cannot be linked: %s", new, strerror(errno));
         }
         mem_free(new);
@@ -214,9 +208,30 @@ enum status attempt_folder_carry_outputs(const char *data_dir, int64_t job_id, i
         mem_free(from);
         mem_free(other);
     }
+    for (size_t i = 0; i < count && status == STATUS_OK; i++) { /* oldest first: a later line of a picture counts */
+        char *other = layout_attempt(data_dir, job_id, numbers[i]), *from = layout_output(other, PICTURE_RECORD);
+        char *record = layout_output(dir, PICTURE_RECORD);
+        if (numbers[i] != number)
+            status = picture_record_move(from, record, err);
+        mem_free(record);
+        mem_free(from);
+        mem_free(other);
+    }
     mem_free(numbers);
     mem_free(to);
     mem_free(dir);
+    return status;
+}
+
+enum status attempt_folder_pictures_done(const char *data_dir, int64_t job_id, const char *digest, int64_t first,
+                                         int64_t count, int64_t *done, struct error *err) {
+    int *numbers;
+    size_t number_count;
+    *done = 0;
+    enum status status = list_attempts(data_dir, job_id, &numbers, &number_count, err);
+    if (status == STATUS_OK)
+        status = picture_record_done(data_dir, job_id, numbers, number_count, digest, first, count, done, err);
+    mem_free(numbers);
     return status;
 }
 
@@ -258,7 +273,7 @@ static enum status tidy_folder(struct tidying *t, const char *path, const char *
             status = tidy_folder(t, inner, output, err);
             if (status == STATUS_OK && rmdir(inner) != 0 && errno != ENOTEMPTY && errno != EEXIST)
                 status = error_set_errno(err, errno, "cannot remove %s", inner);
-        } else if (is_named(t, output) || is_appended_to(output))
+        } else if (is_named(t, output) || is_record(output))
             t->has_files = true;
         else
             status = file_remove_tree(inner, err);
@@ -269,7 +284,29 @@ static enum status tidy_folder(struct tidying *t, const char *path, const char *
     return status;
 }
 
-enum status attempt_folder_tidy(const char *data_dir, struct store *store, int64_t job_id, struct error *err) {
+/* Whether the attempt still writes. */
+static enum status is_running(struct store *store, int64_t job_id, int number, int ended, bool *runs,
+                              struct error *err) {
+    struct attempt_row row;
+    enum status status = store_attempt_get(store, &(struct attempt_key){job_id, number}, &row, err);
+    *runs = status == STATUS_OK && row.phase == ATTEMPT_ROW_RUNNING && number != ended;
+    return status == STATUS_NOT_FOUND ? STATUS_OK : status;
+}
+
+static enum status tidy_attempt(struct tidying *t, const char *dir, struct error *err) {
+    char *out = layout_out(dir);
+    bool has_checkpoint = false;
+    enum status status = tidy_folder(t, out, "", err);
+    if (status == STATUS_OK)
+        status = look_for_checkpoint(dir, &has_checkpoint, err);
+    if (status == STATUS_OK && !t->has_files && !has_checkpoint)
+        status = file_remove_tree(dir, err);
+    mem_free(out);
+    return status;
+}
+
+enum status attempt_folder_tidy(const char *data_dir, struct store *store, int64_t job_id, int ended,
+                                struct error *err) {
     struct output_row *rows = NULL;
     size_t row_count = 0, count = 0;
     int *numbers = NULL;
@@ -278,14 +315,11 @@ enum status attempt_folder_tidy(const char *data_dir, struct store *store, int64
         status = list_attempts(data_dir, job_id, &numbers, &count, err);
     for (size_t i = 0; status == STATUS_OK && i < count; i++) {
         struct tidying t = {.rows = rows, .count = row_count, .number = numbers[i]};
-        char *dir = layout_attempt(data_dir, job_id, numbers[i]), *out = layout_out(dir);
-        bool has_checkpoint = false;
-        status = tidy_folder(&t, out, "", err);
-        if (status == STATUS_OK)
-            status = look_for_checkpoint(dir, &has_checkpoint, err);
-        if (status == STATUS_OK && !t.has_files && !has_checkpoint)
-            status = file_remove_tree(dir, err);
-        mem_free(out);
+        char *dir = layout_attempt(data_dir, job_id, numbers[i]);
+        bool runs = false;
+        status = is_running(store, job_id, numbers[i], ended, &runs, err);
+        if (status == STATUS_OK && !runs)
+            status = tidy_attempt(&t, dir, err);
         mem_free(dir);
     }
     for (size_t i = 0; i < row_count; i++)

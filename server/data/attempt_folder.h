@@ -4,10 +4,10 @@
  * A checkpoint is checkpoint.db with its journal, or the parts that a node has sent (part-N): each part is written once,
  * and the newest says from which number on they are needed.
  *
- * 1. At most one attempt of a job has a checkpoint. The next one takes it over when it begins, by one rename: the
+ * 1. At most one attempt of a job has a checkpoint; jobs that are split (store/parts.h) have none. The next one takes it over when it begins, by one rename: the
  *    database and its journal are never apart, and whoever had it before has lost it.
  * 2. An output belongs to the attempt that wrote it, and a row of state.db says which. A file that no row names is seen
- *    by nobody, and goes when its attempt has ended; but the record of what is done, *.jsonl, stays for the next.
+ *    by nobody, and goes when its attempt has ended; but the records of what is done (picture_record.h) stay.
  * 3. Nobody but an attempt changes its folder while it runs. */
 #ifndef UNBAKE_DATA_ATTEMPT_FOLDER_H
 #define UNBAKE_DATA_ATTEMPT_FOLDER_H
@@ -19,12 +19,13 @@
 #include "common/error.h"
 #include "server/store/store.h"
 
-/* Makes the attempt's folder with all that it begins with, durably. No other attempt of the job may run. */
+/* Makes the attempt's folder with all that it begins with, durably. No other attempt of the job may run, unless they are
+ * of its parts. */
 enum status attempt_folder_begin(const char *data_dir, int64_t job_id, int number, struct error *err);
 
 /* Gives the attempt, which has just begun, what earlier ones have left in out/, the newest of each name: as hard links, so
- * that it costs no space and what others read stays; the record of what is done (*.jsonl) moves. Its worker judges what is whole. What cannot be linked is left out
- * and made again. */
+ * that it costs no space and what others read stays; their records of what is done become its own. Its worker judges what
+ * is whole. What cannot be linked is left out and made again. No other attempt of the job may run. */
 enum status attempt_folder_carry_outputs(const char *data_dir, int64_t job_id, int number, struct error *err);
 
 /* The folder of the attempt that has a checkpoint, relative to data_dir; the caller's (mem_free). NULL: none has. */
@@ -42,8 +43,14 @@ enum status attempt_folder_list_checkpoint(const char *data_dir, int64_t job_id,
 /* Whether a file of a checkpoint may have that name. */
 bool attempt_folder_is_checkpoint_name(const char *name);
 
-/* Removes what attempts have left that no row names, of a job that no attempt works at. */
-enum status attempt_folder_tidy(const char *data_dir, struct store *store, int64_t job_id, struct error *err);
+/* How many of the `count` pictures from `first` on earlier attempts have done one after another (picture_record.h). */
+enum status attempt_folder_pictures_done(const char *data_dir, int64_t job_id, const char *digest, int64_t first,
+                                         int64_t count, int64_t *done, struct error *err);
+
+/* Removes what attempts of the job have left that no row names; of those that run, by the store, nothing: but for
+ * `ended` (0: none), whose end is still to be entered. */
+enum status attempt_folder_tidy(const char *data_dir, struct store *store, int64_t job_id, int ended,
+                                struct error *err);
 
 /* At start: gives attempts of a version before 17 of state.db, whose files lay in their job's folder, folders of their
  * own. One that is interrupted goes on at the next start. */

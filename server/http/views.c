@@ -53,6 +53,16 @@ static void add_webhook(cJSON *v, const struct job *job, const struct caller *wh
     json_add(v, "webhook_delivery", known);
 }
 
+static void add_parts(cJSON *v, const struct job *job) {
+    if (job->part_count == 0) {
+        json_add(v, "parts", cJSON_CreateNull());
+        return;
+    }
+    cJSON *parts = cJSON_AddObjectToObject(v, "parts");
+    json_add_int(parts, "count", job->part_count);
+    json_add_int(parts, "done", job->parts_done);
+}
+
 cJSON *view_job(const struct job *job, const struct caller *who) {
     cJSON *v = cJSON_CreateObject();
     json_add_int(v, "id", job->id);
@@ -75,6 +85,7 @@ cJSON *view_job(const struct job *job, const struct caller *who) {
     add_text(v, "settings", job->settings);
     json_add_int(v, "attempt", job->attempt);
     json_add_int(v, "attempts_left", job->attempts_left);
+    add_parts(v, job);
     view_add_time(v, "created_at", job->created_ms);
     view_add_time(v, "started_at", job->started_ms);
     view_add_time(v, "finished_at", job->finished_ms);

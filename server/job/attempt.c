@@ -13,80 +13,10 @@
 #include "server/job/admission.h"
 #include "server/job/fit.h"
 #include "server/job/housekeeping.h"
-#include "server/job/memory.h"
+#include "server/job/orders.h"
 
 #define EVENTS_MAX 500000      /* of one attempt: three days at 2 a second, which is a lot */
 #define CHECK_LIMIT_SEC 3600.0 /* a scene's check that takes longer is considered stuck */
-
-/* The members that orders for jobs and for checks share. */
-static cJSON *new_order(const char *kind, const struct scheduler_config *config, int thread_count) {
-    cJSON *order = cJSON_CreateObject();
-    json_add_string(order, "kind", kind);
-    json_add_int(order, "thread_count", thread_count);
-    json_add_int(order, "memory_bytes", (int64_t)config->worker_memory_bytes);
-    json_add_int(order, "photograph_memory_bytes", (int64_t)config->photograph_memory_bytes);
-    /* a quarter more than what stops jobs (disk.h): its own pixels are not to stop it */
-    json_add_int(order, "keep_free_bytes", (int64_t)(config->low_disk_bytes + config->low_disk_bytes / 4));
-    json_add_bool(order, "sandbox", config->sandbox);
-    return order;
-}
-
-/* What the job's owner may still take of the disk beside the job; 0: no limit. */
-static enum status disk_left(const struct scheduler_config *config, struct store *store, const struct job *job,
-                             uint64_t *bytes, struct error *err) {
-    uint64_t kept = 0;
-    *bytes = 0;
-    if (config->user_max_bytes == 0 || job->owner_id == 0)
-        return STATUS_OK;
-    enum status status = store_user_bytes(store, job->owner_id, NULL, job->id, &kept, err);
-    *bytes = kept < config->user_max_bytes ? config->user_max_bytes - kept : 1;
-    return status;
-}
-
-/* What orders for jobs of all kinds have. Takes settings. */
-static cJSON *new_job_order(const struct attempt *a, const struct scheduler_config *config, const struct job *job,
-                            int thread_count, uint64_t disk_bytes, cJSON *settings) {
-    cJSON *order = new_order(job_kind_name(job->kind), config, thread_count);
-    json_add_string(order, "scene_id", job->scene_id);
-    json_add_string(order, "name", job->name);
-    json_add_int(order, "job_id", job->id);
-    json_add_int(order, "attempt", a->number);
-    json_add_int(order, "memory_step", job->memory_step);
-    json_add_int(order, "disk_bytes", (int64_t)disk_bytes);
-    json_add(order, "settings", settings);
-    return order;
-}
-
-/* What a reconstruction's order has besides. */
-static void complete_order(cJSON *order, const struct scheduler_config *config, const struct buf *reduced) {
-    json_add_number(order, "checkpoint_interval_sec", config->checkpoint_interval_sec);
-    if (reduced->length > 0)
-        json_add_string(order, "reduced", buf_text(reduced));
-}
-
-/* The order of an attempt; *order is the caller's. */
-static enum status order_job(const struct attempt *a, const struct scheduler_config *config, struct store *store,
-                             const struct job *job, const struct scene_row *row, int thread_count, cJSON **out,
-                             struct error *err) {
-    cJSON *settings;
-    uint64_t disk_bytes;
-    enum status status = disk_left(config, store, job, &disk_bytes, err);
-    if (status == STATUS_OK)
-        status = json_parse(job->settings, strlen(job->settings), "the job's settings", &settings, err);
-    if (status != STATUS_OK)
-        return status;
-    struct buf reduced;
-    buf_init(&reduced, 4096);
-    cJSON *smaller = memory_reduce(job->kind, settings, job->memory_step, &thread_count, &reduced);
-    *out = new_job_order(a, config, job, thread_count, disk_bytes, smaller);
-    if (job->kind != JOB_RENDER)
-        json_add(*out, "reading", fit_reading(row));
-    if (job->kind == JOB_RECONSTRUCT)
-        complete_order(*out, config, &reduced);
-    cJSON_Delete(settings);
-    buf_release(&reduced);
-    return STATUS_OK;
-}
 
 /* The folder with all outputs of the job's source, relative to the data folder; the caller's. */
 static enum status find_outputs(struct store *store, int64_t source, char **folder, struct error *err) {
@@ -108,11 +38,11 @@ static enum status find_outputs(struct store *store, int64_t source, char **fold
 }
 
 /* Prepares the attempt's folder. What another kind than a reconstruction has finished is its checkpoint: `anew` begins
- * without. */
+ * without. A part leaves that where it is. */
 static enum status prepare_folder(const struct attempt *a, const struct scheduler_config *config, const struct job *job,
                                   bool anew, struct error *err) {
     enum status status = attempt_folder_begin(config->data_dir, job->id, a->number, err);
-    if (status == STATUS_OK && job->kind != JOB_RECONSTRUCT && !anew)
+    if (status == STATUS_OK && job->kind != JOB_RECONSTRUCT && !anew && a->part.part == 0)
         status = attempt_folder_carry_outputs(config->data_dir, job->id, a->number, err);
     return status;
 }
@@ -122,12 +52,14 @@ static enum status run_job(struct attempt *a, const struct scheduler_config *con
                            const struct job *job, const struct scene_row *row, bool anew, struct error *err) {
     cJSON *order = NULL;
     char *outputs = NULL, *files = job->kind == JOB_RENDER ? layout_job_files(NULL, job->id) : NULL;
-    enum status status = order_job(a, config, store, job, row, a->thread_count, &order, err);
+    const struct job_work todo = {job, row, &a->part, a->number, a->thread_count};
+    enum status status = orders_of_job(&todo, config, store, &order, err);
     if (status == STATUS_OK && job->source_id)
         status = find_outputs(store, job->source_id, &outputs, err);
     if (status == STATUS_OK)
         status = prepare_folder(a, config, job, anew, err);
-    char *folder = layout_attempt(NULL, job->id, a->number), *home = layout_job(NULL, job->id), *log = layout_log(home);
+    char *folder = layout_attempt(NULL, job->id, a->number), *home = layout_job(NULL, job->id),
+         *log = layout_log(a->part.part > 0 ? folder : home);
     const struct admission foretold = {.worker_limit_bytes = config->worker_memory_bytes};
     const struct run_work work = {.folder = folder,
                                   .log = log,
@@ -157,6 +89,7 @@ void attempt_empty(struct attempt *a) {
     mem_free(a->end_hint);
     mem_free(a->settings);
     mem_free(a->reading);
+    cJSON_Delete(a->plan);
     cJSON_Delete(a->problems);
     cJSON_Delete(a->facts);
     cJSON_Delete(a->untaken);
@@ -252,21 +185,25 @@ static void know_job(struct attempt *a, const struct job *job, int thread_count)
 }
 
 enum status attempt_resume_job(struct attempt *a, const struct scheduler_config *config, struct store *store,
-                               int64_t job_id, struct error *err) {
+                               const struct attempt_key *key, struct error *err) {
     struct job job = {0};
+    struct job_part part = {0};
     struct run *run = NULL;
-    enum status status = store_job_get(store, job_id, &job, err);
+    enum status status = store_job_get(store, key->job_id, &job, err);
+    if (status == STATUS_OK)
+        status = store_part_of(store, key->job_id, key->number, &part, err);
     if (status == STATUS_OK && !config->executor->resume)
         status = error_set(err, STATUS_NOT_FOUND, "no run of %s outlives its daemon", config->executor->name);
     if (status == STATUS_OK)
-        status = config->executor->resume(config->executor, job_id, job.attempt, &run, err);
+        status = config->executor->resume(config->executor, key->job_id, key->number, &run, err);
     if (status == STATUS_OK) {
-        name_attempt(a, config, job_id, job.attempt);
+        name_attempt(a, config, key->job_id, key->number);
+        a->part = part;
         know_job(a, &job, 1);
         a->run = run;
         a->phase = ATTEMPT_ALIVE;
         a->charged_sec = run_cpu_sec(run); /* what the former daemon had not charged is given away */
-        log_info("job %lld: attempt %d goes on as %s", (long long)job_id, job.attempt, run->place);
+        log_info("job %lld: attempt %d goes on as %s", (long long)key->job_id, key->number, run->place);
     }
     job_release(&job);
     return status;
@@ -286,6 +223,8 @@ enum status attempt_start_job(struct attempt *a, const struct scheduler_config *
         return status;
     name_attempt(a, config, job_id, number);
     status = store_job_get(store, job_id, &job, &why);
+    if (status == STATUS_OK)
+        status = store_part_of(store, job_id, number, &a->part, &why);
     if (status == STATUS_OK) {
         know_job(a, &job, thread_count);
         anew = job.restart_from[0] != '\0';
@@ -325,7 +264,7 @@ enum status attempt_start_check(struct attempt *a, const struct scheduler_config
                           .user_max_bytes = config->user_max_bytes,
                           .problems = cJSON_CreateArray()};
     snprintf(a->scene_id, sizeof a->scene_id, "%s", scene_id);
-    cJSON *order = new_order("check", config, thread_count);
+    cJSON *order = orders_new("check", config, thread_count);
     json_add_string(order, "scene_id", scene_id);
     enum status status = store_scene_get(store, scene_id, &row, &why);
     if (status == STATUS_OK) {

@@ -5,7 +5,7 @@
  *      empty ──start──> alive ──(its run ends)──> ended ──settle──> empty
  *
  * 1. A job's attempt is in the store (store/attempts.h) before its run begins, and its outcome is entered after the run
- *    has ended: of one job there is never more than one run.
+ *    has ended: of one job, or of each part of one that is split (store/parts.h), there is never more than one run.
  * 2. What a worker says is checked where it can be: it has read a stranger's files.
  * 3. settle can fail (the disk of state.db is full): the attempt stays ended and is settled
  *    again later; nothing of the outcome is lost. */
@@ -28,6 +28,7 @@ struct attempt {
     double charged_sec;              /* CPU time that was charged to that user */
     const struct executor *executor; /* borrowed */
     int number;                      /* fences what is written for the job */
+    struct job_part part;            /* of the job, that it does */
     char scene_id[SCENE_ID_SIZE];
     char *reading;                  /* with which a scene is checked, JSON; owned; NULL for a job */
     uint64_t user_max_bytes;        /* as in scheduler_config, for the check of a scene */
@@ -51,6 +52,7 @@ struct attempt {
     bool has_end;
     enum status end_status;
     char *end_message, *end_hint;
+    cJSON *plan;             /* that the job is better done in parts; NULL: it has not said so */
     cJSON *problems, *facts; /* of a scene */
     long problems_left_out;  /* problems beyond the number that is kept */
     cJSON *untaken;          /* announced files that are still to be entered; NULL: none */
@@ -62,10 +64,10 @@ struct attempt {
  * immediate retry is pointless. */
 enum status attempt_start_job(struct attempt *a, const struct scheduler_config *config, struct store *store,
                               struct counters *counters, int64_t job_id, int thread_count, struct error *err);
-/* Takes up the job's present attempt, which config->executor runs and an earlier daemon has started. STATUS_NOT_FOUND where
+/* Takes up an attempt of a job, which config->executor runs and an earlier daemon has started. STATUS_NOT_FOUND where
  * it does not run there. */
 enum status attempt_resume_job(struct attempt *a, const struct scheduler_config *config, struct store *store,
-                               int64_t job_id, struct error *err);
+                               const struct attempt_key *key, struct error *err);
 /* Starts the check of a scene, which is in `checking` and stays there if this fails. */
 enum status attempt_start_check(struct attempt *a, const struct scheduler_config *config, struct store *store,
                                 const struct unchecked *scene, int thread_count, struct error *err);

@@ -16,6 +16,8 @@
 #include "server/job/measure.h"
 #include "server/store/remote.h"
 
+#define RUNNING_MAX 10000 /* attempts that an earlier daemon may have left running */
+
 /* Temporary names as file_replace and file_put_in_place make them. */
 static bool is_temporary(const char *name) {
     static const char part[] = ".part", temporary[] = ".tmp-";
@@ -51,38 +53,32 @@ void housekeeping_drop_temporary(const char *dir) {
     mem_free(out);
 }
 
-void housekeeping_tidy_job(const char *data_dir, struct store *store, int64_t job_id) {
+void housekeeping_tidy_job(const char *data_dir, struct store *store, int64_t job_id, int ended) {
     struct error err;
-    if (attempt_folder_tidy(data_dir, store, job_id, &err) != STATUS_OK)
+    if (attempt_folder_tidy(data_dir, store, job_id, ended, &err) != STATUS_OK)
         log_warning("job %lld: what its attempts have left over stays: %s", (long long)job_id, err.message);
 }
 
 void housekeeping_after_kill(const struct scheduler_config *config, struct store *store) {
-    static const struct job_filter running = {.state = JOB_RUNNING, .kind = -1};
-    struct job jobs[16];
+    struct running *list = mem_array(RUNNING_MAX, sizeof *list);
+    size_t count = 0;
     struct error err;
-    size_t count = sizeof jobs / sizeof *jobs;
-    for (int64_t before = 0; count == sizeof jobs / sizeof *jobs;) {
-        if (store_job_list(store, NULL, &running, before, sizeof jobs / sizeof *jobs, jobs, &count, &err) !=
-            STATUS_OK) {
+    if (store_job_running(store, RUNNING_MAX, list, &count, &err) != STATUS_OK)
+        log_warning("what killed jobs left cannot be removed: %s", err.message);
+    for (size_t i = 0; i < count; i++) {
+        struct remote_row row;
+        const struct attempt_key *key = &list[i].key;
+        char *dir = layout_attempt(config->data_dir, key->job_id, key->number);
+        enum status status = key->number ? store_remote_get(store, key->job_id, key->number, &row, &err) : STATUS_OK;
+        if (status == STATUS_NOT_FOUND) {
+            housekeeping_drop_temporary(dir);
+            housekeeping_tidy_job(config->data_dir, store, key->job_id, key->number);
+        } else if (status != STATUS_OK) { /* what runs elsewhere goes on, and writes */
             log_warning("what killed jobs left cannot be removed: %s", err.message);
-            return;
         }
-        for (size_t i = 0; i < count; i++) {
-            struct remote_row row;
-            char *dir = layout_attempt(config->data_dir, jobs[i].id, jobs[i].attempt);
-            enum status status = store_remote_get(store, jobs[i].id, jobs[i].attempt, &row, &err);
-            if (status == STATUS_NOT_FOUND) {
-                housekeeping_drop_temporary(dir);
-                housekeeping_tidy_job(config->data_dir, store, jobs[i].id);
-            } else if (status != STATUS_OK) { /* what runs elsewhere goes on, and writes */
-                log_warning("what killed jobs left cannot be removed: %s", err.message);
-            }
-            before = jobs[i].id;
-            mem_free(dir);
-            job_release(&jobs[i]);
-        }
+        mem_free(dir);
     }
+    mem_free(list);
 }
 
 /* If this is interrupted, the next start measures what is left. The checkpoint goes even where that cannot be
@@ -94,7 +90,7 @@ static enum status drop_checkpoint(const char *data_dir, struct store *store, in
         log_warning("job %lld: %s", (long long)id, err->message);
     enum status status = attempt_folder_drop_checkpoint(data_dir, id, err);
     if (status == STATUS_OK)
-        housekeeping_tidy_job(data_dir, store, id);
+        housekeeping_tidy_job(data_dir, store, id, 0);
     status = status == STATUS_OK ? measure_job(store, id, dir, err) : status;
     mem_free(dir);
     return status;

@@ -39,6 +39,7 @@ enum attempt_row_phase { ATTEMPT_ROW_FORMER, ATTEMPT_ROW_RUNNING, ATTEMPT_ROW_EN
 #define ENDING_STOPPED "stopped"     /* by a request, or with the daemon */
 #define ENDING_BLOCKED "blocked"     /* it cannot go on until somebody acts */
 #define ENDING_LOST "lost"           /* nothing is heard of it: where it ran is at fault */
+#define ENDING_SPLIT "split"         /* from here on attempts of parts do the work (store/parts.h) */
 #define ENDING_RESTARTED "restarted" /* the daemon, or the machine, died */
 
 #define JOB_STATE_COUNT 6
@@ -87,6 +88,7 @@ struct job {
     enum job_wanted wanted;
     int attempt; /* of the current or last run; 0 before the first */
     int attempts_left;
+    int part_count, parts_done;                  /* of one that is split (store/parts.h); else 0 */
     int64_t created_ms, started_ms, finished_ms; /* Unix time, 0: not yet */
     char *stage;                                 /* last reported; "" before */
     char *restart_from; /* the stage that the next attempt begins with; "": where the last one stopped */

@@ -31,13 +31,12 @@ void lanes_release(struct lanes *l) {
 
 void lanes_forget_reasons(struct lanes *l) { l->admission.told_id = l->small_admission.told_id = -1; }
 
-/* Threads of this machine for one more job: an equal share among the jobs that run or could run now. A worker keeps the
+/* Threads of this machine for one more attempt: an equal share among those that run or could run now. A worker keeps the
  * threads it started with, so the shares are approximate. */
 static int thread_share(struct lanes *l) {
-    struct store_counts counts;
     int64_t limit = l->config->max_running > 0 ? l->config->max_running : 1, sharing = 1;
-    if (store_count(l->store, &counts, NULL) == STATUS_OK)
-        sharing = counts.jobs_by_state[JOB_QUEUED] + counts.jobs_by_state[JOB_RUNNING];
+    if (store_attempts_wanted(l->store, &sharing, NULL) != STATUS_OK)
+        sharing = 1;
     sharing = sharing < 1 ? 1 : sharing > limit ? limit : sharing;
     int share = l->config->thread_count / (int)sharing;
     return share > 0 ? share : 1;

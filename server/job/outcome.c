@@ -8,9 +8,11 @@
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
+#include "common/protocol.h"
 #include "server/data/attempt_folder.h"
 #include "server/data/layout.h"
 #include "server/data/trash.h"
+#include "server/job/worker_log.h"
 #include "server/job/worker_messages.h"
 #include "server/job/housekeeping.h"
 #include "server/job/measure.h"
@@ -21,6 +23,7 @@
 
 enum outcome {
     OUTCOME_OK,
+    OUTCOME_SPLIT, /* it is better done in parts */
     OUTCOME_INPUT,
     OUTCOME_CRASH,
     OUTCOME_MEMORY, /* a crash that a smaller working set may avoid */
@@ -60,7 +63,9 @@ static void judge_exit(const struct attempt *a, struct verdict *v) {
     char text[1024];
     switch (code) {
     case PROGRESS_EXIT_OK:
-        if (a->has_end && a->end_status == STATUS_OK)
+        if (a->has_end && a->end_status == STATUS_OK && a->plan)
+            say(v, OUTCOME_SPLIT, "", "");
+        else if (a->has_end && a->end_status == STATUS_OK)
             say(v, OUTCOME_OK, message, "");
         else
             say(v, OUTCOME_CRASH, "the worker ended without a result", "");
@@ -133,10 +138,32 @@ static enum status settle_memory(const struct attempt *a, struct store *store, c
     return status;
 }
 
+/* What the worker has planned, it may have planned wrongly: it has read a stranger's files. */
+static enum status settle_split(const struct attempt *a, struct store *store, struct error *err) {
+    double pictures, parts;
+    const char *digest;
+    struct error why;
+    enum status status = json_number(a->plan, "pictures", "a plan", 0.0, &pictures, &why);
+    if (status == STATUS_OK)
+        status = json_number(a->plan, "parts", "a plan", 0.0, &parts, &why);
+    if (status == STATUS_OK)
+        status = json_string(a->plan, "digest", "a plan", "", &digest, &why);
+    if (status == STATUS_OK && !(pictures >= 0.0 && pictures <= PICTURES_MAX && parts >= 0.0 && parts <= JOB_PARTS_MAX))
+        status = error_set(&why, STATUS_INPUT, "%.9g parts of %.9g pictures cannot be", parts, pictures);
+    if (status == STATUS_OK)
+        status = store_job_split(store, a->job_id, a->number, (int64_t)pictures, (int)parts, digest, &why);
+    if (status == STATUS_INPUT)
+        return store_job_crash(store, a->job_id, a->number, why.message, "", a->memory_step, err);
+    if (status != STATUS_OK && err)
+        *err = why;
+    return status;
+}
+
 static enum status settle_job(const struct attempt *a, struct store *store, const struct verdict *v,
                               struct error *err) {
     switch (v->outcome) {
     case OUTCOME_OK: return store_job_succeed_but(store, a->job_id, a->number, v->reason, err);
+    case OUTCOME_SPLIT: return settle_split(a, store, err);
     case OUTCOME_INPUT: return store_job_fail(store, a->job_id, a->number, v->reason, v->hint, err);
     case OUTCOME_REFUSED:
     case OUTCOME_BLOCKED: return store_job_block(store, a->job_id, a->number, v->reason, v->hint, err);
@@ -251,6 +278,16 @@ bool outcome_lacks_room(const struct attempt *a) {
     return a->phase == ATTEMPT_ENDED && a->end.way == RUN_EXIT && a->end.code == PROGRESS_EXIT_NO_SPACE;
 }
 
+/* What the worker of a part has printed goes to its job's log in one piece. */
+static void take_log(const struct attempt *a) {
+    char *from = layout_log(a->dir), *to = layout_log(a->whole_dir);
+    struct error err;
+    if (a->part.part > 0 && worker_log_take(to, from, NODE_LOG_MAX, &err) != STATUS_OK)
+        log_warning("job %lld: the log of attempt %d is not kept: %s", (long long)a->job_id, a->number, err.message);
+    mem_free(to);
+    mem_free(from);
+}
+
 /* Announced files must be entered before a job ends. A full disk does not delay a stop, though: the next attempt
  * announces them again. */
 static enum status make_up(struct attempt *a, struct store *store, struct error *err) {
@@ -273,7 +310,8 @@ enum status outcome_settle(struct attempt *a, struct store *store, struct trash 
     judge(a, &verdict);
     enum status status = make_up(a, store, err);
     if (status == STATUS_OK && a->job_id) {
-        housekeeping_tidy_job(a->data_dir, store, a->job_id);
+        take_log(a);
+        housekeeping_tidy_job(a->data_dir, store, a->job_id, a->number);
         status = measure_job(store, a->job_id, a->whole_dir, err);
     }
     if (status == STATUS_OK)
@@ -282,15 +320,18 @@ enum status outcome_settle(struct attempt *a, struct store *store, struct trash 
     if (status != STATUS_OK && status != STATUS_CONFLICT && status != STATUS_NOT_FOUND)
         return status;
     static const enum attempt_end ends[] = {
-        [OUTCOME_OK] = END_SUCCEEDED,  [OUTCOME_INPUT] = END_INPUT,     [OUTCOME_CRASH] = END_CRASHED,
-        [OUTCOME_MEMORY] = END_MEMORY, [OUTCOME_STOPPED] = END_STOPPED, [OUTCOME_BLOCKED] = END_DISK,
-        [OUTCOME_LOST] = END_LOST,     [OUTCOME_REFUSED] = END_REFUSED, [OUTCOME_PREEMPTED] = END_PREEMPTED};
+        [OUTCOME_OK] = END_SUCCEEDED,       [OUTCOME_SPLIT] = END_SUCCEEDED, [OUTCOME_INPUT] = END_INPUT,
+        [OUTCOME_CRASH] = END_CRASHED,      [OUTCOME_MEMORY] = END_MEMORY,   [OUTCOME_STOPPED] = END_STOPPED,
+        [OUTCOME_BLOCKED] = END_DISK,       [OUTCOME_LOST] = END_LOST,       [OUTCOME_REFUSED] = END_REFUSED,
+        [OUTCOME_PREEMPTED] = END_PREEMPTED};
     if (a->job_id)
         atomic_fetch_add(&counters->ends[ends[verdict.outcome]], 1);
     static const char *const words[] = {
-        [OUTCOME_OK] = "is done",       [OUTCOME_INPUT] = "is refused",    [OUTCOME_CRASH] = "broke off",
-        [OUTCOME_MEMORY] = "broke off", [OUTCOME_STOPPED] = "was stopped", [OUTCOME_BLOCKED] = "cannot go on",
-        [OUTCOME_LOST] = "is lost",     [OUTCOME_REFUSED] = "was refused", [OUTCOME_PREEMPTED] = "was pre-empted"};
+        [OUTCOME_OK] = "is done",           [OUTCOME_SPLIT] = "leaves the rest to parts",
+        [OUTCOME_INPUT] = "is refused",     [OUTCOME_CRASH] = "broke off",
+        [OUTCOME_MEMORY] = "broke off",     [OUTCOME_STOPPED] = "was stopped",
+        [OUTCOME_BLOCKED] = "cannot go on", [OUTCOME_LOST] = "is lost",
+        [OUTCOME_REFUSED] = "was refused",  [OUTCOME_PREEMPTED] = "was pre-empted"};
     if (a->job_id)
         log_info("job %lld: attempt %d %s%s%s", (long long)a->job_id, a->number, words[verdict.outcome],
                  verdict.reason[0] ? ": " : "", verdict.reason);

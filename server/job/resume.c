@@ -3,7 +3,7 @@
 
 #include "common/mem.h"
 
-#define RUNNING_MAX 10000 /* jobs that an earlier daemon may have left running */
+#define RUNNING_MAX 10000 /* attempts that an earlier daemon may have left running */
 
 struct resume {
     struct attempt *slots;
@@ -13,29 +13,28 @@ struct resume {
     struct store *store;
 };
 
-/* Takes up the attempts that go on without a daemon. Fills kept[*count] with their jobs. */
-static enum status resume_jobs(struct resume *s, int64_t *kept, size_t *count, struct error *err) {
+/* Takes up the attempts that go on without a daemon. Fills kept[*count] with them. */
+static enum status resume_jobs(struct resume *s, struct attempt_key *kept, size_t *count, struct error *err) {
     size_t running = 0;
-    int64_t *ids = mem_array(RUNNING_MAX, sizeof *ids);
-    enum job_wanted *wanted = mem_array(RUNNING_MAX, sizeof *wanted);
+    struct running *list = mem_array(RUNNING_MAX, sizeof *list);
     *count = 0;
-    enum status status = store_job_running(s->store, RUNNING_MAX, ids, wanted, &running, err);
+    enum status status = store_job_running(s->store, RUNNING_MAX, list, &running, err);
     for (size_t i = 0; i < running && *count < s->count && status == STATUS_OK; i++) {
         struct scheduler_config with = *s->config;
         struct attempt_row row = {0};
-        size_t rows = 0;
-        status = store_attempt_list(s->store, ids[i], 1, &row, &rows, err);
-        const struct executor_use *place = rows == 1 ? executors_find(s->places, row.executor) : NULL;
+        if (list[i].key.number == 0)
+            continue;
+        status = store_attempt_get(s->store, &list[i].key, &row, err);
+        const struct executor_use *place = status == STATUS_OK ? executors_find(s->places, row.executor) : NULL;
         if (status != STATUS_OK || !place)
             continue;
         with.executor = place->executor;
-        status = attempt_resume_job(&s->slots[*count], &with, s->store, ids[i], err);
+        status = attempt_resume_job(&s->slots[*count], &with, s->store, &list[i].key, err);
         if (status == STATUS_OK)
-            kept[(*count)++] = ids[i];
+            kept[(*count)++] = list[i].key;
         status = status == STATUS_NOT_FOUND ? STATUS_OK : status;
     }
-    mem_free(wanted);
-    mem_free(ids);
+    mem_free(list);
     return status;
 }
 
@@ -43,7 +42,7 @@ enum status resume_all(struct attempt *slots, size_t slot_count, struct executor
                        const struct scheduler_config *config, struct store *store, size_t *requeued,
                        struct error *err) {
     struct resume all = {slots, slot_count, places, config, store};
-    int64_t *kept = mem_array(slot_count, sizeof *kept);
+    struct attempt_key *kept = mem_array(slot_count, sizeof *kept);
     size_t count;
     enum status status = resume_jobs(&all, kept, &count, err);
     if (status == STATUS_OK)

@@ -183,39 +183,36 @@ static void follow_wish(struct scheduler *s, struct attempt *a, enum job_wanted 
     }
 }
 
-/* A job that the store has as running without an attempt: entering its false start had failed. */
-static void requeue_orphan(struct scheduler *s, int64_t id) {
-    struct job job;
+/* An attempt that the store has as running, and nobody else: entering its false start had failed. Or a job of which none
+ * runs: no part of it could begin. */
+static void requeue_orphan(struct scheduler *s, const struct attempt_key *key) {
     struct error err;
-    enum status status = store_job_get(s->store, id, &job, &err);
-    if (status == STATUS_OK)
-        status = store_job_stop(s->store, id, job.attempt, "its start failed", &err);
-    if (status != STATUS_OK)
+    enum status status = key->number ? store_job_stop(s->store, key->job_id, key->number, "its start failed", &err)
+                                     : store_job_yield(s->store, key->job_id, "", &err);
+    if (status != STATUS_OK && status != STATUS_CONFLICT)
         retry_later(s, "cannot queue a job again", &err);
-    job_release(&job);
 }
 
 static void follow_wishes(struct scheduler *s) {
     size_t limit = s->slot_count + 16, count; /* any further orphans are handled in the next round */
-    int64_t *ids = mem_array(limit, sizeof *ids);
-    enum job_wanted *wanted = mem_array(limit, sizeof *wanted);
+    struct running *list = mem_array(limit, sizeof *list);
     struct error err;
-    if (store_job_running(s->store, limit, ids, wanted, &count, &err) != STATUS_OK) {
+    if (store_job_running(s->store, limit, list, &count, &err) != STATUS_OK) {
         retry_later(s, "cannot read the users' requests", &err);
         count = 0;
     }
     for (size_t i = 0; i < count; i++) {
         struct attempt *a = NULL;
         for (size_t k = 0; k < s->lanes.job_slots && !a; k++)
-            if (s->slot[k].phase != ATTEMPT_EMPTY && s->slot[k].job_id == ids[i])
+            if (s->slot[k].phase != ATTEMPT_EMPTY && s->slot[k].job_id == list[i].key.job_id &&
+                s->slot[k].number == list[i].key.number)
                 a = &s->slot[k];
         if (!a)
-            requeue_orphan(s, ids[i]);
+            requeue_orphan(s, &list[i].key);
         else if (a->phase == ATTEMPT_ALIVE)
-            follow_wish(s, a, wanted[i]);
+            follow_wish(s, a, list[i].wanted);
     }
-    mem_free(wanted);
-    mem_free(ids);
+    mem_free(list);
 }
 
 static bool outlives(const struct attempt *a) { return a->run && a->run->outlives; }

@@ -17,7 +17,8 @@ struct scheduler_config {
     int small_renders;                    /* small renders at once, besides; 0: they wait with the other jobs */
     int small_render_threads;             /* shared between these; 0: all processors */
     double small_render_cost;             /* paths that a small render traces at the most (job.h) */
-    int user_max_running;                 /* jobs of one user at once; 0: no limit */
+    double render_part_cost;              /* paths of a part of a larger render; 0: it is one */
+    int user_max_running;                 /* attempts of jobs of one user at once; 0: no limit */
     int max_checks;                       /* checks of scenes at once; 0: CHECKS_AT_ONCE */
     int thread_count;                     /* shared between running jobs; 0: all processors */
     uint64_t user_max_bytes;              /* what one user may keep; 0: no limit */

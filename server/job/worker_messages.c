@@ -76,9 +76,30 @@ static bool is_thinned(struct attempt *a, struct store *store) {
     return true;
 }
 
+/* Progress of a part becomes that of the job; false: it says nothing. */
+static bool add_up(const struct message_listener *l, cJSON *data) {
+    struct attempt *a = l->attempt;
+    struct parts_progress all;
+    struct error err;
+    double done, total, eta_sec;
+    if (json_number(data, "done", "progress", 0.0, &done, NULL) != STATUS_OK ||
+        json_number(data, "total", "progress", 0.0, &total, NULL) != STATUS_OK ||
+        json_number(data, "eta_sec", "progress", -1.0, &eta_sec, NULL) != STATUS_OK || !(total > 0.0))
+        return false;
+    if (store_part_progress(l->store, a->job_id, a->number, done, eta_sec, &all, &err) != STATUS_OK) {
+        complain(a, EVENT_PROGRESS, &err);
+        return false;
+    }
+    cJSON_SetNumberHelper(cJSON_GetObjectItemCaseSensitive(data, "done"), all.done);
+    cJSON_SetNumberHelper(cJSON_GetObjectItemCaseSensitive(data, "total"), all.total);
+    cJSON_DeleteItemFromObjectCaseSensitive(data, "eta_sec");
+    json_add_number(data, "eta_sec", all.eta_sec);
+    return true;
+}
+
 static void enter_event(const struct message_listener *l, const char *type, cJSON *data) {
     struct attempt *a = l->attempt;
-    if (a->job_id == 0)
+    if (a->job_id == 0 || (a->part.part > 0 && strcmp(type, EVENT_PROGRESS) == 0 && !add_up(l, data)))
         return;
     if (!is_thinned(a, l->store)) {
         put_event(a, l->store, type, data);
@@ -315,7 +336,11 @@ static void take_line(void *user, const char *text, size_t length) {
         note_checkpoint(l, line);
     else if (strcmp(type, "space") == 0)
         note_space(l, line);
-    else if (strcmp(type, "end") == 0)
+    else if (strcmp(type, "plan") == 0) {
+        cJSON_Delete(a->plan);
+        a->plan = line;
+        line = NULL;
+    } else if (strcmp(type, "end") == 0)
         note_end(a, line);
     else if (strcmp(type, "problem") == 0 && a->problems) {
         if (cJSON_GetArraySize(a->problems) < PROBLEMS_MAX) {

@@ -34,8 +34,8 @@ static void digest_settings(struct sha256 *hash, const cJSON *settings) {
     }
 }
 
-/* What the pictures depend on: the settings, the room (by the report, which lists versions and errors) and the files. */
-static void make_digest(const struct relight_job *job, char digest[SHA256_HEX_SIZE]) {
+/* The settings, the room (by the report, which lists versions and errors) and the files. */
+void output_digest(const struct relight_job *job, char digest[SHA256_HEX_SIZE]) {
     static const char *const names[] = {"report.json", "scene.ply", "views.json"};
     struct sha256 hash;
     char hex[SHA256_HEX_SIZE];
@@ -86,7 +86,7 @@ enum status output_open(struct output *o, const struct relight_job *job, const s
                         struct error *err) {
     struct buf text;
     *o = (struct output){.job = job, .watch = watch, .done = cJSON_CreateObject()};
-    make_digest(job, o->digest);
+    output_digest(job, o->digest);
     char *path = file_join(job->out, OUTPUT_RECORD);
     buf_init(&text, RECORD_LIMIT);
     enum status status = file_read(path, &text, err);
@@ -138,7 +138,27 @@ enum status output_record(struct output *o, uint64_t picture, cJSON *record, str
     return status;
 }
 
+/* One line a picture, in their order, whoever has rendered them when. */
+static enum status sort_record(struct output *o, uint64_t pictures, struct error *err) {
+    struct buf lines;
+    char *path = file_join(o->job->out, OUTPUT_RECORD);
+    buf_init(&lines, RECORD_LIMIT);
+    bool fits = true;
+    for (uint64_t i = 0; i < pictures && fits; i++) {
+        char key[24], *text;
+        key_of(i, key);
+        text = json_text(cJSON_GetObjectItemCaseSensitive(o->done, key));
+        fits = buf_puts(&lines, text) && buf_puts(&lines, "\n");
+        mem_free(text);
+    }
+    enum status status = fits ? file_replace(path, buf_text(&lines), lines.length, err) : STATUS_OK;
+    buf_release(&lines);
+    mem_free(path);
+    return status;
+}
+
 enum status output_views(struct output *o, uint64_t pictures, cJSON *head, struct error *err) {
+    enum status status = sort_record(o, pictures, err);
     cJSON *frames = cJSON_AddArrayToObject(head, "frames");
     for (uint64_t i = 0; i < pictures; i++) {
         char key[24];
@@ -148,7 +168,8 @@ enum status output_views(struct output *o, uint64_t pictures, cJSON *head, struc
         cJSON_AddItemToArray(frames, record ? record : cJSON_CreateNull());
     }
     char *text = json_page(head), *path = file_join(o->job->out, OUTPUT_VIEWS);
-    enum status status = file_replace(path, text, strlen(text), err);
+    if (status == STATUS_OK)
+        status = file_replace(path, text, strlen(text), err);
     if (status == STATUS_OK && o->watch->file)
         o->watch->file(o->watch->user, OUTPUT_VIEWS);
     mem_free(path);

@@ -2,7 +2,8 @@
  *
  * NNNNN is the picture's number. A pass is NNNNN_radiance.png or .exr, a source alone NNNNN_light_27.exr, a multilayer
  * EXR NNNNN.exr. views.jsonl has a line of JSON for each picture that is done, with the sizes and digests of its files,
- * appended when all of them have their final names; a line that was cut off counts as none. views.json is made of it. */
+ * appended when all of them have their final names; a line that was cut off counts as none. When all are
+ * done it is put in their order, and views.json is made of it. */
 #ifndef UNBAKE_RELIGHT_OUTPUT_H
 #define UNBAKE_RELIGHT_OUTPUT_H
 
@@ -23,6 +24,9 @@ struct output {
     cJSON *done;                  /* records of this digest, by picture; owned */
     const char *note;             /* a comment in EXR headers; NULL: none; borrowed */
 };
+
+/* Of what the pictures of a job depend on. */
+void output_digest(const struct relight_job *job, char digest[SHA256_HEX_SIZE]);
 
 /* Reads the record, where there is one. */
 enum status output_open(struct output *o, const struct relight_job *job, const struct relight_watch *watch,

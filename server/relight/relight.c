@@ -23,6 +23,7 @@
 #define ROULETTE_DEPTH 5
 #define FIRST_HIT_SPP 16 /* jittered rays for each pixel of the other passes */
 #define UNTIL_SPP 65536  /* with noise or time_limit, where spp is not given */
+#define GUESSED_SPP 1024 /* of a picture that is rendered until its noise is small */
 #define METER_WIDTH 160  /* pixels of the picture that chooses the exposure */
 #define METER_SPP 16
 #define PREVIEW_INTERVAL_SEC 1.0
@@ -395,4 +396,17 @@ enum status relight_count(const struct relight_job *job, uint64_t *pictures, uin
         *pixels += (uint64_t)views.view[i].camera.width * views.view[i].camera.height * environment_suns(job);
     cameras_release(&views);
     return STATUS_OK;
+}
+
+enum status relight_look(const struct relight_job *job, struct relight_plan *plan, struct error *err) {
+    const cJSON *s = job->settings;
+    uint64_t pixels = 0;
+    *plan = (struct relight_plan){0};
+    bool is_until = render_settings_number(s, "noise") > 0.0 || render_settings_number(s, "time_limit") > 0.0;
+    double spp = is_until && !render_settings_has(s, "spp") ? GUESSED_SPP : render_settings_number(s, "spp");
+    enum status status = relight_count(job, &plan->pictures, &pixels, err);
+    if (status == STATUS_OK)
+        output_digest(job, plan->digest);
+    plan->paths = (double)pixels * (needs_light(s) ? spp : FIRST_HIT_SPP);
+    return status;
 }

@@ -5,10 +5,11 @@
  *      FORMER ──store_attempt_adopted──> RUNNING or ENDED, as its job is: attempts of an older version, whose files lie
  *                                        in their job's folder until the daemon has moved them (data/attempt_folder.h)
  *
- * 1. A row is RUNNING in the transaction that makes its job so, before anything of the attempt exists elsewhere; it is
- *    ENDED in the one in which its job leaves that state. So a job has at most one that is RUNNING.
- * 2. Numbers only grow, over retries too: a number names one attempt for ever. All that is said in the name of another
- *    than the job's present one is refused (STATUS_CONFLICT).
+ * 1. A row is RUNNING in a transaction in which its job is or becomes so, before anything of the attempt exists elsewhere;
+ *    it is ENDED, at the latest, in the one in which its job leaves that state. Of a job, or of each part of one that is
+ *    split (parts.h), at most one is RUNNING.
+ * 2. Numbers only grow, over retries and parts too: a number names one attempt of the job for ever. All that is said in
+ *    the name of one that is not RUNNING is refused (STATUS_CONFLICT).
  * 3. ENDED is a sink, and `ending` says how: one of the words of job.h. */
 #ifndef UNBAKE_STORE_ATTEMPTS_H
 #define UNBAKE_STORE_ATTEMPTS_H
@@ -24,6 +25,10 @@ struct store; /* store.h */
 
 #define ATTEMPTS_LOST_MAX 5 /* in a row, before a job fails: what loses five may be the job's own doing */
 
+struct attempt_key {
+    int64_t job_id;
+    int number;
+};
 struct attempt_row {
     int number;
     char executor[32]; /* where it ran: "process" */
@@ -33,13 +38,15 @@ struct attempt_row {
 /* Attempts of the job, newest first. Fills rows[limit]. */
 enum status store_attempt_list(struct store *store, int64_t job_id, size_t limit, struct attempt_row *rows,
                                size_t *count, struct error *err);
+enum status store_attempt_get(struct store *store, const struct attempt_key *key, struct attempt_row *row,
+                              struct error *err);
 /* One attempt that is FORMER; STATUS_NOT_FOUND when there is none. */
 enum status store_attempt_former(struct store *store, int64_t *job_id, int *number, struct error *err);
 /* Its files have been moved. */
 enum status store_attempt_adopted(struct store *store, int64_t job_id, int number, struct error *err);
 
 /* The scheduler's transitions, fenced by `attempt`: STATUS_CONFLICT when another attempt is current. A job whose scene
- * is being checked does not start. A recorded request to cancel overrides every end; one to pause overrides a return to
+ * is being checked does not start. A running job that is split starts its next part, where there is one (parts.h). A recorded request to cancel overrides every end; one to pause overrides a return to
  * the queue. `executor` is the name of what will run it. */
 enum status store_job_start(struct store *store, int64_t id, const char *executor, int *attempt, struct error *err);
 enum status store_job_succeed(struct store *store, int64_t id, int attempt, struct error *err);
@@ -61,10 +68,11 @@ enum status store_job_stop(struct store *store, int64_t id, int attempt, const c
 /* The attempt cannot continue until somebody acts (disk full): paused. */
 enum status store_job_block(struct store *store, int64_t id, int attempt, const char *reason, const char *hint,
                             struct error *err);
-/* At start: every running job but kept[kept_count] is queued again (or paused, cancelled, as requested). It does not count
+/* At start: every running job of which none of kept[kept_count] is queued again (or paused, cancelled, as requested); of the
+ * others the attempts that are not kept end. It does not count
  * as a failed attempt: the job is not at fault when the daemon or the machine dies. The disk usage of such a job becomes
  * unknown. */
-enum status store_reconcile(struct store *store, const int64_t *kept, size_t kept_count, size_t *requeued,
+enum status store_reconcile(struct store *store, const struct attempt_key *kept, size_t kept_count, size_t *requeued,
                             struct error *err);
 
 /* Two lanes, so that small renders do not wait behind hours of work. */
@@ -85,8 +93,12 @@ enum status store_job_next(struct store *store, int user_max_running, const stru
 /* The executor on which the job must run: the one that its user has chosen, JOB_EXECUTOR_HERE for all kinds but
  * reconstructions, "": any. The caller's (mem_free). */
 enum status store_job_executor(struct store *store, int64_t id, char **executor, struct error *err);
-/* Running jobs and the requests to them, for the scheduler. Fills ids[limit], wanted[limit]. */
-enum status store_job_running(struct store *store, size_t limit, int64_t *ids, enum job_wanted *wanted, size_t *count,
+/* Attempts that run, and what is wanted of them, for the scheduler, with every job that runs. Fills list[limit]. */
+struct running {
+    struct attempt_key key; /* number 0: no attempt of the job runs at this moment */
+    enum job_wanted wanted; /* as the job's; and paused, where another part of it has failed or cannot go on */
+};
+enum status store_job_running(struct store *store, size_t limit, struct running *list, size_t *count,
                               struct error *err);
 /* A queued job that must run on another executor than those (names with a blank before and after each), and whose reason
  * does not begin with `prefix`. STATUS_NOT_FOUND if none. *executor is the caller's. */

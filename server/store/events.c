@@ -74,15 +74,16 @@ enum status store_event_append(struct store *store, int64_t job_id, int attempt,
 }
 
 enum status store_fence(struct store *store, int64_t job_id, int attempt, struct error *err) {
-    int64_t present;
-    enum status status = sql_int(&store->sql, -1, &present, err,
-                                 "SELECT CASE state WHEN ?2 THEN attempt ELSE 0 END FROM jobs WHERE id = ?1", "in",
-                                 job_id, (int)JOB_RUNNING);
+    int64_t runs;
+    enum status status = sql_int(&store->sql, -1, &runs, err,
+                                 "SELECT state = ?2 AND EXISTS (SELECT 1 FROM attempts WHERE job_id = ?1"
+                                 " AND number = ?3 AND phase <> ?4) FROM jobs WHERE id = ?1",
+                                 "innn", job_id, (int)JOB_RUNNING, attempt, (int)ATTEMPT_ROW_ENDED);
     if (status != STATUS_OK)
         return status;
-    if (present < 0)
+    if (runs < 0)
         return error_set(err, STATUS_NOT_FOUND, "there is no job %lld", (long long)job_id);
-    if (present != attempt)
+    if (!runs)
         return error_set(err, STATUS_CONFLICT, "attempt %d of job %lld is over", attempt, (long long)job_id);
     return STATUS_OK;
 }

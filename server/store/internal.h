@@ -99,6 +99,14 @@ int64_t store_now_ms(void); /* Unix time */
     "pinned = CASE ?1 WHEN 0 THEN pinned WHEN 1 THEN 1 ELSE 0 END,"                                                    \
     " expires_ms = iif(?2, ?3, expires_ms)"
 
+/* The part (parts.h) of which the job (an SQL expression) begins an attempt next; null where it cannot at this moment. */
+#define NEXT_PART(job)                                                                                                 \
+    "(CASE WHEN EXISTS (SELECT 1 FROM parts WHERE job_id = " job " AND parts.state > 1) THEN NULL"                     \
+    " WHEN EXISTS (SELECT 1 FROM parts WHERE job_id = " job " AND parts.state = 0) THEN"                               \
+    "  (SELECT min(part) FROM parts WHERE job_id = " job " AND parts.state = 0 AND NOT EXISTS (SELECT 1 FROM attempts" \
+    "   WHERE attempts.job_id = " job " AND attempts.part = parts.part AND phase = 1))"                                \
+    " WHEN EXISTS (SELECT 1 FROM attempts WHERE job_id = " job " AND phase = 1) THEN NULL ELSE 0 END)"
+
 /* users.c, while the store is opened: sets has_users. */
 enum status store_look_for_users(struct store *store, struct error *err);
 

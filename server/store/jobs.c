@@ -21,7 +21,9 @@
     "  WHERE webhooks.job_id = jobs.id),"                                                                              \
     " kind, source_id, cost,"                                                                                          \
     " (SELECT json_group_array(json_object('name', job_files.name, 'bytes', iif(bytes < 0, NULL, bytes),"              \
-    "  'sha256', nullif(sha256, ''))) FROM job_files WHERE job_id = jobs.id)"
+    "  'sha256', nullif(sha256, ''))) FROM job_files WHERE job_id = jobs.id),"                                         \
+    " (SELECT count(*) FROM parts WHERE job_id = jobs.id),"                                                            \
+    " (SELECT count(*) FROM parts WHERE job_id = jobs.id AND parts.state = 1)"
 
 static void fill(struct job *job, sqlite3_stmt *stmt) {
     *job = (struct job){
@@ -58,6 +60,8 @@ static void fill(struct job *job, sqlite3_stmt *stmt) {
         .source_id = sqlite3_column_int64(stmt, 31),
         .cost = sqlite3_column_double(stmt, 32),
         .files = sql_dup(stmt, 33),
+        .part_count = sqlite3_column_int(stmt, 34),
+        .parts_done = sqlite3_column_int(stmt, 35),
     };
     strncpy(job->scene_id, sql_text(stmt, 2), sizeof job->scene_id - 1);
 }
@@ -336,19 +340,23 @@ enum status store_job_delete(struct store *store, int64_t id, struct error *err)
     return status;
 }
 
-enum status store_job_running(struct store *store, size_t limit, int64_t *ids, enum job_wanted *wanted, size_t *count,
+enum status store_job_running(struct store *store, size_t limit, struct running *list, size_t *count,
                               struct error *err) {
     sqlite3_stmt *stmt;
     *count = 0;
     store_lock(store);
-    enum status status = sql_query(&store->sql, &stmt, err,
-                                   "SELECT id, wanted FROM jobs WHERE state = ?"
-                                   " ORDER BY id LIMIT ?",
-                                   "ni", (int)JOB_RUNNING, (int64_t)limit);
-    while (sql_next(&store->sql, stmt, &status, err)) {
-        ids[*count] = sqlite3_column_int64(stmt, 0);
-        wanted[(*count)++] = (enum job_wanted)sqlite3_column_int(stmt, 1);
-    }
+    enum status status =
+        sql_query(&store->sql, &stmt, err,
+                  "SELECT id, ifnull(attempts.number, 0), iif(wanted = 0 AND EXISTS (SELECT 1 FROM parts WHERE"
+                  " parts.job_id = id AND parts.state > 1), 1, wanted)"
+                  " FROM jobs LEFT JOIN attempts ON attempts.job_id = id AND attempts.phase = 1"
+                  " WHERE jobs.state = ? ORDER BY id, attempts.number LIMIT ?",
+                  "ni", (int)JOB_RUNNING, (int64_t)limit);
+    while (sql_next(&store->sql, stmt, &status, err))
+        list[(*count)++] = (struct running){{sqlite3_column_int64(stmt, 0), sqlite3_column_int(stmt, 1)},
+                                            (enum job_wanted)sqlite3_column_int(stmt, 2)};
     store_unlock(store);
+    if (status != STATUS_OK)
+        *count = 0;
     return status;
 }

@@ -162,6 +162,7 @@ enum status remote_tell_begun(struct store *store, int64_t job_id, struct error 
 enum status store_remote_explain(struct store *store, int64_t job_id, int number, const char *reason,
                                  struct error *err) {
     struct remote_row row = {0};
+    int64_t others = 0;
     char text[192];
     enum status status = store_begin(store, err);
     if (status != STATUS_OK)
@@ -177,7 +178,11 @@ enum status store_remote_explain(struct store *store, int64_t job_id, int number
     status =
         sql_run(&store->sql, err, "UPDATE remote SET external_reason = ? WHERE job_id = ? AND part = 0 AND number = ?",
                 "tin", reason[0] ? reason : "-", job_id, number);
-    if (status == STATUS_OK)
+    if (status == STATUS_OK) /* while another part of the job runs it does not wait */
+        status = sql_int(&store->sql, 0, &others, err,
+                         "SELECT count(*) FROM attempts WHERE job_id = ? AND number <> ? AND attempts.phase = 1", "in",
+                         job_id, number);
+    if (status == STATUS_OK && others == 0)
         status = tell_job(store, job_id, text, err);
     return store_end(store, status, job_id, err);
 }

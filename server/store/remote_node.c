@@ -23,8 +23,9 @@ static enum status check_token(struct store *store, const struct remote_key *key
     sqlite3_stmt *stmt;
     bool found = false, is_over = true;
     enum status status = sql_first(&store->sql, &stmt, &found, err,
-                                   "SELECT token_sha256, claimant, phase, state, attempt FROM remote"
-                                   " JOIN jobs ON jobs.id = job_id WHERE job_id = ? AND part = 0 AND number = ?",
+                                   "SELECT token_sha256, claimant, phase, state, EXISTS (SELECT 1 FROM attempts WHERE"
+                                   " attempts.job_id = ?1 AND attempts.number = ?2 AND attempts.phase = 1) FROM remote"
+                                   " JOIN jobs ON jobs.id = job_id WHERE job_id = ?1 AND part = 0 AND number = ?2",
                                    "in", key->job_id, key->number);
     if (status != STATUS_OK)
         return status;
@@ -32,7 +33,7 @@ static enum status check_token(struct store *store, const struct remote_key *key
         found = sha256_equal(sql_text(stmt, 0), key->token_sha256);
         snprintf(claimant, REMOTE_CLAIMANT_SIZE, "%s", sql_text(stmt, 1));
         is_over = sqlite3_column_int(stmt, 2) == REMOTE_ENDED || sqlite3_column_int(stmt, 3) != JOB_RUNNING ||
-                  sqlite3_column_int(stmt, 4) != key->number;
+                  !sqlite3_column_int(stmt, 4);
         sqlite3_reset(stmt);
     }
     return !found ? unknown(key, err) : is_over ? over(key, err) : STATUS_OK;

@@ -209,7 +209,7 @@ static const char step_15[] =
 static const char step_16[] = "ALTER TABLE scenes ADD COLUMN reading TEXT NOT NULL DEFAULT '{}';"
                               "ALTER TABLE uploads ADD COLUMN reading TEXT NOT NULL DEFAULT '';";
 
-/* Attempts, the durable part of them (attempts.h). `part` is for jobs that split; none do. All files of a job of an
+/* Attempts, the durable part of them (attempts.h). `part` is for jobs that split (step 24). All files of a job of an
  * earlier version lie in one folder, which becomes that of its last attempt. */
 static const char step_17[] = "CREATE TABLE attempts ("
                               "  job_id INTEGER NOT NULL REFERENCES jobs (id) ON DELETE CASCADE,"
@@ -313,7 +313,23 @@ static const char step_22[] = "CREATE INDEX jobs_by_executor ON jobs (executor) 
 /* Tokens that end by themselves; 0: never. */
 static const char step_23[] = "ALTER TABLE tokens ADD COLUMN expires_ms INTEGER NOT NULL DEFAULT 0;";
 
+/* Parts of renders (parts.h). States: open, done, failed, blocked. */
+static const char step_24[] = "CREATE TABLE parts ("
+                              "  job_id INTEGER NOT NULL REFERENCES jobs (id) ON DELETE CASCADE,"
+                              "  part INTEGER NOT NULL CHECK (part > 0),"
+                              "  first INTEGER NOT NULL,"
+                              "  count INTEGER NOT NULL CHECK (count > 0)," /* of pictures */
+                              "  digest TEXT NOT NULL,"
+                              "  state INTEGER NOT NULL DEFAULT 0 CHECK (state BETWEEN 0 AND 3),"
+                              "  crashes INTEGER NOT NULL DEFAULT 0,"
+                              "  done REAL NOT NULL DEFAULT 0," /* pictures */
+                              "  rate REAL NOT NULL DEFAULT 0," /* pictures a second; 0: unknown */
+                              "  reason TEXT NOT NULL DEFAULT '',"
+                              "  hint TEXT NOT NULL DEFAULT '',"
+                              "  PRIMARY KEY (job_id, part)"
+                              ") STRICT, WITHOUT ROWID;";
+
 const char *const schema_steps[] = {step_1,  step_2,  step_3,  step_4,  step_5,  step_6,  step_7,  step_8,
                                     step_9,  step_10, step_11, step_12, step_13, step_14, step_15, step_16,
-                                    step_17, step_18, step_19, step_20, step_21, step_22, step_23};
+                                    step_17, step_18, step_19, step_20, step_21, step_22, step_23, step_24};
 const int schema_version = (int)(sizeof schema_steps / sizeof schema_steps[0]);

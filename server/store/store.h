@@ -27,6 +27,7 @@
 #include "server/store/limits.h"
 #include "server/store/outbox.h"
 #include "server/store/outputs.h"
+#include "server/store/parts.h"
 #include "server/store/retention.h"
 #include "server/store/uploads.h"
 #include "server/store/usage.h"

@@ -67,18 +67,16 @@ enum status transition_tell(struct store *store, const struct present *now, cons
     return status;
 }
 
-/* The attempt ends with its job's run, and what its node may still say of it is not wanted. */
-static enum status end_attempt(struct store *store, const struct present *now, struct error *err) {
+/* The attempts end with their job's run, and what nodes may still say of them is not wanted. */
+static enum status end_attempts(struct store *store, const struct present *now, struct error *err) {
     enum status status =
         sql_run(&store->sql, err, "UPDATE remote SET phase = 3 WHERE job_id = ? AND phase < 3", "i", now->id);
     if (status == STATUS_OK)
         status = sql_run(&store->sql, err, "DELETE FROM attempt_lines WHERE job_id = ?", "i", now->id);
     if (status != STATUS_OK)
         return status;
-    return sql_run(
-        &store->sql, err,
-        "UPDATE attempts SET phase = ?, ending = ? WHERE job_id = ? AND part = 0 AND number = ? AND phase = ?", "ntinn",
-        (int)ATTEMPT_ROW_ENDED, now->ending, now->id, now->attempt, (int)ATTEMPT_ROW_RUNNING);
+    return sql_run(&store->sql, err, "UPDATE attempts SET phase = ?, ending = ? WHERE job_id = ? AND phase = ?", "ntin",
+                   (int)ATTEMPT_ROW_ENDED, now->ending, now->id, (int)ATTEMPT_ROW_RUNNING);
 }
 
 enum status transition_move(struct store *store, struct present *now, enum job_state to, const char *reason,
@@ -94,14 +92,15 @@ enum status transition_move(struct store *store, struct present *now, enum job_s
     int64_t at = store_now_ms();
     enum status status = STATUS_OK;
     if (ends)
-        status = end_attempt(store, now, err);
+        status = end_attempts(store, now, err);
     if (status == STATUS_OK)
-        status = sql_run(&store->sql, err,
-                         "UPDATE jobs SET revision = revision + 1, events_gone = 0, state = ?, wanted = 0, attempt = ?,"
-                         " attempts_left = ?, reason = ?, hint = ?, finished_ms = ?, eta_sec = -1"
-                         " WHERE id = ?",
-                         "nnnttii", (int)to, now->attempt, now->attempts_left, reason, hint,
-                         job_is_terminal(to) ? at : (int64_t)0, now->id);
+        status = sql_run(
+            &store->sql, err,
+            "UPDATE jobs SET revision = revision + 1, events_gone = 0, state = ?, wanted = 0, attempt = max(attempt, ?),"
+            " attempts_left = ?, reason = ?, hint = ?, finished_ms = ?, eta_sec = -1"
+            " WHERE id = ?",
+            "nnnttii", (int)to, now->attempt, now->attempts_left, reason, hint, job_is_terminal(to) ? at : (int64_t)0,
+            now->id);
     if (status == STATUS_OK)
         status = transition_tell(store, now, reason, hint, err);
     return status == STATUS_OK ? store_webhook_post(store, now->id, now->attempt, job_state_name(to), reason, hint, err)

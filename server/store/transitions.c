@@ -84,6 +84,10 @@ static enum status enqueue(struct store *store, struct present *now, const struc
         status = store_job_files_check(store, now->id, err);
     if (status == STATUS_OK && limits)
         status = store_queue_check(store, owner, limits, err);
+    if (status == STATUS_OK) /* what had blocked a part is tried again */
+        status =
+            sql_run(&store->sql, err,
+                    "UPDATE parts SET state = 0, reason = '', hint = '' WHERE job_id = ? AND state = 3", "i", now->id);
     return status == STATUS_OK ? transition_move(store, now, JOB_QUEUED, "", "", err) : status;
 }
 
@@ -125,6 +129,9 @@ static enum status revive(struct store *store, struct present *now, int max_atte
     if (status != STATUS_OK)
         return status;
     now->attempts_left = max_attempts;
+    status = sql_run(&store->sql, err, "DELETE FROM parts WHERE job_id = ?", "i", now->id); /* it is split anew */
+    if (status != STATUS_OK)
+        return status;
     status = enqueue(store, now, limits, err);
     /* Where it ended is not where it will be. */
     return status == STATUS_OK

@@ -8,6 +8,7 @@
 #include "common/file.h"
 #include "common/mem.h"
 #include "server/data/layout.h"
+#include "server/store/parts.h"
 
 #define WHAT "job.json"
 
@@ -41,6 +42,37 @@ static enum status read_memory(struct order *o, struct error *err) {
     return STATUS_OK;
 }
 
+static enum status read_member(const cJSON *object, const char *key, double *value, struct error *err) {
+    enum status status = json_number(object, key, WHAT, 0.0, value, err);
+    if (status == STATUS_OK && !(*value >= 0.0 && *value <= 0x1p53 && *value == floor(*value)))
+        status = error_set(err, STATUS_INTERNAL, WHAT ": %s is %g", key, *value);
+    return status;
+}
+
+/* Of a render: whether it may split, or which part of one it is. */
+static enum status read_parts(struct order *o, struct error *err) {
+    const cJSON *split = cJSON_GetObjectItemCaseSensitive(o->json, "split");
+    const cJSON *part = cJSON_GetObjectItemCaseSensitive(o->json, "part");
+    double parts = 0.0, first = 0.0, count = 0.0, done = 0.0;
+    enum status status = read_member(split, "parts", &parts, err);
+    if (status == STATUS_OK)
+        status = read_member(split, "paths", &o->split_paths, err);
+    if (status == STATUS_OK)
+        status = read_member(part, "first", &first, err);
+    if (status == STATUS_OK)
+        status = read_member(part, "count", &count, err);
+    if (status == STATUS_OK)
+        status = read_member(part, "done", &done, err);
+    if (status == STATUS_OK && (parts > JOB_PARTS_MAX || (part && !(done < count))))
+        status = error_set(err, STATUS_INTERNAL, WHAT ": part %g of %g, %g parts", done, count, parts);
+    o->may_split = split != NULL;
+    o->split_parts = (int)parts;
+    o->first_view = (uint64_t)first;
+    o->view_count = (uint64_t)count;
+    o->views_done = (uint64_t)done;
+    return status;
+}
+
 /* What orders for jobs of all kinds have. */
 static enum status read_job(struct order *o, struct error *err) {
     double job_id, attempt;
@@ -62,6 +94,8 @@ static enum status read_job(struct order *o, struct error *err) {
         status = json_number(o->json, "checkpoint_interval_sec", WHAT, 60.0, &o->checkpoint_interval_sec, err);
     if (status == STATUS_OK)
         status = json_bool(o->json, "parts", WHAT, false, &o->parts, err);
+    if (status == STATUS_OK)
+        status = read_parts(o, err);
     if (status != STATUS_OK)
         return status;
     o->job_id = (int64_t)job_id;

@@ -1,4 +1,4 @@
-/* order.h -- job.json: what the daemon tells a worker to do; written by server/job/attempt.c.
+/* order.h -- job.json: what the daemon tells a worker to do; written by server/job/orders.c.
  *
  *   {"kind":"reconstruct","scene":"DATA/scenes/ID/files","scene_id":"…","reading":{…},"settings":{…},
  *    "name":"my room","job_id":17,"attempt":2,"thread_count":4,"memory_bytes":0,"sandbox":true,
@@ -6,6 +6,8 @@
  *    "disk_bytes":0,"parts":false}
  *   {"kind":"render","outputs":"DATA/jobs/9/attempt-1/out","files":"DATA/jobs/17/files","settings":{…},"name":"…",
  *    "job_id":17,"attempt":1,"thread_count":4,"memory_bytes":0,"sandbox":true,"memory_step":0,"disk_bytes":0}
+ *      and, where it may find that it is better done in parts, "split":{"parts":0,"paths":1e9}: in how many, or of how much
+ *      each; or, of a part, "part":{"first":100,"count":50,"done":7}: its pictures, of which so many are done
  *   {"kind":"evaluate", as a render's, without files and with "scene" as a reconstruction's}
  *   {"kind":"check","scene_id":"…","reading":{…},"thread_count":4,"memory_bytes":0,"photograph_memory_bytes":0,
  *    "keep_free_bytes":671088640,"sandbox":true}
@@ -38,9 +40,13 @@ struct order {
     bool sandbox;
     const cJSON *reading; /* how to read the scene (common/reading.h); NULL: as its files say */
     /* kinds "render" and "evaluate" */
-    const char *outputs;       /* folder with the outputs of a reconstruction */
-    const char *files;         /* folder of files that settings name */
-    struct denoiser *denoiser; /* opened before the sandbox; NULL: none; the worker's */
+    const char *outputs; /* folder with the outputs of a reconstruction */
+    const char *files;   /* folder of files that settings name */
+    bool may_split;
+    int split_parts;                             /* 0: by split_paths */
+    double split_paths;                          /* pixels times samples of a part; 0: it is not split of itself */
+    uint64_t first_view, view_count, views_done; /* of a part; view_count 0: of none */
+    struct denoiser *denoiser;                   /* opened before the sandbox; NULL: none; the worker's */
     /* kinds "reconstruct" and "evaluate" */
     const char *scene; /* folder of the unpacked bundle */
     /* all kinds of jobs */

@@ -114,6 +114,21 @@ void progress_part(struct progress *p, int number, int first, uint64_t bytes) {
     send_line(p, object);
 }
 
+void progress_record(struct progress *p, const char *name, const char *sha256) {
+    cJSON *object = line("record");
+    json_add_string(object, "name", name);
+    json_add_string(object, "sha256", sha256);
+    send_line(p, object);
+}
+
+void progress_plan(struct progress *p, uint64_t pictures, int parts, const char *digest) {
+    cJSON *object = line("plan");
+    json_add_int(object, "pictures", (int64_t)pictures);
+    json_add_int(object, "parts", parts);
+    json_add_string(object, "digest", digest);
+    send_line(p, object);
+}
+
 void progress_space(struct progress *p, uint64_t bytes) {
     cJSON *object = line("space");
     json_add_int(object, "bytes", (int64_t)bytes);

@@ -8,6 +8,8 @@
  *   {"type":"log","level":"info","message":"…"}
  *   {"type":"checkpoint","iteration":120,"bytes":…,"seconds":…}
  *   {"type":"part","number":7,"first":3,"bytes":…}   of a checkpoint, for another machine: only a node is told
+ *   {"type":"record","name":"views.jsonl","sha256":"…"}   of what is done, which has grown: only a node is told
+ *   {"type":"plan","pictures":500,"parts":8,"digest":"…"}   a render that is better done in parts (store/parts.h); it ends
  *   {"type":"space","bytes":…}   what it takes of the disk besides the files in its folder
  *   {"type":"problem","file":"images/003.png","reason":"…","hint":"…"}   (scene checks)
  *   {"type":"scene","facts":{"triangle_count":…,"frame_count":…,…}}  (scene checks, last)
@@ -48,6 +50,9 @@ void progress_file(struct progress *p, const char *type, const char *name, uint6
 void progress_log(struct progress *p, const char *level, const char *message);
 void progress_checkpoint(struct progress *p, long iteration, uint64_t bytes, double seconds);
 void progress_part(struct progress *p, int number, int first, uint64_t bytes);
+/* "record" */
+void progress_record(struct progress *p, const char *name, const char *sha256);
+void progress_plan(struct progress *p, uint64_t pictures, int parts, const char *digest);
 void progress_space(struct progress *p, uint64_t bytes);
 /* hint may be NULL. */
 void progress_problem(struct progress *p, const char *file, const char *reason, const char *hint);

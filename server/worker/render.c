@@ -7,7 +7,11 @@
  *    an attempt that died between a view's end and its announcement has told nobody of it. So is the engine's record of
  *    what is done, which grows until then.
  * 3. The preview of the picture that is being rendered has one name, and is replaced by that of the next.
- * 4. Where the user's share of the disk is used up the work stops, and goes on when there is more. */
+ * 4. A render that is large enough may end before its first picture by saying in which parts it is better done; a part
+ *    renders its own pictures, after those that are done, and says how many of all of its own there are. For another
+ *    machine the record is told of as it grows, so that what is done counts there even if the rest is lost.
+ * 5. Where the user's share of the disk is used up the work stops, and goes on when there is more. */
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,17 +22,21 @@
 #include "common/mem.h"
 #include "common/parallel.h"
 #include "common/protocol.h"
+#include "common/sha256.h"
 #include "server/data/layout.h"
 #include "server/relight/denoise.h"
 #include "server/relight/relight.h"
+#include "server/store/parts.h"
 #include "server/worker/announce.h"
 #include "server/worker/requests.h"
 #include "server/worker/tasks.h"
 
 #define STAGE "render"
-#define PREVIEWS "preview" /* folder of out/ */
+#define RECORD "views.jsonl" /* of what is done (relight/output.h) */
+#define PREVIEWS "preview"   /* folder of out/ */
 #define PREVIEW PREVIEWS "/render.png"
 #define PROGRESS_INTERVAL_SEC 0.25
+#define RECORD_INTERVAL_SEC 2.0 /* between two words of the record: a part's has some 100 lines */
 #define MIB 1048576.0
 
 struct render_run {
@@ -40,8 +48,9 @@ struct render_run {
     size_t told_count;
     uint64_t bytes;                  /* of them */
     double begun_sec, next_progress; /* as clock_sec */
-    double done_before;              /* when the first view began: what was kept costs no time; negative: not yet */
-    enum status status;              /* of the announcements */
+    double next_record;
+    double done_before; /* when the first view began: what was kept costs no time; negative: not yet */
+    enum status status; /* of the announcements */
     struct error error;
 };
 
@@ -79,11 +88,24 @@ static void tell_progress(void *user, double done, double total) {
     run->next_progress = now + PROGRESS_INTERVAL_SEC;
     if (done > run->done_before)
         eta = (now - run->begun_sec) * (total - done) / (done - run->done_before);
-    progress_step(run->progress, STAGE, done, total, eta);
+    double before = (double)run->order->views_done;
+    progress_step(run->progress, STAGE, before + done, before + total, eta);
+}
+
+/* The record has a line for every picture but the one that is being announced. */
+static void tell_record(struct render_run *run) {
+    char hex[SHA256_HEX_SIZE], *path = file_join(run->out_dir, RECORD);
+    double now = clock_sec();
+    if (run->order->parts && now >= run->next_record && sha256_of_file(path, hex, NULL) == STATUS_OK) {
+        run->next_record = now + RECORD_INTERVAL_SEC;
+        progress_record(run->progress, RECORD, hex);
+    }
+    mem_free(path);
 }
 
 static void tell_file(void *user, const char *name) {
     struct render_run *run = user;
+    tell_record(run);
     announce(run, EVENT_OUTPUT, name);
 }
 
@@ -129,13 +151,40 @@ static enum status tell_kept(struct render_run *run, const char *folder, size_t 
 
 /* --- the whole ------------------------------------------------------------------------------- */
 
-static enum status render(struct render_run *run, struct parallel *pool, struct error *err) {
+static struct relight_job job_of(const struct render_run *run) {
     const struct order *order = run->order;
-    const struct relight_job job = {.outputs = order->outputs,
-                                    .files = order->files,
-                                    .settings = order->settings,
-                                    .out = run->out_dir,
-                                    .denoiser = order->denoiser};
+    return (struct relight_job){.outputs = order->outputs,
+                                .files = order->files,
+                                .settings = order->settings,
+                                .out = run->out_dir,
+                                .first_view = order->first_view + order->views_done,
+                                .view_count = order->view_count - order->views_done,
+                                .denoiser = order->denoiser};
+}
+
+/* In how many parts it is better done; 1: as it is. */
+static int count_parts(const struct order *order, const struct relight_plan *plan) {
+    double parts = order->split_parts > 0     ? order->split_parts
+                   : order->split_paths > 0.0 ? floor(plan->paths / order->split_paths)
+                                              : 1.0;
+    return (int)fmax(1.0, fmin(fmin(parts, JOB_PARTS_MAX), (double)plan->pictures));
+}
+
+/* Whether the render has ended by saying that it is better done in parts. */
+static bool split(const struct render_run *run) {
+    const struct relight_job job = job_of(run);
+    struct relight_plan plan;
+    /* what is wrong with its cameras, the render itself will say */
+    if (!run->order->may_split || relight_look(&job, &plan, NULL) != STATUS_OK)
+        return false;
+    int parts = plan.pictures > PICTURES_MAX ? 1 : count_parts(run->order, &plan);
+    if (parts > 1)
+        progress_plan(run->progress, plan.pictures, parts, plan.digest);
+    return parts > 1;
+}
+
+static enum status render(struct render_run *run, struct parallel *pool, struct error *err) {
+    const struct relight_job job = job_of(run);
     const struct relight_watch watch = {.user = run,
                                         .should_stop = should_stop,
                                         .progress = tell_progress,
@@ -166,7 +215,7 @@ enum status task_render(const struct order *order, struct progress *progress, st
     struct parallel *pool = parallel_new(order->thread_count);
     progress_stage(progress, STAGE);
     enum status status = file_make_dirs(run.out_dir, err);
-    if (status == STATUS_OK)
+    if (status == STATUS_OK && !split(&run))
         status = render(&run, pool, err);
     parallel_free(pool);
     for (size_t i = 0; i < run.told_count; i++)

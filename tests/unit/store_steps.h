@@ -204,10 +204,9 @@ static enum status next_job(void) {
     return store_job_next(store, 1, NULL, &id, &err);
 }
 static enum status running_jobs(void) {
-    int64_t ids[4];
-    enum job_wanted wanted[4];
+    struct running list[4];
     size_t count;
-    return store_job_running(store, 4, ids, wanted, &count, &err);
+    return store_job_running(store, 4, list, &count, &err);
 }
 static enum status cancel_job(void) { return store_job_cancel(store, job, &err); }
 static enum status pause_job(void) { return store_job_pause(store, job, &err); }

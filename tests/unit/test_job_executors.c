@@ -98,7 +98,8 @@ static void test_rename(struct store *store) {
     IS(store_remote_rename(store, key.job_id, key.number, "unbake-c", first, &err), STATUS_CONFLICT);
     /* It outlives a start of the daemon that keeps it; one that does not, queues it. */
     size_t requeued;
-    OK(store_reconcile(store, &key.job_id, 1, &requeued, &err));
+    const struct attempt_key kept = {key.job_id, key.number};
+    OK(store_reconcile(store, &kept, 1, &requeued, &err));
     CHECK(requeued == 0);
     OK(store_reconcile(store, NULL, 0, &requeued, &err));
     CHECK(requeued == 1);

@@ -192,8 +192,8 @@ struct queue {
 static void check_order(struct queue *q) {
     struct store *store = q->store;
     bool existed;
-    int64_t next = 0, ids[8];
-    enum job_wanted wanted[8];
+    int64_t next = 0;
+    struct running list[8];
     size_t count;
     int attempt;
     IS(store_job_next(store, 0, NULL, &next, &err), STATUS_NOT_FOUND);
@@ -214,8 +214,10 @@ static void check_order(struct queue *q) {
     OK(store_job_next(store, 0, NULL, &next, &err));
     CHECK(next == waits);
     OK(store_job_pause(store, q->young, &err));
-    OK(store_job_running(store, 8, ids, wanted, &count, &err));
-    CHECK(count == 3 && ids[0] == q->low && wanted[2] == JOB_WANT_PAUSE && wanted[0] == JOB_WANT_RUN);
+    OK(store_job_running(store, 8, list, &count, &err));
+    CHECK(count == 3 && list[0].key.job_id == q->low && list[2].wanted == JOB_WANT_PAUSE &&
+          list[0].wanted == JOB_WANT_RUN);
+    CHECK(list[0].key.number == 1);
 }
 
 /* Limits, keys, unknown and rejected scenes. */

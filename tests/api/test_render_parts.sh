@@ -1,0 +1,40 @@
+#!/bin/bash
+# A render in parts: at once on this machine and as jobs of a site, with a part's worker, a node and the daemon killed in
+# the middle. The pictures and views.json are those of a render in one part.
+set -u
+. tests/api/client.sh "$@"
+lamp="--set lamp.1.kind=sphere --set lamp.1.position=0,1,0 --set lamp.1.radius=0.3"
+many="$lamp --set cameras=photographs --view all --size 64x48 --spp 200 --set format=both"
+make_room "$work/room" 8
+daemon_start --set threads=2 --set max_running=2 --set small_render_paths=100000 --set max_attempts=3
+# shellcheck disable=SC2086
+run 0 submit "$work/room" $tiny --watch
+field_of() { "$build/unbake" show "$1" --json | jq -c "$2"; }
+# shellcheck disable=SC2086
+run 0 render 1 $many --set parts=1 -q -o "$work/whole"
+equal "$(field_of 2 '[.attempt, .parts]')" '[1,null]' "a render in one part"
+
+same() { # same JOB NAME
+    run 0 get "$1" -q -o "$work/$2"
+    diff -r -x preview "$work/whole" "$work/$2" || fail "$2: it differs from the render in one part"
+}
+rendered() { [ "$(field_of "$id" '[.outputs[] | select(.name | test("radiance.exr"))] | length')" -ge "$1" ]; }
+workers() { grep -c "job $id: attempt [0-9]* runs as process" "$work/log"; }
+pid_of() { grep "job $id: attempt $1 runs as process" "$work/log" | sed 's/.*process \([0-9]*\) .*/\1/'; }
+
+# --- at once on this machine; the worker of one part is killed ---
+# shellcheck disable=SC2086
+run 0 render 1 $many --set parts=3 -q; id=$out
+wait_for 60 rendered 2
+[ "$(workers)" -ge 3 ] || fail "its parts do not run at once"
+equal "$(field_of "$id" '[.state, .parts.count]')" '["running",3]' "a job in parts"
+kill -KILL "$(pid_of 2)"
+wait_for 120 job_is "$id" succeeded
+same "$id" local
+equal "$(field_of "$id" '[.attempts_left, .parts]')" '[3,{"count":3,"done":3}]' "the job at its end"
+call GET "/v1/jobs/$id/events" -H 'Last-Event-ID: 0'
+has "$(cat "$work/body")" "part 1 of 3 is tried again: killed from outside"
+has "$(cat "$work/body")" "part 3 of 3 is done"
+equal "$(sed -n 's/^data: {"state":"\([a-z]*\)".*/\1/p' "$work/body" | xargs)" "queued running succeeded" "its states"
+daemon_end TERM
+finish
