@@ -19,6 +19,7 @@ const struct flag demo_flags[] = {
     {"--ceiling-radiance", "V", "of the emitter at the ceiling (15)"},
     {"--sdr", NULL, "8-bit photographs, exposures cycling over three values"},
     {"--opening", NULL, "the wall emitter is a window: behind it the wall is open, which shows where it is removed"},
+    {"--flush-lamps", NULL, "lamps lie in the planes of wall and ceiling, as those of offices"},
     {"--texture-size", "N", "texels a side of the room's own textures (1024)"},
     {"--seed", "N", "of random numbers and viewpoints (1)"},
     {"--threads", "N", "0: one per processor (0)"},
@@ -54,8 +55,14 @@ int demo_command(int argc, char **argv) {
     int code = arguments_begin(&a, argc, argv, demo_flags, numbers, sizeof numbers / sizeof *numbers, 1);
     if (code >= 0)
         return code;
+    if (arguments_have(&a, "--opening") && arguments_have(&a, "--flush-lamps")) {
+        fprintf(stderr, "unbaked demo-room: --opening and --flush-lamps: only one of them\n");
+        return EXIT_USAGE;
+    }
     s.sdr = arguments_have(&a, "--sdr");
-    s.has_opening = arguments_have(&a, "--opening");
+    s.lamps = arguments_have(&a, "--opening")       ? ROOM_LAMPS_OPENING
+              : arguments_have(&a, "--flush-lamps") ? ROOM_LAMPS_FLUSH
+                                                    : ROOM_LAMPS_FRAMED;
     struct parallel *pool = parallel_new((int)threads);
     enum status status = demo_generate(a.words[0], &s, pool, show_progress, NULL, &err);
     parallel_free(pool);

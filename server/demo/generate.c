@@ -211,7 +211,7 @@ enum status demo_generate(const char *dir, const struct demo_settings *settings,
     struct generator g = {
         .dir = dir, .settings = settings, .pool = pool, .frame_count = settings->train_count + settings->test_count};
     const struct room_look look = {settings->texture_size, settings->wall_radiance, settings->ceiling_radiance,
-                                   settings->has_opening};
+                                   settings->lamps};
     enum status status = make_folders(dir, err);
     if (status == STATUS_OK)
         status = room_init(&g.room, &look, pool, err);

@@ -15,6 +15,7 @@
 
 #include "common/error.h"
 #include "common/parallel.h"
+#include "server/demo/room.h"
 
 struct demo_settings {
     uint32_t width, height; /* pixels of a photograph */
@@ -23,7 +24,7 @@ struct demo_settings {
     uint32_t max_depth;     /* segments of a path */
     float wall_radiance, ceiling_radiance;
     bool sdr;
-    bool has_opening; /* struct room_look */
+    enum room_lamps lamps;
     uint64_t seed;
     uint32_t texture_size; /* texels, of the room's own textures */
 };

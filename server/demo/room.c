@@ -58,17 +58,58 @@ static void box(struct shapes *s, enum room_object o, float x0, float y0, float 
     shapes_box(s, o, vec3_make(x0, y0, z0), vec3_make(x1, y1, z1), without);
 }
 
-/* The emitter on the west wall. */
+/* The emitter on the west wall, metres. */
 #define PANEL_BOTTOM 1.1f
 #define PANEL_TOP 2.0f
 #define PANEL_BACK 1.4f
 #define PANEL_FRONT 2.6f
+#define WALL_FRAME 0.06f /* width of its frame */
+/* The one at the ceiling. */
+#define CEILING_LAMP_LEFT 2.1f
+#define CEILING_LAMP_RIGHT 2.9f
+#define CEILING_LAMP_BACK 1.6f
+#define CEILING_LAMP_FRONT 2.4f
+#define CEILING_FRAME 0.05f
 
 static void add_wall(struct shapes *s, enum room_object o, int face, float y0, float z0, float y1, float z1) {
     box(s, o, 0.0f, y0, z0, ROOM_WIDTH, y1, z1, (63 & ~face) | SHAPE_INWARD);
 }
 
-static void add_shell(struct shapes *s, bool has_opening) {
+/* Wall, frame and emitter in one plane; corners counter-clockwise seen from inside. */
+static void add_flush_lamp(struct shapes *s, enum room_object around, enum room_object emitter, const vec3 side[4],
+                           const vec3 frame[4], const vec3 panel[4]) {
+    shapes_plane_with_hole(s, around, side, frame);
+    shapes_plane_with_hole(s, ROOM_LAMP_FRAMES, frame, panel);
+    shapes_plane(s, emitter, panel);
+}
+
+/* The rectangle at x = 0 that looks to +x. */
+static void on_west_wall(float y0, float z0, float y1, float z1, vec3 corner[4]) {
+    const vec3 c[4] = {{0.0f, y0, z0}, {0.0f, y1, z0}, {0.0f, y1, z1}, {0.0f, y0, z1}};
+    memcpy(corner, c, sizeof c);
+}
+
+/* That at the ceiling, which looks down. */
+static void on_ceiling(float x0, float z0, float x1, float z1, vec3 corner[4]) {
+    const vec3 c[4] = {{x0, ROOM_HEIGHT, z0}, {x1, ROOM_HEIGHT, z0}, {x1, ROOM_HEIGHT, z1}, {x0, ROOM_HEIGHT, z1}};
+    memcpy(corner, c, sizeof c);
+}
+
+static void add_flush_lamps(struct shapes *s) {
+    const float wall = WALL_FRAME, ceiling = CEILING_FRAME;
+    vec3 side[4], frame[4], panel[4];
+    on_west_wall(0.0f, 0.0f, ROOM_HEIGHT, ROOM_DEPTH, side);
+    on_west_wall(PANEL_BOTTOM - wall, PANEL_BACK - wall, PANEL_TOP + wall, PANEL_FRONT + wall, frame);
+    on_west_wall(PANEL_BOTTOM, PANEL_BACK, PANEL_TOP, PANEL_FRONT, panel);
+    add_flush_lamp(s, ROOM_WALL_WEST, ROOM_WALL_EMITTER, side, frame, panel);
+    on_ceiling(0.0f, 0.0f, ROOM_WIDTH, ROOM_DEPTH, side);
+    on_ceiling(CEILING_LAMP_LEFT - ceiling, CEILING_LAMP_BACK - ceiling, CEILING_LAMP_RIGHT + ceiling,
+               CEILING_LAMP_FRONT + ceiling, frame);
+    on_ceiling(CEILING_LAMP_LEFT, CEILING_LAMP_BACK, CEILING_LAMP_RIGHT, CEILING_LAMP_FRONT, panel);
+    add_flush_lamp(s, ROOM_CEILING, ROOM_CEILING_EMITTER, side, frame, panel);
+}
+
+static void add_shell(struct shapes *s, enum room_lamps lamps) {
     static const struct {
         enum room_object o;
         int face;
@@ -76,9 +117,15 @@ static void add_shell(struct shapes *s, bool has_opening) {
         {ROOM_WALL_WEST, SHAPE_LEFT}, {ROOM_WALL_EAST, SHAPE_RIGHT}, {ROOM_FLOOR, SHAPE_BOTTOM},
         {ROOM_CEILING, SHAPE_TOP},    {ROOM_WALL_NORTH, SHAPE_BACK}, {ROOM_WALL_SOUTH, SHAPE_FRONT},
     };
-    for (int i = has_opening; i < 6; i++)
-        add_wall(s, side[i].o, side[i].face, 0.0f, 0.0f, ROOM_HEIGHT, ROOM_DEPTH);
-    if (!has_opening)
+    for (int i = 0; i < 6; i++) {
+        bool has_hole = (side[i].o == ROOM_WALL_WEST && lamps != ROOM_LAMPS_FRAMED) ||
+                        (side[i].o == ROOM_CEILING && lamps == ROOM_LAMPS_FLUSH);
+        if (!has_hole)
+            add_wall(s, side[i].o, side[i].face, 0.0f, 0.0f, ROOM_HEIGHT, ROOM_DEPTH);
+    }
+    if (lamps == ROOM_LAMPS_FLUSH)
+        add_flush_lamps(s);
+    if (lamps != ROOM_LAMPS_OPENING)
         return;
     add_wall(s, ROOM_WALL_WEST, SHAPE_LEFT, 0.0f, 0.0f, PANEL_BOTTOM, ROOM_DEPTH);
     add_wall(s, ROOM_WALL_WEST, SHAPE_LEFT, PANEL_TOP, 0.0f, ROOM_HEIGHT, ROOM_DEPTH);
@@ -180,10 +227,11 @@ static void add_lamps(struct shapes *s) {
     const vec3 x = {1.0f, 0.0f, 0.0f}, y = {0.0f, 1.0f, 0.0f}, z = {0.0f, 0.0f, 1.0f};
     box(s, ROOM_WALL_EMITTER, 0.0f, PANEL_BOTTOM, PANEL_BACK, 0.03f, PANEL_TOP, PANEL_FRONT, 63 & ~SHAPE_RIGHT);
     add_frame(s, ROOM_LAMP_FRAMES, vec3_make(0.0f, PANEL_BOTTOM, PANEL_BACK), vec3_make(0.06f, PANEL_TOP, PANEL_FRONT),
-              z, y, 0.06f, SHAPE_LEFT);
-    box(s, ROOM_CEILING_EMITTER, 2.1f, 2.76f, 1.6f, 2.9f, ROOM_HEIGHT, 2.4f, 63 & ~SHAPE_BOTTOM);
-    add_frame(s, ROOM_LAMP_FRAMES, vec3_make(2.1f, 2.73f, 1.6f), vec3_make(2.9f, ROOM_HEIGHT, 2.4f), x, z, 0.05f,
-              SHAPE_TOP);
+              z, y, WALL_FRAME, SHAPE_LEFT);
+    box(s, ROOM_CEILING_EMITTER, CEILING_LAMP_LEFT, 2.76f, CEILING_LAMP_BACK, CEILING_LAMP_RIGHT, ROOM_HEIGHT,
+        CEILING_LAMP_FRONT, 63 & ~SHAPE_BOTTOM);
+    add_frame(s, ROOM_LAMP_FRAMES, vec3_make(CEILING_LAMP_LEFT, 2.73f, CEILING_LAMP_BACK),
+              vec3_make(CEILING_LAMP_RIGHT, ROOM_HEIGHT, CEILING_LAMP_FRONT), x, z, CEILING_FRAME, SHAPE_TOP);
 }
 
 /* --- textures ----------------------------------------------------------------------------- */
@@ -241,13 +289,14 @@ enum status room_init(struct room *room, const struct room_look *look, struct pa
     struct mesh_report report;
     memset(room, 0, sizeof *room);
     shapes_init(&s);
-    add_shell(&s, look->has_opening);
+    add_shell(&s, look->lamps);
     add_table(&s);
     add_door(&s);
     add_shelves(&s);
     add_pictures(&s);
     add_sofa(&s);
-    add_lamps(&s);
+    if (look->lamps != ROOM_LAMPS_FLUSH)
+        add_lamps(&s);
     room->mesh = s.mesh;
     enum status status = mesh_check(&room->mesh, "the demo room", &report, err);
     if (status != STATUS_OK)

@@ -35,11 +35,17 @@ const char *room_object_name(enum room_object object);
 /* Bounding boxes of the furniture, which cameras avoid; [*count], static storage. */
 const vec3 (*room_obstacles(size_t *count))[2];
 
+enum room_lamps {
+    ROOM_LAMPS_FRAMED,  /* panels before wall and ceiling, their frames stand out */
+    ROOM_LAMPS_OPENING, /* so, but the wall is open behind its emitter, a window: without it one looks out of the room */
+    ROOM_LAMPS_FLUSH    /* in the planes of wall and ceiling, frames too, as lamps of offices are */
+};
+
 /* What of a room can be chosen. */
 struct room_look {
     uint32_t texture_size; /* texels a side */
     float wall_radiance, ceiling_radiance;
-    bool has_opening; /* behind the emitter on the wall, which then is a window: without it one looks out of the room */
+    enum room_lamps lamps;
 };
 
 /* Builds geometry, textures, and the acceleration structure. */

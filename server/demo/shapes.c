@@ -53,6 +53,22 @@ static void add_quad(struct shapes *s, int64_t object, vec3 origin, vec3 u, vec3
     add_triangle(s, object, a, c, d);
 }
 
+void shapes_plane(struct shapes *s, int64_t object, const vec3 corner[4]) {
+    vec3 normal = vec3_normalize(vec3_cross(vec3_sub(corner[1], corner[0]), vec3_sub(corner[3], corner[0])));
+    uint32_t at[4];
+    for (int i = 0; i < 4; i++)
+        at[i] = add_vertex(s, corner[i], normal);
+    add_triangle(s, object, at[0], at[1], at[2]);
+    add_triangle(s, object, at[0], at[2], at[3]);
+}
+
+void shapes_plane_with_hole(struct shapes *s, int64_t object, const vec3 corner[4], const vec3 hole[4]) {
+    for (int i = 0; i < 4; i++) {
+        int next = (i + 1) % 4;
+        shapes_plane(s, object, (vec3[4]){corner[i], corner[next], hole[next], hole[i]});
+    }
+}
+
 void shapes_box(struct shapes *s, int64_t object, vec3 lower, vec3 upper, int without) {
     vec3 size = vec3_sub(upper, lower);
     vec3 x = {size.x, 0.0f, 0.0f}, y = {0.0f, size.y, 0.0f}, z = {0.0f, 0.0f, size.z};

@@ -33,6 +33,12 @@ void shapes_init(struct shapes *s);
 /* The faces of an axis-aligned box, except those in `without`. */
 void shapes_box(struct shapes *s, int64_t object, vec3 lower, vec3 upper, int without);
 
+/* A plane rectangle, its corners counter-clockwise seen from its front. */
+void shapes_plane(struct shapes *s, int64_t object, const vec3 corner[4]);
+
+/* The same with a rectangular hole, as four trapezoids: each edge has one triangle on either side. */
+void shapes_plane_with_hole(struct shapes *s, int64_t object, const vec3 corner[4], const vec3 hole[4]);
+
 /* Surface of revolution: the profile (x = radius, y = height, from bottom to top), rotated about the vertical axis
  * through `base` in `sides` steps. A radius of 0 at an end closes it. */
 void shapes_lathe(struct shapes *s, int64_t object, vec3 base, const vec2 *profile, size_t count, int sides);

@@ -146,7 +146,7 @@ int main(void) {
     struct room room;
     struct error err;
     struct image sky, known;
-    CHECK(room_init(&room, &(struct room_look){512, 15.0f, 15.0f, false}, pool, &err) == STATUS_OK);
+    CHECK(room_init(&room, &(struct room_look){512, 15.0f, 15.0f, ROOM_LAMPS_FRAMED}, pool, &err) == STATUS_OK);
     room.materials.specular[ROOM_CARPET] = 0.0f;
     make_sky(&sky, &known);
     world_set_environment(&room.world, &sky, pool);

@@ -22,12 +22,35 @@ static void test_behind_panel(const struct room *room, enum room_object wanted) 
     CHECK_THAT(room->mesh.object_id[hit.triangle] == wanted, "object %d", (int)room->mesh.object_id[hit.triangle]);
 }
 
+/* Where a ray from the middle of the room meets the surface: nothing stands out of flush lamps. */
+static void test_flush(const struct room *room) {
+    static const struct {
+        vec3 to;
+        enum room_object wanted;
+    } at[] = {
+        {{0.0f, 1.5f, 2.1f}, ROOM_WALL_EMITTER},        {{0.0f, 1.07f, 2.1f}, ROOM_LAMP_FRAMES},
+        {{0.0f, 1.0f, 2.1f}, ROOM_WALL_WEST},           {{2.5f, ROOM_HEIGHT, 2.1f}, ROOM_CEILING_EMITTER},
+        {{2.07f, ROOM_HEIGHT, 2.1f}, ROOM_LAMP_FRAMES}, {{2.0f, ROOM_HEIGHT, 2.1f}, ROOM_CEILING},
+    };
+    vec3 centre = {2.5f, 1.4f, 3.0f};
+    for (size_t i = 0; i < sizeof at / sizeof *at; i++) {
+        vec3 way = vec3_sub(at[i].to, centre);
+        struct accel_hit hit;
+        bool met = accel_intersect(room->world.accel, centre, vec3_normalize(way), 0.0f, 10.0f, &hit);
+        CHECK_THAT(met && room->mesh.object_id[hit.triangle] == at[i].wanted, "place %zu: object %d", i,
+                   met ? (int)room->mesh.object_id[hit.triangle] : -1);
+        CHECK_NEAR(met ? hit.distance_m : 0.0f, vec3_length(way), 1e-4);
+    }
+}
+
 /* The room is closed, its normals look inwards, its colours are reflectances. The panel of a window closes it, too. */
-static void test_room(bool has_opening, struct parallel *pool) {
+static void test_room(enum room_lamps lamps, struct parallel *pool) {
     struct room room;
     struct error err;
-    CHECK(room_init(&room, &(struct room_look){256, 15.0f, 10.0f, has_opening}, pool, &err) == STATUS_OK);
-    test_behind_panel(&room, has_opening ? ROOM_WALL_EMITTER : ROOM_WALL_WEST);
+    CHECK(room_init(&room, &(struct room_look){256, 15.0f, 10.0f, lamps}, pool, &err) == STATUS_OK);
+    test_behind_panel(&room, lamps == ROOM_LAMPS_FRAMED ? ROOM_WALL_WEST : ROOM_WALL_EMITTER);
+    if (lamps == ROOM_LAMPS_FLUSH)
+        test_flush(&room);
     vec3 centre = {2.5f, 1.4f, 3.0f};
     for (int i = 0; i < 2000; i++) {
         float y = 1.0f - 2.0f * ((float)i + 0.5f) / 2000.0f, r = sqrtf(1.0f - y * y);
@@ -113,8 +136,8 @@ int main(void) {
     char dir[] = "/tmp/unbake-demo-XXXXXX";
     struct parallel *pool = parallel_new(2);
     CHECK(mkdtemp(dir) != NULL);
-    test_room(false, pool);
-    test_room(true, pool);
+    for (int lamps = ROOM_LAMPS_FRAMED; lamps <= ROOM_LAMPS_FLUSH; lamps++)
+        test_room((enum room_lamps)lamps, pool);
     test_bundle(dir, false, pool);
     test_bundle(dir, true, pool);
     CHECK(file_remove_tree(dir, NULL) == STATUS_OK);

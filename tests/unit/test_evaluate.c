@@ -188,8 +188,8 @@ static void test_known(const char *dir, struct parallel *pool) {
     demo.spp = 16, demo.test_spp = 128, demo.texture_size = 256, demo.max_depth = 6;
     CHECK(demo_generate(dir, &demo, pool, NULL, NULL, &err) == STATUS_OK);
     CHECK(file_make_dirs(outputs, &err) == STATUS_OK);
-    CHECK(room_init(&room, &(struct room_look){256, demo.wall_radiance, demo.ceiling_radiance, false}, pool, &err) ==
-          STATUS_OK);
+    CHECK(room_init(&room, &(struct room_look){256, demo.wall_radiance, demo.ceiling_radiance, ROOM_LAMPS_FRAMED}, pool,
+                    &err) == STATUS_OK);
 
     export_room(outputs, &room);
     struct evaluation v = evaluate(dir, outputs, pool);
@@ -231,7 +231,7 @@ static void test_picture(const char *dir, struct parallel *pool) {
     struct error err;
     char *outputs = file_join(dir, "picture");
     CHECK(file_make_dirs(outputs, &err) == STATUS_OK);
-    CHECK(room_init(&room, &(struct room_look){256, 15.0f, 15.0f, false}, pool, &err) == STATUS_OK);
+    CHECK(room_init(&room, &(struct room_look){256, 15.0f, 15.0f, ROOM_LAMPS_FRAMED}, pool, &err) == STATUS_OK);
     struct materials *m = &room.materials;
     materials_start_emission_pattern(m);
     for (size_t i = 0; i < room.inverse.valid_count; i++) {

@@ -160,7 +160,7 @@ static void test_clean_levels(struct parallel *pool) {
     } table[] = {{1, 0}, {ATLAS_PADDING, 1}, {ATLAS_AUTOMATIC_PADDING, 2}, {16, 3}};
     struct room room;
     struct error err;
-    CHECK(room_init(&room, &(struct room_look){64, 0.0f, 0.0f, false}, pool, &err) == STATUS_OK);
+    CHECK(room_init(&room, &(struct room_look){64, 0.0f, 0.0f, ROOM_LAMPS_FRAMED}, pool, &err) == STATUS_OK);
     for (size_t i = 0; i < sizeof table / sizeof *table; i++) {
         struct atlas atlas;
         struct inverse_uv inverse;
@@ -407,7 +407,7 @@ int main(void) {
     test_margin();
     test_clean_levels(pool);
     test_comparison();
-    CHECK(room_init(&room, &(struct room_look){256, 15.0f, 15.0f, false}, pool, &err) == STATUS_OK);
+    CHECK(room_init(&room, &(struct room_look){256, 15.0f, 15.0f, ROOM_LAMPS_FRAMED}, pool, &err) == STATUS_OK);
     memcpy(room.mesh.offset, (double[3]){500000.0, -4100000.0, 0.0}, sizeof room.mesh.offset);
     size_t texels = (size_t)room.atlas.width * room.atlas.height;
     float *count = mem_calloc(texels, sizeof *count);

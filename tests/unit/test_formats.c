@@ -511,7 +511,7 @@ int main(void) {
     struct image picture;
     struct error err;
     CHECK(mkdtemp(dir) != NULL);
-    CHECK(room_init(&room, &(struct room_look){256, 15.0f, 15.0f, false}, pool, &err) == STATUS_OK);
+    CHECK(room_init(&room, &(struct room_look){256, 15.0f, 15.0f, ROOM_LAMPS_FRAMED}, pool, &err) == STATUS_OK);
     room.materials.specular[ROOM_FLOOR] = 0.0f;
     image_init_rgb(&picture, 5, 3); /* odd, for the padding */
     char *png = file_join(dir, FORMATS_BASE_COLOR), *glb = file_join(dir, "scene.glb");

@@ -209,7 +209,8 @@ int main(int argc, char **argv) {
     struct room room;
     struct parts parts;
     struct error err;
-    CHECK(dir != NULL && room_init(&room, &(struct room_look){256, 15.0f, 15.0f, false}, pool, &err) == STATUS_OK);
+    CHECK(dir != NULL &&
+          room_init(&room, &(struct room_look){256, 15.0f, 15.0f, ROOM_LAMPS_FRAMED}, pool, &err) == STATUS_OK);
     struct camera camera = {.width = 160, .height = 120, .fx = 100.0f, .fy = 104.0f, .cx = 76.0f, .cy = 63.0f};
     camera.world_from_camera = (struct rigid){{{0, 0, 1}, {0, -1, 0}, {1, 0, 0}}, {0.4f, 1.4f, 2.0f}};
     if (argc > 2) { /* Blender reads neither uneven pixels nor an offset of the principal point from USD */
