@@ -174,7 +174,7 @@ bench: ## print the speed ratios and write build/bench.json; LONG=1: also what t
 	@LONG=$(LONG) tests/bench/run.sh $(B)
 
 fidelity: deps ## compare with the truth of known rooms, some 6 minutes each; FIDELITY_QUALITY, FIDELITY_ROOMS
-	@+$(BUILD) all $(B)/tests/bench/reconstruct_room $(B)/tests/bench/scan_scores
+	@+$(BUILD) all $(B)/tests/bench/reconstruct_room $(B)/tests/bench/scan_scores $(B)/tests/bench/scan_ceiling
 	@tests/bench/fidelity.sh $(B)
 
 light: deps ## compare the light that is found with that of known rooms (make rooms); LIGHT_ROOMS, LIGHT_KINDS, LIGHT_QUALITY

@@ -13,7 +13,9 @@
 #
 # scan and phone: the mesh that a scan of the room gives, and that with drifting poses and one 8-bit exposure a view of a
 # phone (rooms/NAME-scan, rooms/NAME-phone), judged by scan_scores: pixels where the scan has a hole are left out, and
-# the capture's own frame is laid over the room's.
+# the capture's own frame is laid over the room's. Ceilings beside them: what fusing the true base colours of the training
+# photographs onto that mesh scores, with the poses that the capture tells (scan_ceiling); they need the room's hdr, by
+# this run or an earlier one.
 #
 # usage: fidelity.sh BUILD
 set -u
@@ -93,6 +95,17 @@ lay_out() { # ROOM KIND
     [ -e "$dir/room/transforms.json" ] || cp -r "$1/transforms.json" "$1/images" "$dir/room"
 }
 
+# Of the capture in $dir/room, into $dir/ceiling.evaluation.json. OUT: what was recovered on the room's own mesh.
+ceiling() { # ROOM OUT
+    if [ ! -e "$2/base_color.exr" ]; then
+        echo "$label: no ceilings without the room's hdr" >&2
+        return
+    fi
+    "$build/tests/bench/scan_ceiling" "$1" "$2" "$dir/room" "$dir/ceiling" &&
+        "$build/tests/bench/scan_scores" "$1" "$dir/ceiling" "" "$dir/ceiling/truth" >"$dir/ceiling.evaluation.json"
+    rm -rf "$dir/ceiling"
+}
+
 measure_scan() { # ROOM KIND
     local name=${1##*/} dir room label color inside roughness specular overlap
     room=$1
@@ -109,11 +122,14 @@ measure_scan() { # ROOM KIND
     lay_out "$room" "$2"
     reconstruct "$dir/room" "$dir/out" texture_size=2048 "quality=$quality" report_samples=1 &&
         "$build/tests/bench/scan_scores" "$room" "$dir/out" "$dir" >"$dir/out.evaluation.json"
+    ceiling "$room" "$build/fidelity/$name-hdr/out"
     rm -rf "$dir/room"
     value() { figure "$dir/out" "$1"; }
     read -r color inside roughness specular overlap < <(scan_goals "$name" "$2")
     row "base colour PSNR of seen surface, dB" "$(value base_color)" "$color" higher
+    row "its ceiling" "$(figure "$dir/ceiling" base_color)" - higher
     row "base colour PSNR away from outlines, dB" "$(value base_color_inside)" "$inside" higher
+    row "its ceiling away from outlines" "$(figure "$dir/ceiling" base_color_inside)" - higher
     row "roughness PSNR, dB" "$(value roughness)" "$roughness" higher
     row "specular PSNR, dB" "$(value specular)" "$specular" higher
     row "emission, intersection over union" "$(value emission_overlap)" "$overlap" higher

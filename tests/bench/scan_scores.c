@@ -1,4 +1,4 @@
-/* scan_scores ROOM OUT [PICTURES] -- compares what was recovered from a scan of a room with the room's truth.
+/* scan_scores ROOM OUT [PICTURES [TRUTH]] -- compares what was recovered from a scan of a room with the room's truth.
  *
  * `unbaked evaluate` takes the outputs' mesh for the room's own. Here the outputs in OUT have the mesh of a scan: the
  * truth, what the training photographs see of it and where its lamps are come from ROOM and its own mesh, and both are
@@ -16,7 +16,8 @@
  *   false_lamps                     recovered segments that emit, of whose pixels less than half show a lamp, or
  *                                   what is less than two pixels from one
  *
- * With PICTURES: of each held-out view base_color_NNN.png (true | recovered). */
+ * With PICTURES, and unless that is "": of each held-out view base_color_NNN.png (true | recovered). With TRUTH the
+ * held-out views of that folder in place of ROOM's (scan_ceiling). */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -209,13 +210,13 @@ static void leave_out(struct comparison *c, const struct image *truth, const str
     }
 }
 
-static enum status score_view(struct comparison *c, const struct photograph *p, const char *room, const char *pictures,
-                              struct error *err) {
+static enum status score_view(struct comparison *c, const struct photograph *p, const char *truths,
+                              const char *pictures, struct error *err) {
     struct image truth = {0}, found = {0};
     char stem[4] = "";
     const char *slash = strrchr(p->name, '/');
     snprintf(stem, sizeof stem, "%.3s", slash ? slash + 1 : p->name);
-    char *path = mem_printf("%s/truth/%s.exr", room, stem);
+    char *path = mem_printf("%s/%s.exr", truths, stem);
     uint8_t *flags = mem_array((size_t)p->camera.width * p->camera.height, 1);
     enum status status = image_read(path, &truth, NULL, err);
     mem_free(path);
@@ -356,7 +357,8 @@ static void print(const struct comparison *c) {
 
 static enum status run(int argc, char **argv, struct error *err) {
     struct comparison c = {.pool = parallel_new(0)};
-    const char *pictures = argc > 3 ? argv[3] : NULL;
+    const char *pictures = argc > 3 && argv[3][0] ? argv[3] : NULL;
+    char *truths = argc > 4 ? mem_strdup(argv[4]) : file_join(argv[1], "truth");
     enum status status = load(&c, argv[1], argv[2], err);
     if (status == STATUS_OK && pictures)
         status = file_make_dirs(pictures, err);
@@ -365,7 +367,7 @@ static enum status run(int argc, char **argv, struct error *err) {
         seen_init(&c.seen, &c.room, c.accel, c.emits, c.pool);
         for (size_t i = 0; i < c.room.photograph_count && status == STATUS_OK; i++)
             if (c.room.photograph[i].is_test)
-                status = score_view(&c, &c.room.photograph[i], argv[1], pictures, err);
+                status = score_view(&c, &c.room.photograph[i], truths, pictures, err);
         seen_release(&c.seen);
     }
     if (status == STATUS_OK) {
@@ -373,6 +375,7 @@ static enum status run(int argc, char **argv, struct error *err) {
         print(&c);
         recovered_release(&c.recovered);
     }
+    mem_free(truths);
     accel_free(c.accel);
     mesh_release(&c.mesh);
     mem_free(c.emits);
@@ -383,7 +386,7 @@ static enum status run(int argc, char **argv, struct error *err) {
 
 int main(int argc, char **argv) {
     if (argc < 3) {
-        fprintf(stderr, "usage: scan_scores ROOM OUT [PICTURES]\n");
+        fprintf(stderr, "usage: scan_scores ROOM OUT [PICTURES [TRUTH]]\n");
         return 2;
     }
     struct error err = {0};
