@@ -2,10 +2,12 @@
 #include "server/executor/site.h"
 
 #include <math.h>
+#include <pwd.h>
 #include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "common/assignment.h"
 #include "common/file.h"
@@ -13,7 +15,7 @@
 #include "common/nearest.h"
 
 #define FILE_MAX_BYTES ((size_t)1 << 20)
-#define PLACEHOLDER_COUNT 16
+#define PLACEHOLDER_COUNT 20
 
 enum key_type { KEY_WORDS, KEY_TEXT, KEY_NUMBER };
 
@@ -156,7 +158,7 @@ static void read_entries(struct site *site, const char *path, char **rest, bool 
 
 /* Texts that values point to. */
 struct numbers {
-    char job[24], attempt[16], memory[24], threads[16], time[16];
+    char job[24], attempt[16], memory[24], threads[16], minutes[16], seconds[16];
 };
 
 static size_t placeholders(const struct site *s, const struct site_job *job, struct numbers *n,
@@ -165,12 +167,14 @@ static size_t placeholders(const struct site *s, const struct site_job *job, str
     snprintf(n->attempt, sizeof n->attempt, "%d", job->attempt);
     snprintf(n->memory, sizeof n->memory, "%ld", site_memory_mib(s, job->memory_bytes));
     snprintf(n->threads, sizeof n->threads, "%.0f", s->threads);
-    snprintf(n->time, sizeof n->time, "%.0f", s->time_min);
-    const struct placeholder all[] = {
-        {"name", job->name},       {"id", job->id},           {"job", n->job},       {"attempt", n->attempt},
-        {"memory_mib", n->memory}, {"threads", n->threads},   {"time_min", n->time}, {"partition", s->partition},
-        {"url", s->url},           {"node", s->node},         {"cache", s->cache},   {"shared", s->shared},
-        {"ids", job->ids},         {"command", job->command}, {"token", job->token}};
+    snprintf(n->minutes, sizeof n->minutes, "%.0f", s->time_min);
+    snprintf(n->seconds, sizeof n->seconds, "%.0f", 60.0 * s->time_min);
+    const struct placeholder all[] = {{"name", job->name},      {"id", job->id},           {"job", n->job},
+                                      {"attempt", n->attempt},  {"memory_mib", n->memory}, {"threads", n->threads},
+                                      {"time_min", n->minutes}, {"time_sec", n->seconds},  {"partition", s->partition},
+                                      {"url", s->url},          {"node", s->node},         {"cache", s->cache},
+                                      {"shared", s->shared},    {"ids", job->ids},         {"command", job->command},
+                                      {"token", job->token},    {"user", s->user}};
     _Static_assert(sizeof all / sizeof *all <= PLACEHOLDER_COUNT, "room for every placeholder");
     memcpy(list, all, sizeof all);
     return sizeof all / sizeof *all;
@@ -248,11 +252,21 @@ static void check_all(const struct site *s, const bool *seen, struct buf *proble
         buf_printf(problems, "%s: ca is for a url that begins with https://\n", s->where);
 }
 
+static void find_user(char user[64]) {
+    struct passwd entry, *found = NULL;
+    char texts[4096];
+    if (getpwuid_r(geteuid(), &entry, texts, sizeof texts, &found) == 0 && found)
+        snprintf(user, 64, "%s", found->pw_name);
+    else
+        snprintf(user, 64, "%u", (unsigned)geteuid());
+}
+
 enum status site_read(struct site *site, const char *name, const char *path, struct buf *problems, struct error *err) {
     struct buf text;
     bool seen[KEY_COUNT] = {false};
     *site = (struct site){.where = mem_strdup(path)};
     snprintf(site->name, sizeof site->name, "%s", name);
+    find_user(site->user);
     for (size_t i = 0; i < KEY_COUNT; i++)
         if (keys[i].fallback)
             set(site, &keys[i], keys[i].fallback, path, problems);

@@ -31,6 +31,7 @@ enum site_state {
 
 struct site {
     char name[32];                             /* of the file without ".conf": lower-case letters, digits, - */
+    char user[64];                             /* under which this process calls the site's commands */
     char *where;                               /* the file; all texts are owned */
     char **submit, **status, **cancel, **info; /* words; info may be NULL */
     char *submit_id;                           /* pattern of the line of submit's output that has the id; "": none */

@@ -1,6 +1,6 @@
 #!/bin/bash
 # The example files of config/executors.d against fakes of their commands, which take what the real ones take, nothing else,
-# and print what they print: `unbaked executor test` submits a job, follows it to its end, submits another and cancels it.
+# and print what they print (with the time limit of `time_min` in each one's own unit): `unbaked executor test` submits a job, follows it to its end, submits another and cancels it.
 # Then each status command prints garbage, which must not be taken for a listing.
 # HTCondor 23 (condor_submit, condor_q, condor_rm), OpenPBS 23 (qsub, qstat, qdel), kubectl 1.31, OpenSSH.
 . tests/api/lib.sh "$@"
@@ -36,6 +36,7 @@ condor_submit)
         [[ $line =~ ^\+?([A-Za-z_]+)\ *=\ *(.*)$ ]] || usage "$line"
         set[${BASH_REMATCH[1]}]=${BASH_REMATCH[2]}
     done
+    [[ ${set[periodic_remove]} == *"> 60 * 1440)" ]] || usage "periodic_remove ${set[periodic_remove]}"
     [ "$line" = queue ] && [ "${set[universe]}" = vanilla ] && [ "${set[executable]}" = /bin/sh ] || usage submit file
     # the new syntax: all in double quotes, words with blanks in single ones
     [[ ${set[arguments]} =~ ^\"-c\ \'([^\'\"]*)\'\"$ ]] || usage "arguments ${set[arguments]}"
@@ -59,7 +60,7 @@ condor_rm)
     for id in *.0; do grep -q "^${BASH_REMATCH[1]} " "$id" && end "$id" && echo "Jobs matching constraint have been marked for removal"; done
     ;;
 qsub)
-    [[ "$*" =~ ^-N\ (unbake-[a-z0-9-]+)\ -q\ workq\ -r\ y\ -j\ oe\ -o\ /dev/null\ -l\ select=1:ncpus=[0-9]+:mem=[0-9]+mb\ -l\ walltime=[0-9]+:00$ ]] || usage "$@"
+    [[ "$*" =~ ^-N\ (unbake-[a-z0-9-]+)\ -q\ workq\ -r\ y\ -j\ oe\ -o\ /dev/null\ -l\ select=1:ncpus=[0-9]+:mem=[0-9]+mb\ -l\ walltime=86400$ ]] || usage "$@"
     name=${BASH_REMATCH[1]} id=$(number).head
     cat >"$FAKE/$id.sh"
     head -1 "$FAKE/$id.sh" | grep -q '^#!' || usage script
@@ -69,7 +70,7 @@ qsub)
     ;;
 qstat)
     [ "$*" != "-q workq" ] || exit 0
-    [ "$*" = "-x -w -u unbaked" ] || usage "$@"
+    [ "$*" = "-x -w -u $(id -un)" ] || usage "$@"
     printf '\nhead: \n%-98s %s\n' "" "Req'd  Req'd   Elap"
     f='%-30s %-15s %-15s %-15s %-8s %-4s %-5s %-6s %-5s %s %s\n'
     printf "$f" "Job ID" Username Queue Jobname SessID NDS TSK Memory Time S Time
@@ -97,6 +98,7 @@ pod = job["spec"]["template"]["spec"]
 box = pod["containers"][0]
 assert job["apiVersion"] == "batch/v1" and job["kind"] == "Job" and job["metadata"]["labels"] == {"app": "unbake"}
 assert job["spec"]["backoffLimit"] == 0 and pod["restartPolicy"] == "Never" and box["command"][:2] == ["/bin/sh", "-c"]
+assert job["spec"]["activeDeadlineSeconds"] == 86400
 assert isinstance(box["env"][0]["value"], str) and box["resources"]["requests"]["cpu"] == "4"
 print(job["metadata"]["name"]); print(box["command"][2])
 PY

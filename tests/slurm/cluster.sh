@@ -94,8 +94,19 @@ END
     exit 1
 }
 
+# The steps of its jobs, which outlive slurmd and wait for a controller that is gone; and what they have started.
+kill_steps() {
+    local pid
+    for pid in $(pgrep -x slurmstepd); do
+        tr '\0' '\n' <"/proc/$pid/environ" 2>/dev/null | grep -qxF "SLURM_CONF=$dir/slurm.conf" || continue
+        pkill -KILL -P "$pid" || true
+        kill -KILL "$pid" 2>/dev/null || true
+    done
+}
+
 stop() {
     local file
+    kill_steps
     for file in "$dir"/*.job; do [ -f "$file" ] && kill "$(cat "$file")" 2>/dev/null; done
     for file in "$dir"/*.job; do
         [ -f "$file" ] || continue
@@ -103,6 +114,7 @@ stop() {
         kill -9 "$(cat "$file")" 2>/dev/null || true
         rm -f "$file"
     done
+    kill_steps # one may have begun meanwhile
 }
 
 case $1 in

@@ -1,6 +1,7 @@
 /* test_site.c -- files of executors.d: what is refused and why, lines of commands' output, commands and their deadline;
  * and that the files which come with the program are as they must be. */
 #include <dirent.h>
+#include <pwd.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -80,6 +81,12 @@ static void test_filled(void) {
           site_state_of(&site, "P") == SITE_UNKNOWN && site_state_of(&site, "") == SITE_UNKNOWN);
     words_free(words);
     mem_free(script);
+    char *parts[] = {"{user} {time_min} {time_sec}", NULL},
+         *wanted = mem_printf("%s 1440 86400", getpwuid(geteuid())->pw_name);
+    words = site_words(&site, parts, &job);
+    CHECK_STRING(words[0], wanted);
+    words_free(words);
+    mem_free(wanted);
 
     /* Of one name the liveliest; others' jobs are left out; what only looks strange is not garbage, all of it is. */
     struct listed_jobs jobs;
@@ -129,6 +136,14 @@ static void test_commands(void) {
     buf_release(&output);
 }
 
+/* Whether the time limit of its key is passed on. */
+static bool has_limit(const struct site *site) {
+    bool found = strstr(site->script, "{time_min}") || strstr(site->script, "{time_sec}");
+    for (size_t i = 0; site->submit[i]; i++)
+        found |= strstr(site->submit[i], "{time_min}") || strstr(site->submit[i], "{time_sec}");
+    return found;
+}
+
 static void test_shipped(void) {
     DIR *folder = opendir("config/executors.d");
     int count = 0;
@@ -143,6 +158,7 @@ static void test_shipped(void) {
         buf_init(&problems, 1 << 16);
         CHECK(site_read(&site, "shipped", path, &problems, &err) == STATUS_OK);
         CHECK_THAT(problems.length == 0, "%s", buf_text(&problems));
+        CHECK_THAT(has_limit(&site), "%s sets no time limit", path);
         site_release(&site);
         buf_release(&problems);
         mem_free(path);
