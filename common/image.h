@@ -114,6 +114,10 @@ enum status image_read_photograph(const char *path, struct image *image, struct 
 enum status image_read_memory(const char *name, const void *data, size_t size, struct image *image,
                               struct image_info *info, struct error *err);
 
+/* As image_read_stored, from memory. */
+enum status image_read_memory_stored(const char *name, const void *data, size_t size, struct image *image,
+                                     struct error *err);
+
 /* image_read, and image_read_photograph, without reading pixels: only width, height, channels and info; pixel is
  * NULL. */
 enum status image_probe(const char *path, struct image *image, struct image_info *info, struct error *err);

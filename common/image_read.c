@@ -108,3 +108,9 @@ enum status image_read_memory(const char *name, const void *data, size_t size, s
     struct image_source source = {.name = name, .memory = data, .fd = -1, .size = size};
     return read_source(&source, false, image, info, err);
 }
+
+enum status image_read_memory_stored(const char *name, const void *data, size_t size, struct image *image,
+                                     struct error *err) {
+    struct image_source source = {.name = name, .memory = data, .fd = -1, .size = size, .as_stored = true};
+    return read_source(&source, false, image, NULL, err);
+}

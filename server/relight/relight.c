@@ -267,9 +267,10 @@ static enum status choose_exposure(struct relight_state *r, struct error *err) {
     struct camera camera = r->views.view[0].camera;
     struct picture_quality quality;
     struct image image;
-    r->output.look = (struct view_look){(float)told, render_settings_is(s, "view_transform", "filmic"),
-                                        render_settings_is(s, "unit", "nits") ? (float)unit : 1.0f};
-    if (told > 0.0 || render_settings_is(s, "format", "exr"))
+    r->output.look =
+        (struct view_look){told > 0.0 ? (float)told : 1.0f, render_settings_is(s, "view_transform", "filmic"),
+                           render_settings_is(s, "unit", "nits") ? (float)unit : 1.0f};
+    if (told > 0.0 || render_settings_is(s, "format", "exr") || !(r->needs_light || wants(r, "emission")))
         return STATUS_OK;
     if (camera.width > METER_WIDTH)
         camera_resize(&camera, METER_WIDTH, (uint32_t)fmax(1.0, (double)METER_WIDTH * camera.height / camera.width));
@@ -304,15 +305,16 @@ static enum status run_open(struct relight_state *r, struct error *err) {
         status = cameras_read(r->job, mesh.offset, &r->views, err);
     if (status == STATUS_OK)
         status = relit_make(r->job, &mesh, &r->views.compass, r->pool, &r->room, err);
+    for (size_t i = 0; i < r->room.note_count && status == STATUS_OK; i++)
+        say(r, r->room.note[i]);
     if (status == STATUS_OK)
         status = output_open(&r->output, r->job, r->watch, err);
-    if (status == STATUS_OK && r->needs_light) {
+    if (status == STATUS_OK && r->needs_light)
         status = use_sun(r, r->suns / 2, err);
-        if (status == STATUS_OK && !shines(r))
-            status = error_set(err, STATUS_INPUT, "Nothing shines: the picture will be black.");
-        if (status == STATUS_OK)
-            status = choose_exposure(r, err);
-    }
+    if (status == STATUS_OK && r->needs_light && !shines(r))
+        status = error_set(err, STATUS_INPUT, "Nothing shines: the picture will be black.");
+    if (status == STATUS_OK)
+        status = choose_exposure(r, err);
     if (render_settings_bool(r->job->settings, "denoise") && r->job->denoiser)
         r->output.note = denoiser_version(r->job->denoiser);
     mesh_release(&mesh);

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "common/mem.h"
+#include "server/relight/added.h"
 #include "server/relight/environment.h"
 #include "server/relight/files.h"
 #include "server/relight/recovered.h"
@@ -154,107 +155,6 @@ static void leave_out(struct recovered *r, struct mesh *mesh, const bool *remove
             r->materials.emission[s] = rgb_gray(0.0f);
 }
 
-/* --- what is added ---------------------------------------------------------------------------------------------- */
-
-/* Makes the textures higher by one texel in a square of four for each thing; the texel of thing i is at *place. */
-static void extend_textures(struct materials *m, size_t things) {
-    struct texture *t = &m->base_color;
-    uint32_t columns = t->width / 2 > 0 ? t->width / 2 : 1;
-    uint32_t rows = 2 * (uint32_t)((things + columns - 1) / columns);
-    size_t old = (size_t)t->width * t->height, all = (size_t)t->width * (t->height + rows);
-    float(*texel)[4] = mem_calloc_large(all, sizeof *texel);
-    memcpy(texel, t->texel, old * sizeof *texel);
-    mem_free(t->texel);
-    t->texel = texel;
-    if (m->emission_pattern) {
-        uint16_t(*pattern)[3] = mem_calloc(all, sizeof *pattern);
-        memcpy(pattern, m->emission_pattern, old * sizeof *pattern);
-        mem_free(m->emission_pattern);
-        m->emission_pattern = pattern;
-    }
-    t->height += rows;
-}
-
-static void set_texel(struct materials *m, uint32_t first_row, size_t thing, rgb color, vec2 *place) {
-    struct texture *t = &m->base_color;
-    uint32_t columns = t->width / 2 > 0 ? t->width / 2 : 1;
-    uint32_t x = 2 * (uint32_t)(thing % columns), y = first_row + 2 * (uint32_t)(thing / columns);
-    float *texel = t->texel[(size_t)y * t->width + x];
-    texel[0] = color.r;
-    texel[1] = color.g;
-    texel[2] = color.b;
-    texel[3] = 1.0f;
-    *place = vec2_make((float)x + 0.5f, (float)y + 0.5f);
-}
-
-static void extend_segments(struct recovered *r, const struct things *things) {
-    struct materials *m = &r->materials;
-    size_t old = r->segments.count, count = old + things->count;
-    m->roughness = mem_realloc_array(m->roughness, count, sizeof *m->roughness);
-    m->specular = mem_realloc_array(m->specular, count, sizeof *m->specular);
-    m->emission = mem_realloc_array(m->emission, count, sizeof *m->emission);
-    m->cone = mem_array(count, sizeof *m->cone);
-    r->segments.id = mem_realloc_array(r->segments.id, count, sizeof *r->segments.id);
-    for (size_t s = 0; s < count; s++) {
-        m->cone[s] = s < old ? (struct emission_cone){-1.0f, -1.0f} : things->thing[s - old].cone;
-        r->segments.id[s] = (int64_t)s;
-        if (s < old)
-            continue;
-        m->roughness[s] = things->thing[s - old].roughness;
-        m->specular[s] = things->thing[s - old].specular;
-        m->emission[s] = things->thing[s - old].emission;
-    }
-    m->segment_count = r->segments.count = count;
-}
-
-/* Where one mesh has normals, the others get zeros, which mean none. */
-static void append_mesh(struct mesh *mesh, const struct mesh *more) {
-    size_t vertices = mesh->vertex_count + more->vertex_count, triangles = mesh->triangle_count + more->triangle_count;
-    mesh->position = mem_realloc_array(mesh->position, vertices, sizeof *mesh->position);
-    memcpy(mesh->position + mesh->vertex_count, more->position, more->vertex_count * sizeof *mesh->position);
-    if (mesh->normal || more->normal) {
-        vec3 *normal = mem_calloc(vertices, sizeof *normal);
-        if (mesh->normal)
-            memcpy(normal, mesh->normal, mesh->vertex_count * sizeof *normal);
-        if (more->normal)
-            memcpy(normal + mesh->vertex_count, more->normal, more->vertex_count * sizeof *normal);
-        mem_free(mesh->normal);
-        mesh->normal = normal;
-    }
-    mem_free(mesh->uv); /* of no use in a render */
-    mesh->uv = NULL;
-    mesh->index = mem_realloc_array(mesh->index, triangles, sizeof *mesh->index);
-    for (size_t t = 0; t < more->triangle_count; t++)
-        for (int k = 0; k < 3; k++)
-            mesh->index[mesh->triangle_count + t][k] = (uint32_t)mesh->vertex_count + more->index[t][k];
-    mesh->vertex_count = vertices;
-    mesh->triangle_count = triangles;
-}
-
-static void add_things(struct recovered *r, struct mesh *mesh, const struct things *things) {
-    uint32_t first_row = r->materials.base_color.height;
-    size_t first_segment = r->segments.count;
-    if (things->count == 0)
-        return;
-    extend_segments(r, things);
-    extend_textures(&r->materials, things->count);
-    r->atlas.height = r->materials.base_color.height;
-    for (size_t i = 0; i < things->count; i++) {
-        size_t first = mesh->triangle_count;
-        vec2 place;
-        set_texel(&r->materials, first_row, i, things->thing[i].base_color, &place);
-        append_mesh(mesh, &things->thing[i].mesh);
-        r->atlas.corner = mem_realloc_array(r->atlas.corner, mesh->triangle_count, sizeof *r->atlas.corner);
-        r->segments.of_triangle =
-            mem_realloc_array(r->segments.of_triangle, mesh->triangle_count, sizeof *r->segments.of_triangle);
-        for (size_t t = first; t < mesh->triangle_count; t++) {
-            for (int k = 0; k < 3; k++)
-                r->atlas.corner[t][k] = place;
-            r->segments.of_triangle[t] = (uint32_t)(first_segment + i);
-        }
-    }
-}
-
 /* --- all -------------------------------------------------------------------------------------------------------- */
 
 static void add_source(struct relit *r, char *name, uint32_t segment, enum distant_part part) {
@@ -266,8 +166,8 @@ static void list_sources(struct relit *r, size_t room_segments, const struct thi
     for (uint32_t s = 0; s < r->segments.count; s++) {
         if (!(rgb_luminance(r->materials.emission[s]) > 0.0f))
             continue;
-        add_source(r, s < room_segments ? mem_printf("light_%u", s) : mem_strdup(things->thing[s - room_segments].name),
-                   s, DISTANT_WHOLE);
+        add_source(r, s < room_segments ? mem_printf("light_%u", s) : added_name(things, s - room_segments), s,
+                   DISTANT_WHOLE);
     }
     if (r->distant[DISTANT_SKY].pixel)
         add_source(r, mem_strdup("sky"), LIGHT_ENVIRONMENT, DISTANT_SKY);
@@ -335,11 +235,17 @@ enum status relit_make(const struct relight_job *job, struct mesh *mesh, const s
     if (status == STATUS_OK)
         status = mark_removed(job, removed, room_segments, err);
     if (status == STATUS_OK)
-        status = things_read(job, compass, r->mesh.offset, &things, err);
+        status = things_read(job, compass, r->mesh.offset, pool, &things, err);
     if (status != STATUS_OK)
         goto out;
     leave_out(&room, &r->mesh, removed);
-    add_things(&room, &r->mesh, &things);
+    status = added_put(&things, &room, &r->mesh, err);
+    if (status != STATUS_OK)
+        goto out;
+    r->note = things.note;
+    r->note_count = things.note_count;
+    things.note = NULL;
+    things.note_count = 0;
     take(&room, r);
     status = build(job, compass, room_segments, &things, pool, r, err);
 out:
@@ -355,6 +261,9 @@ void relit_release(struct relit *r) {
     for (size_t i = 0; i < r->source_count; i++)
         mem_free(r->source[i].name);
     mem_free(r->source);
+    for (size_t i = 0; i < r->note_count; i++)
+        mem_free(r->note[i]);
+    mem_free(r->note);
     mem_free(r->emission);
     release_distant(r);
     world_release(&r->world);

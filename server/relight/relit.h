@@ -15,20 +15,22 @@
 
 /* What shines: a segment of the room, a thing that was added, or distant light. */
 struct relit_source {
-    char *name;             /* "light_27", "lamp_1", "insert_2", "sky", "sun"; owned */
-    uint32_t segment;       /* or LIGHT_ENVIRONMENT */
+    char *name;       /* "light_27", "lamp_1", "insert_2", "insert_2_0" (its first material), "sky", "sun"; owned */
+    uint32_t segment; /* or LIGHT_ENVIRONMENT */
     enum distant_part part; /* of distant light */
 };
 
 struct relit {
     struct mesh mesh;
-    struct segments segments; /* those of the outputs, then one for each thing; no names */
+    struct segments segments; /* those of the outputs, then one for each material of a thing; no names */
     struct atlas atlas;       /* no charts: corners only */
     struct materials materials;
     struct world world;
     rgb *emission;                         /* [segments.count] with all sources; owned */
     struct image distant[DISTANT_SUN + 1]; /* distant light, where there is any; its parts only with per_light */
     size_t source_count;
+    size_t note_count;
+    char **note;                 /* [note_count] what of inserted files is not rendered, as sentences; owned */
     struct relit_source *source; /* [source_count]; sky and sun are the last; owned */
 };
 

@@ -9,50 +9,27 @@
 #include <string.h>
 
 #include "common/mem.h"
-#include "server/ingest/mesh/mesh_file.h"
-#include "server/relight/files.h"
+#include "server/relight/insert.h"
+#include "server/relight/thing_settings.h"
 
 #define BALL_SPLITS 3
 #define DISC_CORNERS 32
-#define INSERT_MAX_TRIANGLES ((size_t)1 << 24)
 #define LAMP_ROUGHNESS 0.5f /* of a black body without a highlight: no matter */
 
 void things_release(struct things *t) {
     for (size_t i = 0; i < t->count; i++) {
         mem_free(t->thing[i].name);
+        mem_free(t->thing[i].part);
         mesh_release(&t->thing[i].mesh);
+        if (t->thing[i].baked)
+            bake_release(t->thing[i].baked);
+        mem_free(t->thing[i].baked);
     }
+    for (size_t i = 0; i < t->note_count; i++)
+        mem_free(t->note[i]);
+    mem_free(t->note);
     mem_free(t->thing);
     *t = (struct things){0};
-}
-
-/* --- settings of one thing -------------------------------------------------------------------------------------- */
-
-/* "lamp.3.position" of family "lamp", number 3. */
-struct thing_key {
-    char text[64];
-};
-
-static struct thing_key key_of(const char *family, uint32_t number, const char *name) {
-    struct thing_key key;
-    snprintf(key.text, sizeof key.text, "%s.%u.%s", family, number, name);
-    return key;
-}
-
-static double number_of(const cJSON *s, const char *family, uint32_t n, const char *name) {
-    return render_settings_number(s, key_of(family, n, name).text);
-}
-
-static rgb color_of(const cJSON *s, const char *family, uint32_t n, const char *name) {
-    double v[RENDER_MAX_NUMBERS] = {0.0, 0.0, 0.0};
-    render_settings_numbers(s, key_of(family, n, name).text, v);
-    return rgb_make((float)v[0], (float)v[1], (float)v[2]);
-}
-
-static vec3 place_of(const cJSON *s, const char *family, uint32_t n, const double offset[3]) {
-    double v[RENDER_MAX_NUMBERS] = {0.0, 0.0, 0.0};
-    render_settings_numbers(s, key_of(family, n, "position").text, v);
-    return vec3_make((float)(v[0] - offset[0]), (float)(v[1] - offset[1]), (float)(v[2] - offset[2]));
 }
 
 /* --- shapes ----------------------------------------------------------------------------------------------------- */
@@ -146,7 +123,7 @@ double things_spot_flux(struct emission_cone cone) {
 }
 
 static struct emission_cone cone_of(const cJSON *s, uint32_t n) {
-    double half = 0.5 * number_of(s, "lamp", n, "angle") * PI / 180.0, blend = number_of(s, "lamp", n, "blend");
+    double half = 0.5 * thing_number(s, "lamp", n, "angle") * PI / 180.0, blend = thing_number(s, "lamp", n, "blend");
     double outer = cos(half), inner = cos(half * (1.0 - blend));
     return (struct emission_cone){(float)outer, (float)fmax(inner, outer + 1e-4)};
 }
@@ -160,10 +137,10 @@ static rgb radiance_of_flux(const cJSON *s, double lumen, double flux_per_lumina
 
 static enum status make_lamp(const cJSON *s, uint32_t n, const struct compass *compass, const double offset[3],
                              struct thing *lamp, struct error *err) {
-    struct thing_key kind = key_of("lamp", n, "kind");
-    rgb toward = color_of(s, "lamp", n, "direction");
-    vec3 centre = place_of(s, "lamp", n, offset), front = vec3_normalize(vec3_make(toward.r, toward.g, toward.b));
-    double size[RENDER_MAX_NUMBERS], radius = number_of(s, "lamp", n, "radius"), solid = PI;
+    struct thing_name kind = thing_key("lamp", n, "kind");
+    rgb toward = thing_color(s, "lamp", n, "direction");
+    vec3 centre = thing_place(s, "lamp", n, offset), front = vec3_normalize(vec3_make(toward.r, toward.g, toward.b));
+    double size[RENDER_MAX_NUMBERS], radius = thing_number(s, "lamp", n, "radius"), solid = PI;
     lamp->cone.outer = -1.0f;
     if (!render_settings_is(s, kind.text, "sphere") && !(vec3_length(front) > 0.0f))
         return error_set(err, STATUS_INPUT, "setting lamp.%u.direction: must not be 0, 0, 0", n);
@@ -174,62 +151,22 @@ static enum status make_lamp(const cJSON *s, uint32_t n, const struct compass *c
         lamp->cone = cone_of(s, n);
         solid = things_spot_flux(lamp->cone);
     } else {
-        render_settings_numbers(s, key_of("lamp", n, "size").text, size);
+        render_settings_numbers(s, thing_key("lamp", n, "size").text, size);
         make_area(centre, front, compass->up, size[0], size[1], &lamp->mesh);
     }
     lamp->name = mem_printf("lamp_%u", n);
-    lamp->roughness = LAMP_ROUGHNESS;
-    lamp->emission = color_of(s, "lamp", n, "radiance");
-    double lumen = number_of(s, "lamp", n, "lumen");
-    if (lumen > 0.0)
-        lamp->emission = radiance_of_flux(s, lumen, solid * mesh_area(&lamp->mesh), lamp->emission);
-    return STATUS_OK;
-}
-
-/* --- meshes of files -------------------------------------------------------------------------------------------- */
-
-/* The file's y is up. */
-static void move_mesh(const cJSON *s, uint32_t n, const struct compass *compass, vec3 to, struct mesh *m) {
-    double turn = number_of(s, "insert", n, "turn") * PI / 180.0;
-    float scale = (float)number_of(s, "insert", n, "scale"), c = (float)cos(turn), i = (float)sin(turn);
-    for (size_t v = 0; v < m->vertex_count; v++) {
-        vec3 file[2] = {
-            vec3_add(m->position[v], vec3_make((float)m->offset[0], (float)m->offset[1], (float)m->offset[2])),
-            m->normal ? m->normal[v] : vec3_make(0.0f, 0.0f, 0.0f)};
-        for (int k = 0; k < 2; k++) {
-            vec3 p = file[k];
-            file[k] = compass_from_map(compass, vec3_make(c * p.x + i * p.z, p.y, c * p.z - i * p.x));
-        }
-        m->position[v] = vec3_mad(to, scale, file[0]);
-        if (m->normal)
-            m->normal[v] = file[1];
-    }
-}
-
-static enum status make_insert(const struct relight_job *job, uint32_t n, const struct compass *compass,
-                               const double offset[3], struct thing *thing, struct error *err) {
-    const cJSON *s = job->settings;
-    struct faces_report report;
-    const char *name = render_settings_text(s, key_of("insert", n, "file").text);
-    char *path = files_path(job, name);
-    enum status status = mesh_file_read(path, name, INSERT_MAX_TRIANGLES, &thing->mesh, &report, err);
-    if (status == STATUS_OK)
-        status = mesh_check(&thing->mesh, name, NULL, err);
-    mem_free(path);
-    if (status != STATUS_OK)
-        return status;
-    move_mesh(s, n, compass, place_of(s, "insert", n, offset), &thing->mesh);
-    thing->name = mem_printf("insert_%u", n);
-    thing->base_color = color_of(s, "insert", n, "base_color");
-    thing->emission = color_of(s, "insert", n, "emission");
-    thing->roughness = (float)number_of(s, "insert", n, "roughness");
-    thing->specular = (float)number_of(s, "insert", n, "specular");
-    thing->cone.outer = -1.0f;
+    lamp->part = mem_calloc(1, sizeof *lamp->part);
+    lamp->part_count = 1;
+    lamp->part->roughness = LAMP_ROUGHNESS;
+    rgb radiance = thing_color(s, "lamp", n, "radiance");
+    double lumen = thing_number(s, "lamp", n, "lumen");
+    lamp->part->emission =
+        lumen > 0.0 ? radiance_of_flux(s, lumen, solid * mesh_area(&lamp->mesh), radiance) : radiance;
     return STATUS_OK;
 }
 
 enum status things_read(const struct relight_job *job, const struct compass *compass, const double offset[3],
-                        struct things *t, struct error *err) {
+                        struct parallel *pool, struct things *t, struct error *err) {
     size_t lamps, inserts;
     uint32_t *lamp = render_settings_family(job->settings, "lamp.", &lamps);
     uint32_t *insert = render_settings_family(job->settings, "insert.", &inserts);
@@ -238,7 +175,7 @@ enum status things_read(const struct relight_job *job, const struct compass *com
     for (size_t i = 0; i < lamps + inserts && status == STATUS_OK; i++) {
         struct thing *thing = &t->thing[t->count++];
         status = i < lamps ? make_lamp(job->settings, lamp[i], compass, offset, thing, err)
-                           : make_insert(job, insert[i - lamps], compass, offset, thing, err);
+                           : insert_make(job, insert[i - lamps], compass, offset, pool, thing, t, err);
     }
     mem_free(lamp);
     mem_free(insert);

@@ -1,4 +1,4 @@
-/* things.h -- geometry that is put into a room: lamps, and meshes of files. Each thing is a segment of its own. */
+/* things.h -- geometry that is put into a room: lamps, and meshes of files. */
 #ifndef UNBAKE_RELIGHT_THINGS_H
 #define UNBAKE_RELIGHT_THINGS_H
 
@@ -6,26 +6,13 @@
 
 #include "server/relight/compass.h"
 #include "common/error.h"
+#include "common/parallel.h"
 #include "server/relight/relight_job.h"
-#include "server/scene/materials.h"
-#include "server/scene/mesh.h"
-
-struct thing {
-    char *name; /* "lamp_1", "insert_1"; owned */
-    rgb base_color, emission;
-    float roughness, specular;
-    struct emission_cone cone; /* outer -1: none */
-    struct mesh mesh;          /* in the room's coordinates; with normals or without; owned */
-};
-
-struct things {
-    size_t count;
-    struct thing *thing; /* [count] owned */
-};
+#include "server/relight/thing.h"
 
 /* Lamps first, each family by number. `offset` is that of the room's mesh. */
 enum status things_read(const struct relight_job *job, const struct compass *compass, const double offset[3],
-                        struct things *things, struct error *err);
+                        struct parallel *pool, struct things *things, struct error *err);
 void things_release(struct things *things);
 
 /* Luminous flux (lm) of a spot of area 1 m2 and luminance 1 cd/m2 along its axis. */

@@ -91,6 +91,27 @@ static inline struct bsdf bsdf_make(rgb base_color, float roughness, float specu
     return b;
 }
 
+/* What the specular lobe of a metal reflects at the cosine c between the directions and the microfacet's normal: Schlick
+ * 1994, as Mitsuba 3's `principled` has it. */
+static inline rgb bsdf_metal_fresnel(rgb base_color, float c) {
+    float w = bsdf_schlick(c);
+    return (rgb){base_color.r + (1.0f - base_color.r) * w, base_color.g + (1.0f - base_color.g) * w,
+                 base_color.b + (1.0f - base_color.b) * w};
+}
+
+/* bsdf_make of a surface of which a share is metal. For bsdf_eval's density and bsdf_sample; the values are those of
+ * bsdf_metal. */
+static inline struct bsdf bsdf_make_metal(rgb base_color, float roughness, float specular, float metallic,
+                                          float cos_wo) {
+    struct bsdf b = bsdf_make(base_color, roughness, specular, cos_wo);
+    float metal = rgb_luminance(bsdf_metal_fresnel(base_color, cos_wo));
+    float diffuse = bsdf_max(rgb_luminance(base_color), 0.1f) * (1.0f - metallic);
+    float shiny = b.specular_chance / (1.0f - b.specular_chance) * bsdf_max(rgb_luminance(base_color), 0.1f);
+    shiny = shiny + (metal - shiny) * metallic;
+    b.specular_chance = shiny / bsdf_max(shiny + diffuse, 1e-6f);
+    return b;
+}
+
 /* The specular lobe alone, without base; only this lobe is sampled. */
 static inline struct bsdf bsdf_lobe(float roughness, float specular) {
     struct bsdf b = bsdf_make(rgb_gray(0.0f), roughness, specular, 1.0f);
@@ -145,6 +166,18 @@ static inline struct bsdf_value bsdf_eval(const struct bsdf *b, vec3 wo, vec3 wi
     v.specular *= lit;
     v.pdf *= lit;
     return v;
+}
+
+/* f cos of a surface of which a share is metal: the rest is bsdf_eval's, f. */
+static inline rgb bsdf_metal(const struct bsdf *b, struct bsdf_value f, float metallic, vec3 wo, vec3 wi) {
+    float cos_i = bsdf_max(wi.z, 1e-12f), rest = 1.0f - metallic;
+    struct bsdf_ggx t = bsdf_ggx(b->alpha, wo, (vec3){wi.x, wi.y, cos_i});
+    float lobe = metallic * t.d * cos_i / ((wo.z + t.root_o) * (cos_i + t.root_i));
+    lobe = wi.z > 0.0f ? lobe : 0.0f;
+    rgb metal = bsdf_metal_fresnel(b->base_color, t.cos_d);
+    return (rgb){rest * (b->base_color.r * f.diffuse + f.specular) + lobe * metal.r,
+                 rest * (b->base_color.g * f.diffuse + f.specular) + lobe * metal.g,
+                 rest * (b->base_color.b * f.diffuse + f.specular) + lobe * metal.b};
 }
 
 /* Derivatives of bsdf_eval; `specular` is the parameter that b was made from. As specular -> 0 the lobe goes to 0

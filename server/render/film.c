@@ -200,20 +200,12 @@ static void add_hit(const struct film *f, const struct accel_hit *hit, vec3 dire
     vec3 point = mesh_point(f->world->mesh, hit->triangle, hit->b1, hit->b2);
     vec3 normal = surface_shading(f->world->mesh, hit->triangle, hit->b1, hit->b2, t->normal);
     normal = vec3_dot(normal, direction) > 0.0f ? vec3_neg(normal) : normal;
-    const float value[] = {base.r,
-                           base.g,
-                           base.b,
-                           m->roughness[t->segment],
-                           m->specular[t->segment],
-                           emission.r,
-                           emission.g,
-                           emission.b,
-                           normal.x,
-                           normal.y,
-                           normal.z,
-                           point.x,
-                           point.y,
-                           point.z};
+    float roughness = m->roughness[t->segment], metallic;
+    if (m->metallic)
+        materials_gloss(m, t->segment, place.x, place.y, &roughness, &metallic);
+    const float value[] = {base.r,     base.g,     base.b,     roughness, m->specular[t->segment],
+                           emission.r, emission.g, emission.b, normal.x,  normal.y,
+                           normal.z,   point.x,    point.y,    point.z};
     for (int c = 0; c < SEGMENT; c++)
         out[c] += value[c];
     if (first)

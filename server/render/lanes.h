@@ -37,6 +37,7 @@ struct vertex_block {
     uint32_t segment[LANES];
     uint32_t light_segment[LANES]; /* of the light sample, LIGHT_ENVIRONMENT where none */
     float roughness[LANES], specular[LANES];
+    float metallic[LANES]; /* only where materials have metals, which the backward pass does not know */
     struct lanes3 emission;
     struct lanes3 pattern;        /* emission = pattern * emission of the segment; only where materials have a
                                       * pattern */

@@ -111,6 +111,8 @@ static void load_lane(struct path_batch *b, const struct world *world, struct ve
     v->segment[lane] = segment;
     v->roughness[lane] = m->roughness[segment];
     v->specular[lane] = m->specular[segment];
+    if (m->metallic)
+        materials_gloss(m, segment, s->place_x[lane], s->place_y[lane], &v->roughness[lane], &v->metallic[lane]);
     lanes3_set_rgb(&v->emission, lane, m->emission[segment]);
     if (b->has_pattern)
         apply_pattern(m, s, v, lane);
@@ -235,7 +237,10 @@ static void shade(struct path_batch *b, const struct world *world, const struct 
         path_lights_environment(s, v, world->lights, count);
     gather_texels(v, s, texture, count);
     shade_texture(v, s);
-    shade_scatter(v, s, roulette_at(settings, depth + 2));
+    if (world->materials->metallic)
+        shade_scatter_metals(v, s, roulette_at(settings, depth + 2));
+    else
+        shade_scatter(v, s, roulette_at(settings, depth + 2));
     spawn_rays(b, v, (uint32_t)block * LANES, count);
 }
 

@@ -187,14 +187,23 @@ static inline rgb reflect(struct bsdf_value f, rgb base_color, rgb light) {
                  (base_color.b * f.diffuse + f.specular) * light.b};
 }
 
-KERNEL void shade_scatter(struct vertex_block *restrict v, struct shade_block *restrict s,
-                          struct shade_roulette roulette) {
+/* f cos times light, of a lane's surface. */
+static inline rgb reflect_lane(const struct bsdf *bsdf, struct bsdf_value f, bool has_metals, float metallic, vec3 wo,
+                               vec3 wi, rgb color, rgb light) {
+    return has_metals ? rgb_mul(bsdf_metal(bsdf, f, metallic, wo, wi), light) : reflect(f, color, light);
+}
+
+static inline __attribute__((always_inline)) void scatter(struct vertex_block *restrict v,
+                                                          struct shade_block *restrict s,
+                                                          struct shade_roulette roulette, bool has_metals) {
     FOR_LANES {
         vec3 n = lanes3_get(&s->frame_normal, i), a, b;
         vec3_frame(n, &a, &b);
         rgb base_color = lanes3_rgb(&v->base_color, i), beta = lanes3_rgb(&v->beta, i);
         vec3 wo = lanes3_get(&v->wo, i);
-        struct bsdf bsdf = bsdf_make(base_color, v->roughness[i], v->specular[i], wo.z);
+        float metallic = has_metals ? v->metallic[i] : 0.0f;
+        struct bsdf bsdf = has_metals ? bsdf_make_metal(base_color, v->roughness[i], v->specular[i], metallic, wo.z)
+                                      : bsdf_make(base_color, v->roughness[i], v->specular[i], wo.z);
 
         vec3 to = lanes3_get(&s->light_direction, i);
         vec3 light = {vec3_dot(a, to), vec3_dot(b, to), vec3_dot(n, to)};
@@ -203,13 +212,15 @@ KERNEL void shade_scatter(struct vertex_block *restrict v, struct shade_block *r
         bool lit = light_pdf > 0.0f && f.pdf > 0.0f;
         float factor = lit ? power_heuristic(light_pdf, f.pdf) / bsdf_max(light_pdf, 1e-30f) : 0.0f;
         rgb unoccluded = rgb_scale(lanes3_rgb(&s->radiance, i), factor);
-        rgb contribution = rgb_mul(beta, reflect(f, base_color, unoccluded));
+        rgb contribution =
+            rgb_mul(beta, reflect_lane(&bsdf, f, has_metals, metallic, wo, light, base_color, unoccluded));
         /* Roulette for shadow rays whose contribution is small against what the path has gathered (Veach 1997,
          * section 10.4.1). */
         rgb path_rr_beta = lanes3_rgb(&s->rr_beta, i),
             color = {bsdf_max(base_color.r, roulette.least_color), bsdf_max(base_color.g, roulette.least_color),
                      bsdf_max(base_color.b, roulette.least_color)};
-        float max_contribution = max_channel(rgb_mul(path_rr_beta, reflect(f, color, unoccluded)));
+        float max_contribution = max_channel(
+            rgb_mul(path_rr_beta, reflect_lane(&bsdf, f, has_metals, metallic, wo, light, color, unoccluded)));
         float chance = max_contribution / bsdf_max(MIN_CONTRIBUTION_SHARE * s->path_radiance[i], 1e-30f);
         chance = clamp_branchless(chance, roulette.least_light, 1.0f);
         bool is_traced = lit && s->light_roulette[i] < chance;
@@ -223,8 +234,8 @@ KERNEL void shade_scatter(struct vertex_block *restrict v, struct shade_block *r
         vec3 wi = bsdf_sample(&bsdf, wo, s->lobe[i], s->bounce_u[i], s->bounce_v[i]);
         f = bsdf_eval(&bsdf, wo, wi);
         float scale = f.pdf > 0.0f ? 1.0f / bsdf_max(f.pdf, 1e-30f) : 0.0f;
-        rgb next_beta = rgb_scale(reflect(f, base_color, beta), scale);
-        rgb rr_beta = rgb_scale(reflect(f, color, path_rr_beta), scale);
+        rgb next_beta = rgb_scale(reflect_lane(&bsdf, f, has_metals, metallic, wo, wi, base_color, beta), scale);
+        rgb rr_beta = rgb_scale(reflect_lane(&bsdf, f, has_metals, metallic, wo, wi, color, path_rr_beta), scale);
         chance = clamp_branchless(roulette.scale * max_channel(rr_beta), roulette.least, roulette.most);
         float over = 1.0f / chance;
         bool open = f.pdf > 0.0f && s->roulette[i] < chance;
@@ -238,6 +249,16 @@ KERNEL void shade_scatter(struct vertex_block *restrict v, struct shade_block *r
         s->bounce_pdf[i] = f.pdf;
         s->bounce_continues[i] = open ? 1 : 0;
     }
+}
+
+KERNEL void shade_scatter(struct vertex_block *restrict v, struct shade_block *restrict s,
+                          struct shade_roulette roulette) {
+    scatter(v, s, roulette, false);
+}
+
+KERNEL void shade_scatter_metals(struct vertex_block *restrict v, struct shade_block *restrict s,
+                                 struct shade_roulette roulette) {
+    scatter(v, s, roulette, true);
 }
 
 KERNEL void shade_backward(const struct vertex_block *restrict v, struct shade_derivative *restrict d) {

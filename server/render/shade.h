@@ -38,6 +38,9 @@ struct shade_roulette {
 
 /* Reflection towards the light sample and along the continued path. */
 void shade_scatter(struct vertex_block *restrict v, struct shade_block *restrict s, struct shade_roulette roulette);
+/* The same where materials have metals. Not for a backward pass. */
+void shade_scatter_metals(struct vertex_block *restrict v, struct shade_block *restrict s,
+                          struct shade_roulette roulette);
 
 /* Derivatives by all parameters at a vertex, and the radiance that leaves it. */
 void shade_backward(const struct vertex_block *restrict v, struct shade_derivative *restrict d);

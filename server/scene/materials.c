@@ -18,6 +18,8 @@ void materials_init(struct materials *m, const struct inverse_uv *inverse, size_
     m->emission_pattern = NULL;
     m->deviation = NULL;
     m->cone = NULL;
+    m->metallic = NULL;
+    m->gloss = NULL;
     m->roughness = mem_array(segment_count, sizeof *m->roughness);
     m->specular = mem_array(segment_count, sizeof *m->specular);
     m->emission = mem_calloc(segment_count, sizeof *m->emission);
@@ -33,6 +35,8 @@ void materials_release(struct materials *m) {
     mem_free(m->specular);
     mem_free(m->emission);
     mem_free(m->cone);
+    mem_free(m->metallic);
+    mem_free(m->gloss);
     mem_free(m->deviation);
     materials_drop_emission_pattern(m);
     *m = (struct materials){0};
@@ -101,6 +105,21 @@ rgb materials_emission_pattern(const struct materials *m, float x, float y) {
         weights += weight;
     }
     return weights > 0.0f ? rgb_scale(sum, 1.0f / weights) : rgb_gray(1.0f);
+}
+
+void materials_gloss(const struct materials *m, uint32_t segment, float x, float y, float *roughness, float *metallic) {
+    struct texture_taps taps;
+    *roughness = m->roughness[segment];
+    *metallic = m->metallic[segment];
+    if (*metallic != MATERIALS_BY_TEXEL)
+        return;
+    float sum[2] = {0.0f, 0.0f};
+    texture_taps(&m->base_color, x, y, &taps);
+    for (int k = 0; k < 4; k++)
+        for (int c = 0; c < 2 && taps.weight[k] > 0.0f; c++)
+            sum[c] += taps.weight[k] * image_float_from_half(m->gloss[taps.texel[k]][c]);
+    *roughness = sum[0];
+    *metallic = sum[1];
 }
 
 rgb materials_emission_of_texel(const struct materials *m, uint32_t segment, size_t texel) {

@@ -20,6 +20,8 @@ struct emission_cone {
     float outer, inner;
 };
 
+#define MATERIALS_BY_TEXEL -1.0f
+
 struct materials {
     struct texture base_color; /* linear reflectance in [0, 1] */
     size_t segment_count;
@@ -31,6 +33,10 @@ struct materials {
                                       * segment, positive; 0 where unknown, which reads as 1. NULL: none. Owned */
     uint16_t *deviation; /* [height][width] half precision: standard deviation of base colour by measurement, over its
                           * channels; 0: unknown. NULL: none. Owned */
+    /* Of things that were added to a room; no derivative knows of metals. NULL: none. Owned. */
+    float *metallic; /* [segment_count] share of the surface that is metal, which reflects in the base colour and not
+                           * diffusely; MATERIALS_BY_TEXEL: that and roughness are in gloss */
+    uint16_t (*gloss)[2];       /* [height][width] half precision: roughness and share of metal */
     struct emission_cone *cone; /* [segment_count] of lamps that were added to a room; no derivative knows it. NULL:
                                       * none. Owned */
 };
@@ -52,6 +58,9 @@ rgb materials_deviation(const struct materials *m, size_t texel);
 /* Allocates a pattern of unknown texels, or frees it. Untouched pages of the former take no memory. */
 void materials_start_emission_pattern(struct materials *m);
 void materials_drop_emission_pattern(struct materials *m);
+
+/* Roughness and share of metal at a point of a segment, (x, y) in texels; for materials with metals. */
+void materials_gloss(const struct materials *m, uint32_t segment, float x, float y, float *roughness, float *metallic);
 
 /* Sets the pattern of a texel: its radiance over the mean of its segment, clamped to be positive. */
 void materials_set_emission_pattern(struct materials *m, size_t texel, rgb radiance, rgb mean);

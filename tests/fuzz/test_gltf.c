@@ -12,6 +12,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     for (size_t i = 0; status == STATUS_OK && i < mesh.triangle_count; i++)
         MUST(!mesh.object_id || mesh.object_id[i] >= 0);
     must_be_mesh(status, &mesh, &err);
+    struct mesh_look look = {0};
+    status = gltf_parse_look(data, size, "case", NULL, 100000, &mesh, &look, NULL, &err);
+    must_be_look(status, &mesh, &look, &err);
     return 0;
 }
 
@@ -54,9 +57,26 @@ static void add_glb(struct seeds *s) {
     "\"POSITION\":0,\"NORMAL\":1}}]}],\"nodes\":[{\"mesh\":0,\"extensions\":{\"EXT_mesh_gpu_instancing\":{"                \
     "\"attributes\":{\"TRANSLATION\":2,\"SCALE\":2}}}}]"
 
+/* A triangle with a material, whose pictures are a PNG of one pixel. */
+#define MATERIALS                                                                                                        \
+    "\"asset\":{\"version\":\"2.0\"},\"bufferViews\":[{\"buffer\":0,\"byteLength\":36}],\"accessors\":[{"                \
+    "\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"},{\"bufferView\":0,"                          \
+    "\"componentType\":5126,\"count\":3,\"type\":\"VEC2\"}],\"images\":[{\"uri\":\"data:image/png;base64,"               \
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVR4nGNocFAAAAIkAOGrWWInAAAAAElFTkSuQmCC\"}],"                  \
+    "\"samplers\":[{\"wrapS\":33648,\"wrapT\":33071}],\"textures\":[{\"source\":0,\"sampler\":0}],\"materials\":[{"      \
+    "\"pbrMetallicRoughness\":{\"baseColorTexture\":{\"index\":0,\"extensions\":{\"KHR_texture_transform\":{"            \
+    "\"offset\":[0,1],\"rotation\":1.5,\"scale\":[2,3]}}},\"metallicRoughnessTexture\":{\"index\":0},"                   \
+    "\"baseColorFactor\":[1,0.5,2,1],\"roughnessFactor\":0.5},\"emissiveTexture\":{\"index\":0},\"emissiveFactor\":"     \
+    "[1,1,1],\"extensions\":{\"KHR_materials_ior\":{\"ior\":1.4},\"KHR_materials_emissive_strength\":{"                  \
+    "\"emissiveStrength\":5},\"KHR_materials_specular\":{\"specularFactor\":0.5}}}],\"meshes\":[{\"primitives\":[{"      \
+    "\"attributes\":{\"POSITION\":0,\"TEXCOORD_0\":1},\"material\":0},{\"attributes\":{\"POSITION\":0}}]}],\"nodes\":[{" \
+    "\"mesh\":0}]"
+
 void fuzz_seeds(struct seeds *s) {
     s->mutants = 10000;
     add_glb(s);
+    seeds_text(s, "{" MATERIALS ",\"buffers\":[{\"byteLength\":36,\"uri\":\"data:x;base64,"
+                  "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA\"}]}");
     seeds_text(s, "{" EXTENSIONS ",\"buffers\":[{\"byteLength\":83,\"uri\":\"data:x;base64,"
                   "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAABAAIAoAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA"
                   "AAAAAAAA\"}]}");

@@ -13,6 +13,7 @@
 
 #include "common/error.h"
 #include "server/ingest/mesh/faces.h"
+#include "server/ingest/mesh/look.h"
 #include "server/scene/mesh.h"
 
 /* As ply_read and ply_parse; `folder` contains the file's external buffers, NULL: none are allowed. */
@@ -20,5 +21,12 @@ enum status gltf_read(const char *path, const char *name, size_t triangle_limit,
                       struct faces_report *report, struct error *err);
 enum status gltf_parse(const void *data, size_t size, const char *name, const char *folder, size_t triangle_limit,
                        struct mesh *mesh, struct faces_report *report, struct error *err);
+
+/* The same with materials: mesh->object_id are their numbers in *look, and mesh->uv are as the file has them, without transforms of pictures. The look is the caller's
+ * (look_release), also after a failure. */
+enum status gltf_read_look(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
+                           struct mesh_look *look, struct faces_report *report, struct error *err);
+enum status gltf_parse_look(const void *data, size_t size, const char *name, const char *folder, size_t triangle_limit,
+                            struct mesh *mesh, struct mesh_look *look, struct faces_report *report, struct error *err);
 
 #endif

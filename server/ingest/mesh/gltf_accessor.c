@@ -91,6 +91,11 @@ static enum status open_view(struct gltf_file *g, const cJSON *object, const cha
     return STATUS_OK;
 }
 
+enum status gltf_view(struct gltf_file *g, const cJSON *object, const char *where, size_t index,
+                      struct gltf_bytes *bytes, struct error *err) {
+    return open_view(g, object, where, index, 1, bytes, err);
+}
+
 /* Whether it holds `count` elements; STATUS_INPUT where not. */
 static enum status check_room(const struct gltf_file *g, const struct gltf_bytes *bytes, const char *user,
                               uint64_t count, size_t element, struct error *err) {

@@ -22,6 +22,10 @@ struct gltf_span {
 enum status gltf_span(struct gltf_file *g, size_t index, const char *type, struct gltf_span *span, struct error *err);
 void gltf_span_release(struct gltf_span *span);
 
+/* The bytes of the member "bufferView" of `object`, which is WHERE[INDEX] in messages; data is NULL where it has none. */
+enum status gltf_view(struct gltf_file *g, const cJSON *object, const char *where, size_t index,
+                      struct gltf_bytes *bytes, struct error *err);
+
 /* Reads `width` numbers of an element, by its component type and normalisation (3.11). */
 void gltf_read_vector(const struct gltf_span *span, size_t at, size_t width, double *value);
 /* Reads an unsigned integer of any size. */

@@ -53,9 +53,8 @@ static enum status split_glb(const uint8_t *data, size_t size, const char *name,
 
 /* --- buffers (3.6.1) ------------------------------------------------------------------------ */
 
-/* Decodes percent escapes in place; invalid ones stay. */
-static void unescape(char *text) {
-    char *to = text;
+char *gltf_unescape(const char *uri) {
+    char *text = mem_strdup(uri), *to = text;
     for (const char *c = text; *c; c++) {
         unsigned value;
         if (*c == '%' && strspn(c + 1, "0123456789abcdefABCDEF") >= 2 && sscanf(c + 1, "%2x", &value) == 1 &&
@@ -67,11 +66,11 @@ static void unescape(char *text) {
         }
     }
     *to = '\0';
+    return text;
 }
 
 static enum status open_file_buffer(struct gltf_file *g, struct gltf_buffer *b, const char *uri, struct error *err) {
-    char *text = mem_strdup(uri), *clean = NULL;
-    unescape(text);
+    char *text = gltf_unescape(uri), *clean = NULL;
     enum status status = path_clean(text, &clean, err);
     if (status == STATUS_OK && !g->folder)
         status = error_set(err, STATUS_INPUT, "%s: its buffer %s is not in it", g->name, uri);

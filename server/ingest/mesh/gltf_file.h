@@ -54,6 +54,9 @@ enum status gltf_index(const struct gltf_file *g, const cJSON *object, const cha
 enum status gltf_whole(const struct gltf_file *g, const cJSON *object, const char *key, const char *where, size_t index,
                        double fallback, double least, double most, uint64_t *value, struct error *err);
 
+/* The address with percent escapes decoded, of which invalid ones stay; the caller's. */
+char *gltf_unescape(const char *uri);
+
 /* The extension's object of a JSON object; NULL when there is none. */
 const cJSON *gltf_extension(const cJSON *object, const char *extension);
 

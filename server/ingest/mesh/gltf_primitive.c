@@ -113,6 +113,21 @@ static enum status add_triangles(struct gltf_surface *r, const struct primitive 
     return STATUS_OK;
 }
 
+static enum status open_uv(struct gltf_surface *r, const cJSON *object, struct primitive *p) {
+    size_t count = p->position.count;
+    const cJSON *attributes = cJSON_GetObjectItemCaseSensitive(object, "attributes");
+    r->colored_count += cJSON_GetObjectItemCaseSensitive(attributes, "COLOR_0") != NULL;
+    if (!r->is_look) /* geometry does not need them */
+        r->no_uv_count += gltf_uv_open(&p->uv, r->file, object, p->where, count, NULL) != STATUS_OK;
+    if (!r->is_look || r->uv_set < 0)
+        return STATUS_OK;
+    enum status status = gltf_uv_open_set(&p->uv, r->file, object, r->uv_set, p->where, count, r->err);
+    if (status == STATUS_OK && !p->uv.is_there)
+        status = error_set(r->err, STATUS_INPUT, "%s: %s has no TEXCOORD_%d, which the pictures of its material need",
+                           r->file->name, p->where, r->uv_set);
+    return status;
+}
+
 static enum status open_primitive(struct gltf_surface *r, const cJSON *object, struct primitive *p) {
     size_t accessor;
     bool found;
@@ -139,9 +154,7 @@ static enum status open_primitive(struct gltf_surface *r, const cJSON *object, s
     if (status == STATUS_OK && p->has_normal && p->normal.count != p->position.count)
         status = error_set(r->err, STATUS_INPUT, "%s: %s has %zu positions and %zu normals", r->file->name, p->where,
                            p->position.count, p->normal.count);
-    if (status == STATUS_OK) /* geometry does not need them */
-        r->no_uv_count += gltf_uv_open(&p->uv, r->file, object, p->where, p->position.count, NULL) != STATUS_OK;
-    return status;
+    return status == STATUS_OK ? open_uv(r, object, p) : status;
 }
 
 static void release_primitive(struct primitive *p) {

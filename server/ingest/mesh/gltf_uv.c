@@ -47,11 +47,18 @@ enum status gltf_uv_open(struct gltf_uv *uv, struct gltf_file *g, const cJSON *p
                          size_t vertex_count, struct error *err) {
     const cJSON *use = use_of(g, primitive), *extension = gltf_extension(use, "KHR_texture_transform");
     double set = number_or(cJSON_GetObjectItemCaseSensitive(use, "texCoord"), 0.0);
+    set = number_or(cJSON_GetObjectItemCaseSensitive(extension, "texCoord"), set);
+    enum status status = gltf_uv_open_set(uv, g, primitive, set, where, vertex_count, err);
+    read_transform(extension, uv->transform);
+    return status;
+}
+
+enum status gltf_uv_open_set(struct gltf_uv *uv, struct gltf_file *g, const cJSON *primitive, double set,
+                             const char *where, size_t vertex_count, struct error *err) {
     char key[32];
     size_t accessor;
-    set = number_or(cJSON_GetObjectItemCaseSensitive(extension, "texCoord"), set);
     *uv = (struct gltf_uv){0};
-    read_transform(extension, uv->transform);
+    read_transform(NULL, uv->transform);
     snprintf(key, sizeof key, "TEXCOORD_%d", set >= 0.0 && set <= MAX_SET ? (int)set : 0);
     enum status status = gltf_index(g, cJSON_GetObjectItemCaseSensitive(primitive, "attributes"), key, where,
                                     &g->accessors, &uv->is_there, &accessor, err);

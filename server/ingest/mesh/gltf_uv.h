@@ -18,6 +18,9 @@ struct gltf_uv {
 /* Those of a primitive with `vertex_count` vertices. Fails, with *uv released, where they are damaged. */
 enum status gltf_uv_open(struct gltf_uv *uv, struct gltf_file *g, const cJSON *primitive, const char *where,
                          size_t vertex_count, struct error *err);
+/* The same of TEXCOORD_set, without a transform. */
+enum status gltf_uv_open_set(struct gltf_uv *uv, struct gltf_file *g, const cJSON *primitive, double set,
+                             const char *where, size_t vertex_count, struct error *err);
 void gltf_uv_release(struct gltf_uv *uv);
 
 /* Those of a vertex, from the lower left as struct mesh has them. They must be there. */

@@ -3,6 +3,7 @@
 
 #include <strings.h>
 
+#include "common/mem.h"
 #include "server/ingest/mesh/gltf.h"
 #include "server/ingest/mesh/obj.h"
 #include "server/ingest/path.h"
@@ -37,6 +38,20 @@ enum status mesh_file_read(const char *path, const char *name, size_t triangle_l
                            struct faces_report *report, struct error *err) {
     mesh_reader *read = reader_of(name);
     return (read ? read : ply_read)(path, name, triangle_limit, mesh, report, err);
+}
+
+enum status mesh_file_read_look(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
+                                struct mesh_look *look, struct faces_report *report, struct error *err) {
+    mesh_reader *read = reader_of(name);
+    *look = (struct mesh_look){0};
+    if (read == gltf_read)
+        return gltf_read_look(path, name, triangle_limit, mesh, look, report, err);
+    if (read == obj_read)
+        return obj_read_look(path, name, triangle_limit, mesh, look, report, err);
+    enum status status = ply_read(path, name, triangle_limit, mesh, report, err);
+    mem_free(mesh->object_id);
+    mesh->object_id = NULL;
+    return status;
 }
 
 static void warn_of_place(const char *name, const struct mesh *mesh, const struct faces_report *report,

@@ -9,6 +9,7 @@
 #include "common/mem.h"
 #include "server/ingest/mesh/intern.h"
 #include "server/ingest/mapping.h"
+#include "server/ingest/mesh/obj_look.h"
 #include "server/ingest/mesh/obj_objects.h"
 #include "server/ingest/mesh/positions.h"
 
@@ -32,6 +33,7 @@ struct obj_reader {
     uint32_t (*pair)[2]; /* [pairs.count]; owned */
     size_t pair_capacity;
     struct obj_objects objects;
+    struct mesh_look *look; /* NULL: materials are not read */
     struct error *err;
 };
 
@@ -253,7 +255,7 @@ static enum status read_line(struct obj_reader *r) {
 
 /* --- the mesh ------------------------------------------------------------------------------- */
 
-static void finish(struct obj_reader *r, struct mesh *mesh) {
+static enum status finish(struct obj_reader *r, struct mesh *mesh) {
     if (r->absent_count > 0)
         faces_note(&r->faces->report,
                    "%zu corners of faces name a normal that is not there: it was read without normals",
@@ -271,7 +273,10 @@ static void finish(struct obj_reader *r, struct mesh *mesh) {
         mesh->normal[v] = vec3_make((float)n[0], (float)n[1], (float)n[2]);
     }
     positions_settle(&vertices, mesh);
+    if (r->look)
+        return obj_look_settle(&r->objects, r->name, r->folder, mesh, r->look, &r->faces->report, r->err);
     obj_objects_settle(&r->objects, r->folder, mesh, &r->faces->report);
+    return STATUS_OK;
 }
 
 static enum status check_whole(const struct obj_reader *r) {
@@ -283,13 +288,14 @@ static enum status check_whole(const struct obj_reader *r) {
     return error_hint(r->err, "a mesh of triangles or polygons is needed, not a point cloud or curves");
 }
 
-enum status obj_parse(const void *data, size_t size, const char *name, const char *folder, size_t triangle_limit,
-                      struct mesh *mesh, struct faces_report *report, struct error *err) {
+enum status obj_parse_look(const void *data, size_t size, const char *name, const char *folder, size_t triangle_limit,
+                           struct mesh *mesh, struct mesh_look *look, struct faces_report *report, struct error *err) {
     *mesh = (struct mesh){0};
     if (size > MAX_BYTES)
         return error_set(err, STATUS_LIMIT, "%s is larger than %zu bytes", name, MAX_BYTES);
     struct obj_reader *r = mem_calloc(1, sizeof *r);
-    *r = (struct obj_reader){.name = name, .folder = folder, .data = data, .size = size, .next_line = 1, .err = err};
+    *r = (struct obj_reader){
+        .name = name, .folder = folder, .data = data, .size = size, .next_line = 1, .look = look, .err = err};
     r->faces = faces_new(mesh, name, triangle_limit, true);
     intern_init(&r->pairs);
     obj_objects_init(&r->objects);
@@ -300,8 +306,8 @@ enum status obj_parse(const void *data, size_t size, const char *name, const cha
     if (status == STATUS_OK)
         status = check_whole(r);
     if (status == STATUS_OK)
-        finish(r, mesh);
-    else
+        status = finish(r, mesh);
+    if (status != STATUS_OK)
         mesh_release(mesh);
     if (report)
         *report = r->faces->report;
@@ -316,16 +322,26 @@ enum status obj_parse(const void *data, size_t size, const char *name, const cha
     return status;
 }
 
-enum status obj_read(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
-                     struct faces_report *report, struct error *err) {
+enum status obj_parse(const void *data, size_t size, const char *name, const char *folder, size_t triangle_limit,
+                      struct mesh *mesh, struct faces_report *report, struct error *err) {
+    return obj_parse_look(data, size, name, folder, triangle_limit, mesh, NULL, report, err);
+}
+
+enum status obj_read_look(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
+                          struct mesh_look *look, struct faces_report *report, struct error *err) {
     struct mapping file;
     const char *slash = strrchr(path, '/');
     char *folder = slash ? mem_strndup(path, (size_t)(slash - path)) : mem_strdup(".");
     *mesh = (struct mesh){0};
     enum status status = mapping_open(&file, path, name, "an OBJ file", err);
     if (status == STATUS_OK)
-        status = obj_parse(file.data, file.size, name, folder, triangle_limit, mesh, report, err);
+        status = obj_parse_look(file.data, file.size, name, folder, triangle_limit, mesh, look, report, err);
     mapping_close(&file);
     mem_free(folder);
     return status;
+}
+
+enum status obj_read(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
+                     struct faces_report *report, struct error *err) {
+    return obj_read_look(path, name, triangle_limit, mesh, NULL, report, err);
 }

@@ -1,0 +1,13 @@
+/* obj_look.h -- the materials of an OBJ file: those that usemtl names, in the library of mtllib. */
+#ifndef UNBAKE_INGEST_MESH_OBJ_LOOK_H
+#define UNBAKE_INGEST_MESH_OBJ_LOOK_H
+
+#include "server/ingest/mesh/look.h"
+#include "server/ingest/mesh/obj_objects.h"
+
+/* Turns mesh->object_id, objects of o, into numbers of materials of the look, which are read from the library. A library or
+ * material that is not there is told in the report. `name` is the OBJ file's, for messages. */
+enum status obj_look_settle(const struct obj_objects *o, const char *name, const char *folder, struct mesh *mesh,
+                            struct mesh_look *look, struct faces_report *report, struct error *err);
+
+#endif
