@@ -49,6 +49,9 @@ static const struct setting table[] = {
      "a scene whose mesh and photographs do not fit, as its check found, is refused; or reconstructed all the same"},
     {"gather_samples", SETTING_INT, "rays", 16, 1048576, NULL, "512", "solve",
      "solve: directions from which light is gathered at each point where it is"},
+    {"glb_lights", SETTING_CHOICE, "", 0, 0, "off|on", "off", NULL,
+     "lamps and sun in scene.glb also as lights (KHR_lights_punctual), in candela and lux where luminance is known: for viewers that "
+     "show a room black which its surfaces light"},
     {"glb_textures", SETTING_CHOICE, "", 0, 0, "atlas|input", "atlas", NULL,
      "textures of scene.glb: those of the atlas, or in the mesh's own texture coordinates where bake_uv could make them"},
     {"gloss_passes", SETTING_INT, "", 1, 2, NULL, "2", "solve",

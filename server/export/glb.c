@@ -12,6 +12,8 @@
 #include "common/mem.h"
 #include "common/protocol.h"
 #include "server/export/emission_texture.h"
+#include "server/export/glb_lights.h"
+#include "server/export/glb_material.h"
 #include "server/export/sink.h"
 #include "server/export/upright.h"
 
@@ -49,7 +51,7 @@ struct glb {
     const struct export_input *in;
     const struct parts *parts;
     const struct export_input *shown; /* whose textures it has: the atlas's or those in the input's layout */
-    const float *scales;              /* [segment_count] see emission_texture.h; NULL: no emission pattern */
+    struct glb_look look;
     struct {
         uint64_t offset, length;
         int number;
@@ -58,8 +60,6 @@ struct glb {
     cJSON *root, *accessors, *nodes, *children;
     int accessor_count, node_count;
 };
-
-static bool shows_input_uv(const struct glb *g) { return g->shown != g->in; }
 
 static uint64_t padded(uint64_t length) { return (length + 3) / 4 * 4; }
 
@@ -134,10 +134,10 @@ static void add_pictures(struct glb *g) {
     json_add_int(sampler, "wrapT", WRAP_CLAMP);
     cJSON *textures = cJSON_AddArrayToObject(g->root, "textures");
     add_picture(images, textures, "base_color", g->view[VIEW_BASE_COLOR].number);
-    if (g->scales)
+    if (g->look.scales)
         add_picture(images, textures, "emission", g->view[VIEW_EMISSION].number);
     cJSON *extras = add_object(sampler, "extras");
-    if (!shows_input_uv(g)) /* of the input's layout nobody knows */
+    if (!g->look.has_input_uv) /* of the input's layout nobody knows */
         json_add_int(extras, "clean_mip_level", atlas_clean_level(g->in->atlas->padding));
     json_add_number(extras, "atlas_utilisation", g->shown->atlas->utilisation);
 }
@@ -175,41 +175,6 @@ static void add_mesh(struct glb *g, cJSON *mesh, size_t i, const char *name) {
     json_add_int(primitive, "material", (int64_t)i);
 }
 
-static void add_emission(cJSON *material, cJSON *extensions, rgb emission) {
-    float strength = rgb_max(emission);
-    rgb factor = rgb_scale(emission, 1.0f / strength);
-    add_numbers(material, "emissiveFactor",
-                (float[]){fminf(factor.r, 1.0f), fminf(factor.g, 1.0f), fminf(factor.b, 1.0f)}, 3);
-    json_add_number(add_object(extensions, "KHR_materials_emissive_strength"), "emissiveStrength", (double)strength);
-}
-
-static void add_texture(const struct glb *g, cJSON *parent, const char *key, int number) {
-    cJSON *use = add_object(parent, key);
-    json_add_int(use, "index", number);
-    if (shows_input_uv(g))
-        json_add_int(use, "texCoord", 1);
-}
-
-static void add_material(const struct glb *g, cJSON *material, uint32_t s, const char *name) {
-    const struct materials *m = g->in->materials;
-    bool varies = g->scales && g->scales[s] > 0.0f, emits = rgb_max(m->emission[s]) > 0.0f;
-    json_add_string(material, "name", name);
-    cJSON *model = add_object(material, "pbrMetallicRoughness");
-    add_texture(g, model, "baseColorTexture", 0);
-    json_add_number(model, "metallicFactor", 0.0);
-    json_add_number(model, "roughnessFactor", (double)m->roughness[s]);
-    json_add_bool(material, "doubleSided", !emits);
-    cJSON *extensions = add_object(material, "extensions");
-    double root = sqrt(0.08 * (double)m->specular[s]);
-    json_add_number(add_object(extensions, "KHR_materials_specular"), "specularFactor", root > 0.0 ? 1.0 : 0.0);
-    json_add_number(add_object(extensions, "KHR_materials_ior"), "ior", (1.0 + root) / (1.0 - root));
-    if (emits)
-        add_emission(material, extensions, varies ? rgb_gray(g->scales[s]) : m->emission[s]);
-    if (varies)
-        add_texture(g, material, "emissiveTexture", 1);
-    json_add_number(add_object(material, "extras"), "specular", (double)m->specular[s]);
-}
-
 static cJSON *add_node(struct glb *g, const char *name) {
     cJSON_AddItemToArray(g->children, cJSON_CreateNumber(g->node_count++));
     cJSON *node = append(g->nodes);
@@ -226,7 +191,7 @@ static void add_parts(struct glb *g) {
         const char *own = segments_name(g->in->segments, g->in->mesh, s), *name = own ? own : number;
         snprintf(number, sizeof number, "segment %u", s);
         add_mesh(g, append(meshes), i, name);
-        add_material(g, append(materials), s, name);
+        json_add_string(glb_material(&g->look, s, append(materials)), "name", name);
         cJSON *node = add_node(g, name);
         json_add_int(node, "mesh", (int64_t)i);
         cJSON *extras = add_object(node, "extras");
@@ -267,6 +232,21 @@ static void add_cameras(struct glb *g) {
         cJSON_Delete(cameras);
 }
 
+/* The stand-ins; glTF does not allow an empty array of them. */
+static void add_lights(struct glb *g) {
+    cJSON *lights = cJSON_CreateArray(), *nodes = cJSON_CreateArray(), *node;
+    glb_lights_add(g->in, lights, nodes);
+    while ((node = cJSON_DetachItemFromArray(nodes, 0)) != NULL) {
+        cJSON_AddItemToArray(g->children, cJSON_CreateNumber(g->node_count++));
+        cJSON_AddItemToArray(g->nodes, node);
+    }
+    cJSON_Delete(nodes);
+    if (cJSON_GetArraySize(lights) > 0)
+        json_add(add_object(add_object(g->root, "extensions"), "KHR_lights_punctual"), "lights", lights);
+    else
+        cJSON_Delete(lights);
+}
+
 /* Where the turn puts the mesh's offset. */
 static void add_translation(cJSON *room, const double o[3], vec3 up) {
     double at[3];
@@ -298,9 +278,9 @@ static char *describe(struct glb *g) {
     cJSON *asset = add_object(g->root, "asset");
     json_add_string(asset, "version", "2.0");
     json_add_string(asset, "generator", "unbake " UNBAKE_VERSION);
-    static const char *const used[] = {"KHR_materials_emissive_strength", "KHR_materials_ior",
-                                       "KHR_materials_specular"};
-    json_add(g->root, "extensionsUsed", cJSON_CreateStringArray(used, 3));
+    static const char *const used[] = {"KHR_materials_emissive_strength", "KHR_materials_ior", "KHR_materials_specular",
+                                       "KHR_lights_punctual"};
+    json_add(g->root, "extensionsUsed", cJSON_CreateStringArray(used, g->in->options.glb_has_lights ? 4 : 3));
     json_add_int(append(cJSON_AddArrayToObject(g->root, "buffers")), "byteLength", (int64_t)g->length);
     add_views(g);
     add_pictures(g);
@@ -313,6 +293,8 @@ static char *describe(struct glb *g) {
     add_room(g);
     add_parts(g);
     add_cameras(g);
+    if (g->in->options.glb_has_lights)
+        add_lights(g);
     char *text = json_text(g->root);
     char *whole = mem_printf("%s%*s", text, (int)(padded(strlen(text)) - strlen(text)), "");
     mem_free(text);
@@ -352,7 +334,7 @@ static void put_bytes(const struct glb *g, struct sink *out, const char *base_co
                 sink_u32(out, seams->index[g->parts->order[i]][c] - (uint32_t)part->first_vertex);
     }
     put_picture(g, out, VIEW_BASE_COLOR, base_color);
-    if (g->scales)
+    if (g->look.scales)
         put_picture(g, out, VIEW_EMISSION, emission);
 }
 
@@ -375,7 +357,8 @@ enum status glb_write(const char *path, const struct export_input *input, const 
         return error_set_errno(err, errno, "cannot look at %s", emission);
     const struct export_input *shown = glb_shown(input);
     float *scales = emission_texture_scales(shown);
-    struct glb g = {.in = input, .parts = parts, .shown = shown, .scales = scales};
+    struct glb g = {.in = input, .parts = parts, .shown = shown};
+    g.look = (struct glb_look){input->materials, scales, glb_lights_unit(input), shown != input};
     lay_out(&g, (uint64_t)info.st_size, (uint64_t)emission_info.st_size);
     char *json = describe(&g);
     uint64_t json_length = strlen(json);

@@ -22,6 +22,8 @@
  * TEXCOORD_0 are the atlas's coordinates, TEXCOORD_1 those of the input, where it has some. Textures are those of the
  * atlas, or on request those in the input's own layout, looked up by TEXCOORD_1 (glb_shown).
  *
+ * On request lamps and sun have stand-ins (glb_lights.h).
+ *
  * glTF has no ratified environment light: the extras of node "room" name environment.exr, with the layout of
  * outputs.h in the room's axes. */
 #ifndef UNBAKE_EXPORT_GLB_H

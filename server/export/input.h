@@ -44,8 +44,9 @@ struct export_camera {
 
 /* What the user chose of the files. */
 struct export_options {
-    bool bakes_uv;   /* also writes textures in the input's own texture coordinates, see uv_bake.h */
-    bool glb_has_uv; /* scene.glb shows these, where they could be made */
+    bool bakes_uv;       /* also writes textures in the input's own texture coordinates, see uv_bake.h */
+    bool glb_has_lights; /* scene.glb has stand-ins for lamps and sun, see glb_lights.h */
+    bool glb_has_uv;     /* scene.glb shows these, where they could be made */
 };
 
 /* All borrowed. */

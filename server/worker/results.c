@@ -24,6 +24,7 @@ struct export_input results_so_far(const struct reconstruction *r, const char *t
         .luminance_per_unit = r->luminance_per_unit,
         .sun = {r->sun.is_there, r->sun.direction, r->sun.radius_rad, r->sun.irradiance},
         .options = {.bakes_uv = settings_is(r->settings, "bake_uv", "auto"),
+                    .glb_has_lights = settings_is(r->settings, "glb_lights", "on"),
                     .glb_has_uv = settings_is(r->settings, "glb_textures", "input")},
         .pool = r->pool,
     };

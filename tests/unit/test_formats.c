@@ -224,6 +224,34 @@ static void test_glb(const char *dir, struct export_input *in, const struct part
     mem_free(path);
 }
 
+/* Stand-ins on request: every light has a node below the room, and the emission is in their unit. */
+static void test_lights(const char *dir, struct export_input *in, const struct parts *parts) {
+    struct error err = {0};
+    struct glb g;
+    char *path = file_join(dir, "scene.glb"), *png = file_join(dir, FORMATS_BASE_COLOR);
+    in->options.glb_has_lights = true;
+    in->luminance_per_unit = 50.0;
+    CHECK(glb_write(path, in, parts, png, "/nowhere", &err) == STATUS_OK);
+    read_glb(path, &g);
+    const cJSON *lights = cJSON_GetObjectItem(member(g.json, "extensions", "KHR_lights_punctual"), "lights");
+    const cJSON *children = cJSON_GetObjectItem(item(&g, "nodes", 0.0), "children"), *child;
+    int count = cJSON_GetArraySize(lights), found = 0;
+    cJSON_ArrayForEach(child, children) {
+        const cJSON *use = member(item(&g, "nodes", cJSON_GetNumberValue(child)), "extensions", "KHR_lights_punctual");
+        found += use && number(use, "light") >= 0.0 && number(use, "light") < count;
+    }
+    CHECK_THAT(count == 2 && found == 2, "%d lights, %d nodes", count, found);
+    CHECK(strstr(cJSON_GetStringValue(cJSON_GetArrayItem(cJSON_GetObjectItem(g.json, "extensionsUsed"), 3)), "lights"));
+    const cJSON *extensions = cJSON_GetObjectItem(item(&g, "materials", ROOM_CEILING_EMITTER), "extensions");
+    double strength = number(cJSON_GetObjectItem(extensions, "KHR_materials_emissive_strength"), "emissiveStrength");
+    CHECK_NEAR(strength, 50.0 * (double)rgb_max(in->materials->emission[ROOM_CEILING_EMITTER]), 1e-2);
+    release_glb(&g);
+    in->options.glb_has_lights = false;
+    in->luminance_per_unit = 0.0;
+    mem_free(png);
+    mem_free(path);
+}
+
 static size_t count_lines(const char *text, const char *start) {
     size_t count = 0;
     for (const char *at = text; at; at = strchr(at, '\n'))
@@ -530,6 +558,7 @@ int main(void) {
     CHECK(parts.count == ROOM_OBJECT_COUNT);
     test_glb(dir, &in, &parts);
     test_obj(dir, &in, &parts);
+    test_lights(dir, &in, &parts);
     in.up = (vec3){0.0f, 1.0f, 0.0f};
     CHECK(glb_write(glb, &in, &parts, png, "/nowhere", &err) == STATUS_OK);
     test_round(dir, "scene.obj", &in, &parts);
