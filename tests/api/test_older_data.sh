@@ -21,7 +21,7 @@ for job in 1 2; do
     mv "$folder"/attempt-1/checkpoint/* "$folder/attempt-1/out" "$folder/attempt-1/job.json" "$folder"
     rm -r "$folder/attempt-1"
 done
-sqlite3 "$data/state.db" "DROP TABLE attempts; DROP TABLE usage_months; DROP TABLE remote; DROP TABLE attempt_lines;
+sqlite3 "$data/state.db" "DROP TABLE attempts; DROP TABLE usage_months; DROP TABLE remote; DROP TABLE attempt_lines; DROP TABLE parts;
     DROP INDEX jobs_by_executor; DROP TRIGGER job_labels_of_new; DROP TRIGGER job_labels_of_changed;
     DROP TABLE job_labels; DROP TABLE job_files; DROP INDEX jobs_by_source; ALTER TABLE jobs DROP COLUMN executor;
     ALTER TABLE jobs DROP COLUMN kind; ALTER TABLE jobs DROP COLUMN source_id; ALTER TABLE jobs DROP COLUMN cost;
