@@ -78,14 +78,14 @@ static enum status take_over(const char *data_dir, int64_t job_id, int number, c
     return status;
 }
 
-enum status attempt_folder_begin(const char *data_dir, int64_t job_id, int number, struct error *err) {
+static enum status begin(const char *data_dir, int64_t job_id, int number, bool takes_over, struct error *err) {
     char *dir = layout_attempt(data_dir, job_id, number), *out = layout_out(dir);
     char *checkpoint = layout_checkpoint_folder(dir);
     bool exists = false;
     enum status status = file_make_dirs(out, err);
     if (status == STATUS_OK)
         status = look(checkpoint, &exists, err);
-    if (status == STATUS_OK && !exists)
+    if (status == STATUS_OK && !exists && takes_over)
         status = take_over(data_dir, job_id, number, checkpoint, err);
     if (status == STATUS_OK)
         status = file_make_dirs(checkpoint, err);
@@ -93,6 +93,14 @@ enum status attempt_folder_begin(const char *data_dir, int64_t job_id, int numbe
     mem_free(out);
     mem_free(dir);
     return status;
+}
+
+enum status attempt_folder_begin(const char *data_dir, int64_t job_id, int number, struct error *err) {
+    return begin(data_dir, job_id, number, true, err);
+}
+
+enum status attempt_folder_begin_part(const char *data_dir, int64_t job_id, int number, struct error *err) {
+    return begin(data_dir, job_id, number, false, err);
 }
 
 enum status attempt_folder_with_checkpoint(const char *data_dir, int64_t job_id, char **work_dir, struct error *err) {

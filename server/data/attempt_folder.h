@@ -19,9 +19,10 @@
 #include "common/error.h"
 #include "server/store/store.h"
 
-/* Makes the attempt's folder with all that it begins with, durably. No other attempt of the job may run, unless they are
- * of its parts. */
+/* Makes the attempt's folder with all that it begins with, durably. No other attempt of the job may run. */
 enum status attempt_folder_begin(const char *data_dir, int64_t job_id, int number, struct error *err);
+/* The same for one of a part of a job that is split (store/parts.h): others may run, and it takes nothing of theirs. */
+enum status attempt_folder_begin_part(const char *data_dir, int64_t job_id, int number, struct error *err);
 
 /* Gives the attempt, which has just begun, what earlier ones have left in out/, the newest of each name: as hard links, so
  * that it costs no space and what others read stays; their records of what is done become its own. Its worker judges what

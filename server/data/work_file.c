@@ -77,6 +77,15 @@ enum status work_file_open_scene(const char *data_dir, const char *scene_id, con
     return status;
 }
 
+enum status work_file_open_job_file(const char *data_dir, int64_t job_id, const char *name, int *fd,
+                                    struct error *err) {
+    char *folder = layout_job_files(NULL, job_id), *path = file_join(folder, name);
+    enum status status = open_in(layout_jobs(data_dir), path, fd, err);
+    mem_free(path);
+    mem_free(folder);
+    return status;
+}
+
 enum status work_file_open_checkpoint(const char *data_dir, int64_t job_id, int attempt, const char *name, int *fd,
                                       struct error *err) {
     char *dir = layout_attempt(NULL, job_id, attempt), *folder = layout_checkpoint_folder(dir);

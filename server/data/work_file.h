@@ -16,6 +16,8 @@ enum status work_file_open_log(const char *data_dir, int64_t job_id, int *fd, st
 /* A file of a checked scene. */
 enum status work_file_open_scene(const char *data_dir, const char *scene_id, const char *name, int *fd,
                                  struct error *err);
+/* A file that was sent with a job. */
+enum status work_file_open_job_file(const char *data_dir, int64_t job_id, const char *name, int *fd, struct error *err);
 /* A file in an attempt's folder checkpoint/. */
 enum status work_file_open_checkpoint(const char *data_dir, int64_t job_id, int attempt, const char *name, int *fd,
                                       struct error *err);

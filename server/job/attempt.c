@@ -41,8 +41,10 @@ static enum status find_outputs(struct store *store, int64_t source, char **fold
  * without. A part leaves that where it is. */
 static enum status prepare_folder(const struct attempt *a, const struct scheduler_config *config, const struct job *job,
                                   bool anew, struct error *err) {
+    if (a->part.part > 0)
+        return attempt_folder_begin_part(config->data_dir, job->id, a->number, err);
     enum status status = attempt_folder_begin(config->data_dir, job->id, a->number, err);
-    if (status == STATUS_OK && job->kind != JOB_RECONSTRUCT && !anew && a->part.part == 0)
+    if (status == STATUS_OK && job->kind != JOB_RECONSTRUCT && !anew)
         status = attempt_folder_carry_outputs(config->data_dir, job->id, a->number, err);
     return status;
 }

@@ -106,10 +106,28 @@ static int read_arguments(struct node *n, int argc, char **argv) {
 
 /* --- the attempt ---------------------------------------------------------------------------------- */
 
+static bool is_kind(const cJSON *order, const char *kind) {
+    const char *word = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(order, "kind"));
+    return word && strcmp(word, kind) == 0;
+}
+
+static void replace_text(cJSON *order, const char *key, const char *text) {
+    cJSON_DeleteItemFromObjectCaseSensitive(order, key);
+    json_add_string(order, key, text);
+}
+
 /* Makes the daemon's order one of this machine. */
 static void adapt_order(const struct node *n, cJSON *order) {
-    cJSON_DeleteItemFromObjectCaseSensitive(order, "scene");
-    json_add_string(order, "scene", n->scene.files);
+    static const char *const folders[] = {"outputs", "files"};
+    bool is_render = is_kind(order, "render");
+    if (!is_render)
+        replace_text(order, "scene", n->scene.files);
+    for (size_t i = 0; i < 2 && is_render; i++) { /* as the list of a render's files names them */
+        char *path = file_join(n->scene.files, folders[i]);
+        if (access(path, F_OK) == 0)
+            replace_text(order, folders[i], path);
+        mem_free(path);
+    }
     cJSON_DeleteItemFromObjectCaseSensitive(order, "parts");
     json_add_bool(order, "parts", true);
     if (n->threads > 0) {
@@ -118,11 +136,11 @@ static void adapt_order(const struct node *n, cJSON *order) {
     }
 }
 
-/* Other kinds of jobs read what lies at the daemon's: those stay there. */
+/* What other kinds of jobs read, nodes are not sent. */
 static enum status check_kind(const cJSON *order, struct error *err) {
     const char *kind;
     enum status status = json_string(order, "kind", "the order", "", &kind, err);
-    return status != STATUS_OK || strcmp(kind, "reconstruct") == 0
+    return status != STATUS_OK || is_kind(order, "reconstruct") || is_kind(order, "render")
                ? status
                : error_set(err, STATUS_INPUT, "a job of kind \"%.40s\" cannot run on another machine", kind);
 }

@@ -234,6 +234,9 @@ static enum status pass_on(struct relay *r, struct error *err) {
         (void)json_string(line, "type", "a line", "", &type, NULL);
     if (strcmp(type, "output") == 0 || strcmp(type, "preview") == 0) {
         status = send_output(r, line, &is_passed, err);
+    } else if (strcmp(type, "record") == 0) { /* it may have grown again: then that is told, too */
+        status = send_output(r, line, &is_passed, err);
+        is_passed = false;
     } else if (strcmp(type, "part") == 0) {
         status = send_part(r, line, err);
         is_passed = false;

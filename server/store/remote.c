@@ -150,9 +150,10 @@ static enum status tell_job(struct store *store, int64_t job_id, const char *rea
     enum status status = transition_look(store, job_id, &now, err);
     if (status == STATUS_OK)
         status =
-            sql_run(&store->sql, err, "UPDATE jobs SET revision = revision + 1, reason = ?, hint = '' WHERE id = ?",
+            sql_run(&store->sql, err,
+                    "UPDATE jobs SET revision = revision + 1, reason = ?1, hint = '' WHERE id = ?2 AND reason <> ?1",
                     "ti", reason, job_id);
-    return status == STATUS_OK ? transition_tell(store, &now, reason, "", err) : status;
+    return status == STATUS_OK && sql_changes(&store->sql) > 0 ? transition_tell(store, &now, reason, "", err) : status;
 }
 
 enum status remote_tell_begun(struct store *store, int64_t job_id, struct error *err) {

@@ -2,11 +2,16 @@
 # A render in parts: at once on this machine and as jobs of a site, with a part's worker, a node and the daemon killed in
 # the middle. The pictures and views.json are those of a render in one part.
 set -u
-. tests/api/client.sh "$@"
+. tests/api/site.sh "$@"
 lamp="--set lamp.1.kind=sphere --set lamp.1.position=0,1,0 --set lamp.1.radius=0.3"
 many="$lamp --set cameras=photographs --view all --size 64x48 --spp 200 --set format=both"
 make_room "$work/room" 8
-daemon_start --set threads=2 --set max_running=2 --set small_render_paths=100000 --set max_attempts=3
+flags="--set threads=2 --set max_running=2 --set small_render_paths=100000 --set max_attempts=3"
+daemon_start
+site_make batch ""
+daemon_end TERM
+start() { daemon_start $flags $site_flags --set executors=process,batch; } # shellcheck disable=SC2086
+start
 # shellcheck disable=SC2086
 run 0 submit "$work/room" $tiny --watch
 field_of() { "$build/unbake" show "$1" --json | jq -c "$2"; }
@@ -24,7 +29,7 @@ pid_of() { grep "job $id: attempt $1 runs as process" "$work/log" | sed 's/.*pro
 
 # --- at once on this machine; the worker of one part is killed ---
 # shellcheck disable=SC2086
-run 0 render 1 $many --set parts=3 -q; id=$out
+run 0 render 1 $many --set parts=3 --set executor=process -q; id=$out
 wait_for 60 rendered 2
 [ "$(workers)" -ge 3 ] || fail "its parts do not run at once"
 equal "$(field_of "$id" '[.state, .parts.count]')" '["running",3]' "a job in parts"
@@ -36,5 +41,49 @@ call GET "/v1/jobs/$id/events" -H 'Last-Event-ID: 0'
 has "$(cat "$work/body")" "part 1 of 3 is tried again: killed from outside"
 has "$(cat "$work/body")" "part 3 of 3 is done"
 equal "$(sed -n 's/^data: {"state":"\([a-z]*\)".*/\1/p' "$work/body" | xargs)" "queued running succeeded" "its states"
+equal "$(curl -s "$url/v1/jobs/$id/log" | grep -c 'unbaked worker')" 0 "faults in its log"
+
+# --- as jobs of a site: what they read is fetched, what they have done is known before their end ---
+cp "$work/room/images/1.png" "$work/sky.png"
+sky="--environment $work/sky.png"
+# shellcheck disable=SC2086
+run 0 render 1 $many $sky --set parts=1 -q -o "$work/whole"
+# shellcheck disable=SC2086
+run 0 render 1 $many $sky --set parts=2 --set executor=batch -q; job=$out id=$out
+wait_for 60 rendered 1
+recorded() { [ -s "$data/jobs/$job/attempt-3/out/views.jsonl" ]; }
+wait_for 60 recorded
+kill -KILL "$(node_pid)"
+wait_for 60 test -s "$data/jobs/$id/attempt-4/job.json"
+[ "$(jq .part.done "$data/jobs/$id/attempt-4/job.json")" -ge 1 ] || fail "what the lost part had done is done again"
+wait_for 120 job_is "$id" succeeded
+same "$id" at-site
+[ "$(grep -c "job $id: attempt [0-9]* is lost" "$work/log")" = 1 ] || fail "no attempt, or more than one, was lost"
+equal "$(find "$work/cache" -name '*.use' | wc -l)" 1 "what the cache has of its two parts"
+cat "$work/cache/"*/files/sky.png | cmp - "$work/sky.png" || fail "the cache has no sky"
+
+# --- in both places, and the daemon dies: parts at the site go on without it ---
+# shellcheck disable=SC2086
+run 0 render 1 $many $sky --set parts=4 -q; job=$out id=$out
+wait_for 60 rendered 2
+daemon_end KILL
+start
+wait_for 120 job_is "$id" succeeded
+same "$id" both
+
+# --- a user's wishes are for all parts; what is done stays ---
+# shellcheck disable=SC2086
+run 0 render 1 $many $sky --set parts=4 -q; job=$out id=$out
+wait_for 60 rendered 2
+run 0 pause "$id" -q
+wait_for 60 job_is "$id" paused
+[ -z "$(pgrep -f "unbaked worker $data/jobs/$id/")" ] || fail "a part runs though the job is paused"
+run 0 resume "$id" -q
+wait_for 60 job_is "$id" running
+run 0 cancel "$id" -q
+wait_for 60 job_is "$id" cancelled
+run 0 rm "$id" -q
+[ ! -e "$data/jobs/$id" ] || wait_for 20 test ! -e "$data/jobs/$id"
 daemon_end TERM
+[ $failures = 0 ] || cat "$work/nodes.log"
 finish

@@ -1,4 +1,4 @@
-/* node_files.c -- the files of an attempt that runs elsewhere: its node reads the scene and the checkpoint, and writes
+/* node_files.c -- the files of an attempt that runs elsewhere: its node reads what its job reads, and the checkpoint, and writes
  * checkpoints and outputs.
  *
  * 1. What is read is opened component by component, without symbolic links, below the one folder that is meant.
@@ -14,28 +14,24 @@
 #include "common/protocol.h"
 #include "server/data/attempt_folder.h"
 #include "server/data/layout.h"
-#include "server/data/scene_files.h"
 #include "server/data/work_file.h"
 #include "server/http/file_reply.h"
 #include "server/http/handlers.h"
 #include "server/http/nodes/node.h"
 #include "server/http/nodes/node_body.h"
+#include "server/http/nodes/node_inputs.h"
 #include "server/net/field.h"
 #include "server/transport/problem.h"
 
 /* --- what a node reads ----------------------------------------------------------------------- */
 
-static enum status scene_of(struct api *api, const struct request *r, char id[SCENE_ID_SIZE], struct error *err) {
+/* The job of the attempt; *job needs job_release in any case. */
+static enum status job_of(struct api *api, const struct request *r, struct job *job, struct error *err) {
     struct node_key key;
-    struct job job;
     struct response *refusal = node_key(r, &key); /* it was checked: it is there */
     response_free(refusal);
-    enum status status = store_job_get(api->store, key.key.job_id, &job, err);
-    if (status != STATUS_OK)
-        return status;
-    snprintf(id, SCENE_ID_SIZE, "%s", job.scene_id);
-    job_release(&job);
-    return STATUS_OK;
+    *job = (struct job){0};
+    return store_job_get(api->store, key.key.job_id, job, err);
 }
 
 static struct response *send_file(const struct request *r, enum status status, int fd, const char *thing,
@@ -53,12 +49,16 @@ static struct response *send_file(const struct request *r, enum status status, i
 struct response *node_files_scene(struct api *api, struct request *r) {
     char id[SCENE_ID_SIZE];
     struct error err;
-    cJSON *list;
-    enum status status = scene_of(api, r, id, &err);
+    struct job job;
+    cJSON *list = NULL;
+    enum status status = job_of(api, r, &job, &err);
     if (status == STATUS_OK)
-        status = scene_files_list(api->config.data_dir, id, &list, &err);
-    if (status != STATUS_OK)
+        status = node_inputs_list(api, &job, id, &list, &err);
+    job_release(&job);
+    if (status != STATUS_OK) {
+        cJSON_Delete(list);
         return problem_from(r, &err);
+    }
     cJSON *reply = cJSON_CreateObject();
     json_add_string(reply, "scene_id", id);
     json_add(reply, "files", list);
@@ -66,13 +66,15 @@ struct response *node_files_scene(struct api *api, struct request *r) {
 }
 
 struct response *node_files_scene_get(struct api *api, struct request *r) {
-    char id[SCENE_ID_SIZE], *name = target_rest(&r->target, 5);
+    char *name = target_rest(&r->target, 5);
     struct error err;
+    struct job job;
     int fd = -1;
-    enum status status = scene_of(api, r, id, &err);
+    enum status status = job_of(api, r, &job, &err);
     if (status == STATUS_OK)
-        status = work_file_open_scene(api->config.data_dir, id, name, &fd, &err);
-    struct response *reply = send_file(r, status, fd, id, name, &err);
+        status = node_inputs_open(api, &job, name, &fd, &err);
+    struct response *reply = send_file(r, status, fd, job.scene_id, name, &err);
+    job_release(&job);
     mem_free(name);
     return reply;
 }
