@@ -36,17 +36,25 @@ void folder_close(struct folder *f) {
     pthread_mutex_destroy(&f->scene_mutex);
 }
 
+#define MIB ((uint64_t)1 << 20)
+
 enum status folder_check_room(const struct folder *f, uint64_t keep, uint64_t bytes, struct error *err) {
     uint64_t room;
     enum status status = file_free_bytes(f->dir, &room, err);
     if (status != STATUS_OK || (room >= keep && room - keep >= bytes))
         return status;
-    error_set(err, STATUS_NO_SPACE, "%llu MiB are needed, and of the %llu MiB that are free, %llu MiB are kept free",
-              (unsigned long long)(bytes >> 20), (unsigned long long)(room >> 20), (unsigned long long)(keep >> 20));
-    return error_hint(err, trash_is_busy(f->trash)
-                               ? "what was deleted is still being removed: try again in a moment"
-                               : "delete jobs or scenes that nobody needs; an administrator can lower the options"
-                                 " min_free_mib and admin_free_mib");
+    unsigned long long needed = (bytes + MIB - 1) / MIB, free_mib = room / MIB;
+    if (keep > 0)
+        error_set(err, STATUS_NO_SPACE,
+                  "%llu MiB are needed, and of the %llu MiB that are free, %llu MiB are kept free", needed, free_mib,
+                  (unsigned long long)(keep / MIB));
+    else
+        error_set(err, STATUS_NO_SPACE, "%llu MiB are needed, and %llu MiB are free", needed, free_mib);
+    return error_hint(err, trash_is_busy(f->trash) ? "what was deleted is still being removed: try again in a moment"
+                           : keep > 0
+                               ? "delete jobs or scenes that nobody needs; an administrator can lower the options"
+                                 " min_free_mib and admin_free_mib"
+                               : "delete jobs or scenes that nobody needs");
 }
 
 /* --- the lock ------------------------------------------------------------------------------ */

@@ -296,16 +296,15 @@ static int run(struct node *n) {
 int node_command(int argc, char **argv) {
     struct node n = {.folder = {.lock_fd = -1}, .scene = {.use_fd = -1}};
     sigset_t set;
+    sigemptyset(&set);
+    sigaddset(&set, SIGTERM);
+    sigaddset(&set, SIGINT);
+    sigaddset(&set, SIGUSR1);
+    sigprocmask(SIG_BLOCK, &set, NULL); /* at once: from now on they are heard */
+    signal(SIGPIPE, SIG_IGN);
     int code = read_arguments(&n, argc, argv);
-    if (code < 0) {
-        sigemptyset(&set);
-        sigaddset(&set, SIGTERM);
-        sigaddset(&set, SIGINT);
-        sigaddset(&set, SIGUSR1);
-        sigprocmask(SIG_BLOCK, &set, NULL);
-        signal(SIGPIPE, SIG_IGN);
+    if (code < 0)
         code = run(&n);
-    }
     mem_free(n.token);
     mem_free(n.cache);
     mem_free(n.work);

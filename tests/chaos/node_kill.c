@@ -29,7 +29,7 @@ static int port; /* that nodes are told */
 static struct error err;
 static char binary[512], home_sums[WORKER_OUTPUTS][SHA256_HEX_SIZE];
 static unsigned random_;
-static long kill_count, checkpoint_count; /* of a job that nobody disturbed */
+static long kill_count, taken_count, checkpoint_count; /* the last: of a job that nobody disturbed */
 
 /* The rig's disk, as the HTTP side sees it. */
 static atomic_bool disk_is_full;
@@ -165,7 +165,9 @@ static int follow(struct remote_attempt *a, int parts, double wait_sec, int numb
     bool has_sent = false;
     while (waitpid(a->pid, &status, WNOHANG) == 0) {
         listen_to(a);
-        if (at == 0.0 && parts >= 0 && newest_part(a) >= before + parts)
+        /* Who takes a process's machine before it has claimed anything takes nothing of a job. */
+        bool may_signal = number == SIGKILL || a->row.phase >= REMOTE_CLAIMED;
+        if (at == 0.0 && parts >= 0 && may_signal && newest_part(a) >= before + parts)
             at = clock_sec() + wait_sec;
         if (!has_sent && at > 0.0 && clock_sec() >= at) {
             kill(a->pid, number);
@@ -229,8 +231,22 @@ static void test_undisturbed(void) {
     check_equal(&a);
 }
 
-/* Killed again and again, until a life is long enough. */
+/* The site has taken the attempt's machine: its worker has stopped by itself, not been killed after the time that it has for
+ * a checkpoint, and the attempt is over for whoever is started for it again. */
+static void check_taken_back(const struct remote_attempt *a, int code) {
+    struct remote_attempt again = *a;
+    CHECK_THAT(code == 85 && strcmp(a->row.end.way, "preempted") == 0, "the node ended with %d, %s", code,
+               a->row.end.way);
+    CHECK_THAT(a->row.end.code == 85 || a->row.end.code == 0, "the worker ended with %d",
+               a->row.end.code); /* 0: not begun */
+    again.pid = start_node(a);
+    CHECK(follow(&again, -1, 0.0, 0) == 1);
+    taken_count++;
+}
+
+/* Killed or taken back again and again, until a life is long enough. */
 static void test_kills(int lives) {
+    static const int signals[] = {SIGKILL, SIGKILL, SIGUSR1, SIGTERM};
     struct remote_attempt a = {.lease_sec = LEASE_SEC};
     int64_t job = 0;
     bool is_done = true;
@@ -241,14 +257,19 @@ static void test_kills(int lives) {
         begin(&a, job, 1 + i % 2, ITERATIONS);
         a.pid = start_node(&a);
         bool is_last = of_job + 1 >= LIVES_PER_JOB || i >= lives;
-        int code = follow(&a, is_last ? -1 : (int)draw(5), 1e-3 * draw(150), SIGKILL);
+        int number = signals[draw(4)];
+        int code = follow(&a, is_last ? -1 : (int)draw(5), 1e-3 * draw(150), number);
         is_done = code == 0;
         if (is_done) {
             check_equal(&a);
             continue;
         }
-        CHECK_THAT(code == -SIGKILL, "the node ended with %d", code);
-        kill_count++;
+        if (number == SIGKILL) {
+            CHECK_THAT(code == -SIGKILL, "the node ended with %d", code);
+            kill_count++;
+        } else {
+            check_taken_back(&a, code);
+        }
         lose(&a);
     }
 }
@@ -417,7 +438,7 @@ int main(int argc, char **argv) {
     mem_free(files);
     mem_free(scene);
     mem_free(home);
-    printf("%ld nodes killed\n", kill_count);
+    printf("%ld nodes killed, %ld taken back\n", kill_count, taken_count);
     service_free(rig.api);
     scheduler_free(rig.scheduler);
     store_close(rig.store);
