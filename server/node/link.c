@@ -95,6 +95,10 @@ enum status link_note(struct attempt_link *l, enum status status, const struct r
     return status;
 }
 
+bool link_is_busy(enum status status, const struct reply *reply) {
+    return (status == STATUS_UNAVAILABLE && !reply->is_untrusted) || reply->code == 429;
+}
+
 static double pause_sec(int tries) { return fmin(PAUSE_FIRST_SEC * pow(2.0, tries), PAUSE_MAX_SEC); }
 
 bool link_pause(struct attempt_link *l, int tries) {
@@ -146,9 +150,7 @@ enum status link_claim(struct attempt_link *l, const char *host, int threads, cJ
     reply_init(&reply);
     *order = NULL;
     enum status status = post(l, "claim", body, "order", &reply, &sent, err);
-    for (int tries = 0;
-         (status == STATUS_UNAVAILABLE || status == STATUS_NO_SPACE) && !reply.is_untrusted && link_pause(l, tries);
-         tries++)
+    for (int tries = 0; (status == STATUS_NO_SPACE || link_is_busy(status, &reply)) && link_pause(l, tries); tries++)
         status = post(l, "claim", body, "order", &reply, &sent, err);
     if (status == STATUS_OK) {
         *order = cJSON_DetachItemFromObjectCaseSensitive(reply.json, "order");

@@ -103,6 +103,9 @@ enum status link_note(struct attempt_link *l, enum status status, const struct r
  * answer to a successful request is not JSON with that member. */
 enum status link_whole(const struct attempt_link *l, enum status status, const struct reply *reply, const char *member,
                        struct error *err);
+/* Whether the next try may fare better: the daemon was not reached, or had too much to do at once, as for one of many nodes
+ * that share an address. Not where its certificate is not trusted. */
+bool link_is_busy(enum status status, const struct reply *reply);
 /* Waits before try number `tries`, with beats; false when the link is not open any more. */
 bool link_pause(struct attempt_link *l, int tries);
 

@@ -81,7 +81,7 @@ static enum status run(struct attempt_link *l, struct request_call *call, struct
         if (t->status != STATUS_OK)
             return t->status;
         bool is_again =
-            status == STATUS_UNAVAILABLE ? tries < TRIES_MAX : reply->code == HTTP_NO_SPACE && waits_for_room(l);
+            link_is_busy(status, reply) ? tries < TRIES_MAX : reply->code == HTTP_NO_SPACE && waits_for_room(l);
         if (!is_again || !link_pause(l, tries))
             return status;
     }

@@ -1,5 +1,6 @@
 /* proxy.h -- for long tests: a way to a server that loses what goes over it. One in `one_in` connections is cut, at a random
- * place of what the server answers: that is carried out, and whoever asked does not know. */
+ * place of what the server answers: that is carried out, and whoever asked does not know. One in `one_in_turned` gets 429, as
+ * where an address has too many. */
 #ifndef UNBAKE_TESTS_CHAOS_PROXY_H
 #define UNBAKE_TESTS_CHAOS_PROXY_H
 
@@ -16,9 +17,9 @@
 struct proxy {
     int listener, port, to; /* ports */
     pthread_t thread;
-    unsigned one_in; /* 0: none is cut */
+    unsigned one_in, one_in_turned; /* 0: none */
     atomic_uint random;
-    atomic_long cut_count; /* connections */
+    atomic_long cut_count, turned_count; /* connections */
     atomic_int open_count;
     atomic_bool is_closing;
 };
@@ -78,6 +79,18 @@ static inline void *proxy_serve(void *user) {
     return NULL;
 }
 
+static inline void proxy_turn_away(struct proxy *p, int fd) {
+    static const char reply[] =
+        "HTTP/1.1 429 Too Many Requests\r\nContent-Type: text/plain\r\nConnection: close\r\n\r\nfull\n";
+    char bytes[16384];
+    (void)!recv(fd, bytes, sizeof bytes, 0);
+    (void)!send(fd, reply, sizeof reply - 1, MSG_NOSIGNAL);
+    shutdown(fd, SHUT_WR);
+    (void)!recv(fd, bytes, sizeof bytes, 0);
+    close(fd);
+    atomic_fetch_add(&p->turned_count, 1);
+}
+
 static inline void *proxy_accept(void *user) {
     struct proxy *p = user;
     while (!atomic_load(&p->is_closing)) {
@@ -85,6 +98,10 @@ static inline void *proxy_accept(void *user) {
         int here = poll(&wait, 1, 200) == 1 ? accept4(p->listener, NULL, NULL, SOCK_CLOEXEC) : -1;
         if (here < 0)
             continue;
+        if (p->one_in_turned > 0 && proxy_draw(p, p->one_in_turned) == 0) {
+            proxy_turn_away(p, here);
+            continue;
+        }
         struct proxy_connection *c = calloc(1, sizeof *c);
         struct sockaddr_in to = {
             .sin_family = AF_INET, .sin_port = htons((uint16_t)p->to), .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
