@@ -207,6 +207,24 @@ static enum status complete(struct cached_scene *scene, const char *cache_dir, u
     return status;
 }
 
+/* Makes the folder, and looks whose it is. */
+static enum status make_cache(const char *cache_dir, struct error *err) {
+    struct stat own, above;
+    enum status status = file_make_dirs(cache_dir, err);
+    if (status != STATUS_OK)
+        return status;
+    char *parent = mem_printf("%s/..", cache_dir);
+    if (lstat(cache_dir, &own) != 0 || stat(parent, &above) != 0)
+        status = error_set_errno(err, errno, "cannot look at %s", cache_dir);
+    else if ((above.st_mode & S_IWOTH) && own.st_uid != geteuid() && own.st_uid != 0)
+        status =
+            error_set(err, STATUS_INPUT, "%s belongs to another user (%u), who may have made it to change scenes there",
+                      cache_dir, (unsigned)own.st_uid);
+    mem_free(parent);
+    return status == STATUS_INPUT ? error_hint(err, "--cache DIR (the key cache of the executor's file) names another")
+                                  : status;
+}
+
 /* The scene's two locks and its folder; what an earlier call has locked stays so. */
 static enum status begin(struct cached_scene *scene, const char *use, const char *fetching,
                          const struct scene_source *source, int *fetch_fd, struct error *err) {
@@ -222,7 +240,7 @@ enum status scene_cache_take(struct cached_scene *scene, const char *cache_dir, 
     int fetch_fd = -1;
     *scene = (struct cached_scene){.files = file_join(cache_dir, scene_id), .use_fd = -1};
     char *use = mem_printf("%s" CACHE_USE, scene->files), *fetching = mem_printf("%s" CACHE_FETCH, scene->files);
-    enum status status = file_make_dirs(cache_dir, err);
+    enum status status = make_cache(cache_dir, err);
     if (status == STATUS_OK)
         status = begin(scene, use, fetching, source, &fetch_fd, err);
     while (status == STATUS_NO_SPACE && cache_room_give_up(cache_dir)) /* even a name takes space */

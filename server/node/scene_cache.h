@@ -8,7 +8,9 @@
  *
  * 1. A file has its name only when its digest was right. It is hashed again for every attempt: what is damaged is fetched
  *    again, and replaced by a rename, so that whoever reads it is not disturbed.
- * 2. A scene that is in use is not removed. Where it takes more than its bound, or the disk is full, the cache gives up
+ * 2. In a folder in which everybody may make others (/var/tmp), CACHE is this user's or root's: whoever else made it could
+ *    change scenes after they were hashed, and read them.
+ * 3. A scene that is in use is not removed. Where it takes more than its bound, or the disk is full, the cache gives up
  *    those that have not been used for longest. */
 #ifndef UNBAKE_NODE_SCENE_CACHE_H
 #define UNBAKE_NODE_SCENE_CACHE_H
@@ -36,7 +38,7 @@ struct cached_scene {
 
 /* Makes the scene's files present and right. `list`: [{"name","bytes","sha256"},...] of the daemon. Waits while another
  * fetches it. *scene needs cached_scene_release in any case. STATUS_NO_SPACE: the disk is full, and there is nothing to
- * give up. STATUS_CORRUPT: a file arrives wrong, twice. */
+ * give up. STATUS_CORRUPT: a file arrives wrong, twice. STATUS_INPUT: the folder is another user's. */
 enum status scene_cache_take(struct cached_scene *scene, const char *cache_dir, uint64_t cache_bytes,
                              const char *scene_id, const cJSON *list, const struct scene_source *source,
                              struct error *err);

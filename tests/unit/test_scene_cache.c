@@ -153,6 +153,31 @@ static void test_names(void) {
     }
 }
 
+/* Somebody else has made the cache's folder where everybody may make one. */
+static void test_owner(void) {
+    struct store s = {0};
+    struct cached_scene scene;
+    const struct scene_source source = {.user = &s, .fetch = send_rest, .go_on = go_on};
+    char *open_dir = file_join(dir, "open"), *theirs = file_join(open_dir, "scenes");
+    cJSON *list = cJSON_CreateArray();
+    OK(file_make_dirs(theirs, &err));
+    CHECK(chmod(open_dir, 01777) == 0);
+    OK(scene_cache_take(&scene, theirs, 0, SCENE_A, list, &source, &err));
+    cached_scene_release(&scene);
+    if (chown(theirs, 12345, (gid_t)-1) == 0) { /* root only */
+        CHECK(scene_cache_take(&scene, theirs, 0, SCENE_A, list, &source, &err) == STATUS_INPUT);
+        CHECK_THAT(strstr(err.message, "belongs to another user (12345)"), "%s", err.message);
+        cached_scene_release(&scene);
+        CHECK(chmod(open_dir, 0755) == 0); /* there its owner was trusted to make it */
+        OK(scene_cache_take(&scene, theirs, 0, SCENE_A, list, &source, &err));
+        cached_scene_release(&scene);
+    }
+    OK(file_remove_tree(open_dir, &err));
+    cJSON_Delete(list);
+    mem_free(theirs);
+    mem_free(open_dir);
+}
+
 static void set_age(const char *id, time_t age_sec) {
     char *name = mem_printf("%s/%s" CACHE_USE, dir, id);
     const struct timespec times[2] = {{.tv_sec = time(NULL) - age_sec}, {.tv_sec = time(NULL) - age_sec}};
@@ -225,6 +250,7 @@ int main(void) {
         return 1;
     test_faults();
     test_names();
+    test_owner();
     test_room();
     test_together();
     OK(file_remove_tree(dir, &err));
