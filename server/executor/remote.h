@@ -12,7 +12,8 @@
  *    half of its lease; both by a monotonic clock, which begins anew with the daemon. Then its row is closed, which shuts
  *    its node out, and only after its last writer has left it has ended.
  * 4. What the site has ended for its own reasons (pre-empted, out of time, a broken node), or started again, counts as
- *    pre-empted: the job goes on elsewhere and is not charged.
+ *    pre-empted: the job goes on elsewhere and is not charged. But where its time was up before it had saved anything, the
+ *    next one would fare no better: it waits for help (time_limit.h).
  * 5. A site's job that carries the name of an attempt that is over is cancelled when it is seen.
  * 6. A run outlives the daemon: freed before its end it goes on, and the next daemon resumes it.
  *

@@ -11,6 +11,7 @@
 #include "common/protocol.h"
 #include "server/data/layout.h"
 #include "server/executor/remote_run.h"
+#include "server/executor/time_limit.h"
 #include "server/job/worker_log.h"
 
 #define RETRY_SEC 1.0      /* after a fault of the store */
@@ -210,6 +211,7 @@ static void take_log(const struct remote_run *r) {
 
 static bool remote_ended(struct run *run, struct run_end *end, run_hear *each, void *user) {
     struct remote_run *r = of(run);
+    const struct site *site = r->remote->parts.site;
     if ((!r->has_verdict && r->row.phase != REMOTE_ENDED) || r->is_closed || !close_row(r))
         return false;
     read_lines(r, REMOTE_REPORTS_MAX + 1, each, user);
@@ -221,6 +223,12 @@ static bool remote_ended(struct run *run, struct run_end *end, run_hear *each, v
         read_end(&r->row, end);
     else
         *end = r->verdict;
+    if (end->way == RUN_PREEMPTED && time_limit_is_futile(site, r->remote->parts.data_dir, &r->row)) {
+        end->way = RUN_REFUSED;
+        snprintf(end->reason, sizeof end->reason,
+                 "%s has ended it after %.0f min, its limit (time_min), and it had no checkpoint by then", site->name,
+                 site->time_min);
+    }
     count_end(r->remote, end->way);
     return true;
 }
