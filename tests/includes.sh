@@ -25,7 +25,7 @@ own() {
 }
 
 # The engine, lowest first: each folder includes only those before it (and common).
-engine_order='scene render capture gather state material light refine reconstruct'
+engine_order='scene render capture holes gather state material light refine reconstruct'
 engine="server/($(echo "$engine_order" | tr ' ' '|')|ingest|export)/"
 daemon='http|events|transport|net|uploads|data|store|job|admin|node'
 above=" $engine_order "
@@ -85,10 +85,10 @@ forbid server/worker 'server/(http|events|transport|net|uploads|job)/|server/dat
 # Renders read outputs, as they read anything else, and share with export how pictures look.
 forbid "$(for folder in $engine_order ingest export check; do echo "server/$folder"; done)" 'server/relight/' \
     'only the worker and the tools see relight'
-forbid server/relight "server/(capture|gather|state|material|light|refine|reconstruct|check|$daemon|worker)/" \
+forbid server/relight "server/(capture|holes|gather|state|material|light|refine|reconstruct|check|$daemon|worker)/" \
     'relight sees scene, render, ingest and export'
 forbid "server/demo server/evaluate" "server/($daemon|worker)/" 'tools know only the engine'
-forbid server/demo 'server/(ingest|capture|gather|state|material|light|refine|reconstruct|export|evaluate)/' 'demo sees only render and scene'
+forbid server/demo 'server/(ingest|capture|holes|gather|state|material|light|refine|reconstruct|export|evaluate)/' 'demo sees only render and scene'
 forbid "$(ls -d server/*/ | grep -vE 'demo|evaluate|worker' | tr '\n' ' ')" 'server/(demo|evaluate)/' \
     'only main.c, and of evaluate the worker, sees the tools'
 forbid server/worker 'server/(demo/|evaluate/(evaluate_command|[^e]))' 'the worker sees of the tools evaluate.h'

@@ -43,6 +43,19 @@ static void put_found(struct buf *out, const cJSON *report) {
     buf_puts(out, ".</p>");
 }
 
+/* What was done about the holes of the mesh. */
+static void put_holes(struct buf *out, const cJSON *report) {
+    double filled = number_at(report, "holes", "filled"), kept = number_at(report, "holes", "openings_kept");
+    if (filled > 0.0)
+        buf_printf(
+            out, "<p>%.0f hole%s of the mesh %s filled, %.2g m2, where photographs show that a surface goes on.</p>",
+            filled, filled == 1.0 ? "" : "s", filled == 1.0 ? "was" : "were", number_at(report, "holes", "filled_m2"));
+    if (kept > 0.0)
+        buf_printf(out,
+                   "<p>%.0f opening%s of the mesh, %.2g m2, %s taken for a way out of the room: a window, a door.</p>",
+                   kept, kept == 1.0 ? "" : "s", number_at(report, "holes", "openings_m2"), kept == 1.0 ? "is" : "are");
+}
+
 static void put_views(struct buf *out, const cJSON *report) {
     double views = number_at(report, "metrics", "held_out_views"), psnr = number_at(report, "metrics", "psnr_db");
     double error = number_at(report, "metrics", "msre"), noise = number_at(report, "metrics", "msre_noise_left");
@@ -122,6 +135,7 @@ static void put_weak(struct buf *out, const cJSON *report) {
 void report_verdict(struct buf *out, const cJSON *report) {
     buf_puts(out, "<section class=\"card verdict\" aria-label=\"verdict\">");
     put_found(out, report);
+    put_holes(out, report);
     put_views(out, report);
     put_weak(out, report);
     buf_puts(out, "</section>");

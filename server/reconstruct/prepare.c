@@ -11,6 +11,7 @@
 #include "server/capture/radiance_preview.h"
 #include "server/capture/seen_share.h"
 #include "server/capture/texel_density.h"
+#include "server/holes/holes.h"
 #include "server/light/split.h"
 #include "server/light/sun_seen.h"
 #include "server/reconstruct/calibrate.h"
@@ -150,6 +151,20 @@ static bool split_bright_parts(struct prepare *p) {
     return any;
 }
 
+/* The same again, after mesh or segments changed. */
+static enum status remake_surface(struct prepare *p, const float *density, struct error *err) {
+    struct reconstruction *r = p->r;
+    release_surface(r);
+    mem_free(r->radiance_preview); /* of the former atlas */
+    r->radiance_preview = NULL;
+    enum status status = map_surface(r, density, err);
+    if (status != STATUS_OK)
+        return status;
+    views_update_segments(p->views, r->world.accel, r->pool);
+    prepare_environment(r);
+    return STATUS_OK;
+}
+
 /* Makes the atlas again, with the split segments and a density by visibility. */
 static enum status remap_surface(struct prepare *p, bool has_split, struct error *err) {
     struct reconstruction *r = p->r;
@@ -159,16 +174,9 @@ static enum status remap_surface(struct prepare *p, bool has_split, struct error
     float *density = even ? NULL : mem_array(r->scene->mesh.triangle_count, sizeof *density);
     if (density)
         texel_density_from_views(p->views, &r->atlas, r->pool, density);
-    release_surface(r);
-    mem_free(r->radiance_preview); /* of the former atlas */
-    r->radiance_preview = NULL;
-    enum status status = map_surface(r, density, err);
+    enum status status = remake_surface(p, density, err);
     mem_free(density);
-    if (status != STATUS_OK)
-        return status;
-    views_update_segments(p->views, r->world.accel, r->pool);
-    prepare_environment(r);
-    return STATUS_OK;
+    return status;
 }
 
 static void denoise_mesh(struct prepare *p) {
@@ -258,10 +266,40 @@ static enum status make_surface(struct prepare *p, struct error *err) {
     return status;
 }
 
-/* Calibrates the photographs, and finds what of them is to be trusted and the distant light they show. */
-static void measure_photographs(struct prepare *p) {
+static void report_holes(const struct prepare *p, struct holes_found *found) {
+    cJSON *report = cJSON_AddObjectToObject(p->r->report, "holes");
+    char line[200];
+    json_add_int(report, "filled", (int64_t)found->filled);
+    json_add_number(report, "filled_m2", found->filled_m2);
+    json_add_int(report, "triangles", (int64_t)found->triangles);
+    json_add_int(report, "openings_kept", (int64_t)found->kept);
+    json_add_number(report, "openings_m2", found->kept_m2);
+    json_add(report, "regions", found->list ? found->list : cJSON_CreateArray());
+    snprintf(line, sizeof line, "mesh: %zu holes were filled, %.3g m2; %zu openings are kept, %.3g m2", found->filled,
+             found->filled_m2, found->kept, found->kept_m2);
+    if (found->filled > 0)
+        p->pace->hooks->log(p->pace->hooks->user, line);
+}
+
+/* Fills holes of the mesh, and makes again what was made of it. */
+static enum status fill_holes(struct prepare *p, struct error *err) {
+    struct reconstruction *r = p->r;
+    struct holes_found found;
+    if (settings_is(r->settings, "holes", "keep"))
+        return STATUS_OK;
+    holes_fill(r->scene, &r->segments, p->views, settings_is(r->settings, "holes", "fill"), r->pool, &found);
+    report_holes(p, &found);
+    return found.triangles > 0 ? remake_surface(p, NULL, err) : STATUS_OK;
+}
+
+/* Calibrates the photographs, fills the holes that they show, and finds what of them is to be trusted and the distant
+ * light they show. */
+static enum status measure_photographs(struct prepare *p, struct error *err) {
     struct reconstruction *r = p->r;
     calibrate(r, p->views, p->pace->hooks);
+    enum status status = fill_holes(p, err);
+    if (status != STATUS_OK)
+        return status;
     noise_measure(&r->noise, p->views, r->pool);
     noise_set_black(&r->noise, r->scene);
     clip_mark(r->scene, p->views, &r->noise, r->pool);
@@ -270,6 +308,7 @@ static void measure_photographs(struct prepare *p) {
     sun_seen_take(&r->environment, &r->sun);
     prepare_environment(r);
     advance(p, CALIBRATE_SHARE);
+    return STATUS_OK;
 }
 
 enum status prepare_run(struct reconstruction *r, struct views *views, const struct pace *pace, struct error *err) {
@@ -289,8 +328,9 @@ enum status prepare_run(struct reconstruction *r, struct views *views, const str
         status = show_radiance(p, err);
     if (status != STATUS_OK)
         return status;
-    measure_photographs(p);
-    status = remap_surface(p, split_bright_parts(p), err);
+    status = measure_photographs(p, err);
+    if (status == STATUS_OK)
+        status = remap_surface(p, split_bright_parts(p), err);
     add_prepare_figures(p);
     pace_measure_room(p->pace, r->scene, &r->inverse);
     advance(p, 1.0 - MAP_SHARE - VIEWS_SHARE - CALIBRATE_SHARE);

@@ -13,6 +13,8 @@
 #define MESH_MAX_TRIANGLES ((size_t)1 << 28)
 #define MESH_MAX_COORDINATE_M 1e6f /* beyond it single precision resolves no room */
 
+#define MESH_NO_FACE UINT32_MAX /* -1 in scene.ply */
+
 struct mesh {
     size_t vertex_count;
     vec3 *position; /* [vertex_count] metres; owned */
@@ -20,7 +22,7 @@ struct mesh {
     size_t triangle_count;
     uint32_t (*index)[3]; /* [triangle_count] vertices, counter-clockwise from the front; owned */
     uint32_t *face;       /* [triangle_count] face of the input that the triangle was cut from,
-                              * ascending; owned */
+                              * ascending; MESH_NO_FACE: added since, to fill a hole; owned */
     int64_t *object_id;   /* [triangle_count] the input's object_id, or NULL; owned */
     vec2 (*uv)[3];        /* [triangle_count] the input's own texture coordinates of the corners, from the lower left as
                               * OBJ has them; not finite: the face has none. NULL: no face has any; owned */

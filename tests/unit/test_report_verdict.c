@@ -41,6 +41,10 @@ int main(void) {
     CHECK(says(bad, "2 sources of light in no photograph"));
     CHECK(says(bad, "brightness of 1 source of light cannot be told well: the standard deviation is up to 50 %"));
     CHECK(!says(bad, "No weakness is known"));
+    const char *holes = "{\"holes\": {\"filled\": 2, \"filled_m2\": 3.25, \"openings_kept\": 1, \"openings_m2\": 0.5}}";
+    CHECK(says(holes, "2 holes of the mesh were filled, 3.2 m2"));
+    CHECK(says(holes, "1 opening of the mesh, 0.5 m2, is taken for a way out"));
+    CHECK(!says(good, "of the mesh"));
     CHECK(says("{}", "No photograph was held out"));
     CHECK(!says("{}", "of the surface"));
     return check_result();

@@ -1,0 +1,40 @@
+/* hole_looks.h -- pixels of the training photographs that look through holes or openings of the mesh, and what all others
+ * say of the cells of a grid (hole_grid.h): which they pass, and how bright the mesh is that lies in them. */
+#ifndef UNBAKE_HOLES_HOLE_LOOKS_H
+#define UNBAKE_HOLES_HOLE_LOOKS_H
+
+#include "server/capture/views.h"
+#include "server/holes/hole_grid.h"
+
+/* Of the pixels that are asked for what they pass and what surface they see, along both axes, for time. */
+#define HOLE_PASS_STRIDE 2
+
+/* A pixel whose ray meets no surface and that is not dark. */
+struct hole_look {
+    vec3 direction; /* unit */
+    float value;    /* log radiance */
+    uint32_t train; /* index into views.train; looks are in its order */
+    uint32_t cell;  /* that it is taken to see, or HOLE_NO_CELL */
+    bool is_saturated;
+};
+
+struct hole_looks {
+    const struct views *views; /* borrowed */
+    size_t count;
+    struct hole_look *look; /* [count]; owned */
+};
+
+/* Looks at up to 80,000 pixels of each photograph. Exposures and poses must be known. */
+void hole_looks_take(struct hole_looks *looks, struct hole_grid *grid, const struct views *views,
+                     struct parallel *pool);
+void hole_looks_release(struct hole_looks *looks);
+
+/* Where the camera of a look stands. */
+static inline vec3 hole_look_origin(const struct hole_looks *looks, const struct hole_look *look) {
+    return camera_origin(&looks->views->scene->photograph[looks->views->train[look->train]].camera);
+}
+
+/* Has each look see the nearest cell on its way that is not refused, and adds up what the cells show. */
+void hole_looks_assign(struct hole_looks *looks, struct hole_grid *grid);
+
+#endif
