@@ -100,7 +100,8 @@ static void add_steps(struct hole_steps *steps, const struct hole_grid *grid, co
 static bool decide(const struct hole_region *r, size_t steps) {
     if (r->saturated > MOST_SATURATED)
         return false;
-    double here = fmax(r->here.variance, 1e-9), away = fmax(r->away.variance, 1e-9);
+    double here = fmax(r->here.variance, HOLE_LEAST_VARIANCE);
+    double away = fmax(r->away.variance, HOLE_LEAST_VARIANCE);
     bool can_tell = r->here.freedom >= LEAST_FREEDOM && r->away.freedom >= LEAST_FREEDOM;
     double error = can_tell ? sqrt(2.0 / r->here.freedom + 2.0 / r->away.freedom) : INFINITY;
     bool agrees = here <= HOLE_MOST_VARIANCE * r->beside;

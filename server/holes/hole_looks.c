@@ -11,7 +11,6 @@
 #define LIKE_COSINE 0.7f /* between the normals of a plane and of a surface in it */
 
 #define LEAST_PHOTOGRAPHS 4 /* of a cell whose variance counts */
-#define LEAST_VARIANCE 1e-3 /* of 3 %: exposures and gloss leave as much */
 
 /* What a pixel shows. */
 struct hole_pixel {
@@ -134,7 +133,7 @@ static double variance_of(const struct hole_grid *grid, const struct hole_plane 
     }
     double middle = (double)quantile(variance, count, 0.5);
     mem_free(variance);
-    return fmax(middle, LEAST_VARIANCE);
+    return fmax(middle, HOLE_LEAST_VARIANCE);
 }
 
 void hole_looks_take(struct hole_looks *looks, struct hole_grid *grid, const struct views *views,

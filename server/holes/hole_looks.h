@@ -9,6 +9,9 @@
 /* Of the pixels that are asked for what they pass and what surface they see, along both axes, for time. */
 #define HOLE_PASS_STRIDE 2
 
+/* Least variance of log radiance among photographs that tells anything: of 3 %, which exposures and gloss leave. */
+#define HOLE_LEAST_VARIANCE 1e-3
+
 /* A pixel whose ray meets no surface and that is not dark. */
 struct hole_look {
     vec3 direction; /* unit */
