@@ -177,12 +177,22 @@ static void free_chunks(struct spill *s, size_t goal) {
     }
 }
 
+/* Starts to read a chunk that becomes used, in one piece; the next one as well where the one before is there: readers of
+ * rows come to it. */
+static void read_ahead(const struct spill *s, size_t chunk) {
+    size_t count = chunk > 0 && atomic_load_explicit(&s->state[chunk - 1], memory_order_relaxed) != ABSENT ? 2 : 1;
+    madvise(s->file.base + chunk * CHUNK, count * CHUNK, MADV_WILLNEED); /* no more than advice: it may fail */
+}
+
 void spill_use_file(struct spill *s, const void *at, size_t bytes) {
     size_t first = (size_t)((const char *)at - s->file.base) / CHUNK;
     size_t last = ((size_t)((const char *)at - s->file.base) + (bytes > 0 ? bytes - 1 : 0)) / CHUNK;
     for (size_t i = first; i <= last; i++) {
         if (atomic_load_explicit(&s->state[i], memory_order_relaxed) == USED ||
-            atomic_exchange(&s->state[i], USED) != ABSENT || ++s->chunks <= s->most)
+            atomic_exchange(&s->state[i], USED) != ABSENT)
+            continue;
+        read_ahead(s, i);
+        if (++s->chunks <= s->most)
             continue;
         pthread_mutex_lock(&s->mutex);
         if (s->chunks > s->most)
@@ -326,6 +336,9 @@ static enum status grow_file(struct spill *s, const char *what, uint64_t more, s
     if (mmap(s->file.base + s->reserved, more, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_FIXED, s->fd,
              (off_t)s->reserved) == MAP_FAILED)
         mem_exhausted("the mapping of pixels");
+    /* We say what is read (read_ahead). The kernel reads up to its read_ahead_kb, of some machines 8 MiB, around each
+     * fault, of which a look-up in a photograph wants some rows. */
+    madvise(s->file.base + s->reserved, more, MADV_RANDOM);
     s->reserved += more;
     return STATUS_OK;
 }
