@@ -7,7 +7,8 @@
 #             everything runs. Its figures say little. Otherwise the long form: hours.
 # PAPER_QUALITY  setting quality of a reconstruction (standard; short: draft)
 # PAPER_SEC   longest time limit that "speed" tries (600; short: 5)
-# PAPER_ONLY  some of "fig7 fig8 table1 dense fig5 speed ablations"; dense: Table 1 as a scanner would have it
+# PAPER_ONLY  some of "fig4 fig7 fig8 table1 dense fig5 speed ablations"; dense: Table 1 as a scanner would have it; fig4
+#             takes numpy, OpenEXR and pillow from PyPI into BUILD/retinex
 #
 # usage: paper.sh BUILD
 set -u
@@ -86,6 +87,26 @@ fig7() {
 }
 
 # Fig. 8: everything at once; then, in the long form, 8192 x 8192.
+# Fig. 4: one photograph, that of a held-out view, against a single-image method.
+fig4() {
+    local room=$data/rooms/staircase2 out=$dir/fig4 view=1 frame=014 python=$build/retinex/bin/python
+    if [ ! -e "$room/truth/$frame.exr" ]; then
+        echo "no $room: fig4 is left out" >&2
+        return
+    fi
+    [ -x "$python" ] || python3 -m venv "$build/retinex" >&2
+    "$python" -c 'import numpy, OpenEXR, PIL' 2>/dev/null ||
+        timeout 300 "$build/retinex/bin/pip" install -q numpy==2.4.6 OpenEXR==3.5.3 pillow==13.0.0 >&2
+    if ! "$python" -c 'import numpy, OpenEXR, PIL' 2>/dev/null; then
+        echo "numpy, OpenEXR and pillow are not to be had: fig4 is left out" >&2
+        return
+    fi
+    run "$room" "$out" && rm -rf "$out.view" &&
+        "$build/unbaked" relight "$out" --out "$out.view" --set passes=base_color --set format=exr --set view=$view --quiet &&
+        "$python" tests/bench/retinex.py "$room/images/$frame.exr" "$room/truth/$frame.exr" \
+            "$out.view/00000_base_color.exr" "$dir/single_image.png" >>"$rows"
+}
+
 fig8() {
     local out=$dir/fig8 memory total
     demo_room 15 15 || return
@@ -233,9 +254,9 @@ paths of 8 segments,max_depth=8
 direct light alone,max_depth=2"
 }
 
-for part in ${PAPER_ONLY:-fig7 fig8 table1 dense fig5 speed ablations}; do
+for part in ${PAPER_ONLY:-fig4 fig7 fig8 table1 dense fig5 speed ablations}; do
     case $part in
-    fig7 | fig8 | table1 | dense | fig5 | speed | ablations)
+    fig4 | fig7 | fig8 | table1 | dense | fig5 | speed | ablations)
         echo "== $part ($SECONDS s)" >&2
         "$part"
         ;;

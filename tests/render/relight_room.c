@@ -9,7 +9,8 @@
  * Each is rendered twice of either room, with independent noise: o1, o2 of the recovered one, a, b of the true one. PSNR is
  * that of sRGB pictures at one exposure a lighting, of which the mean square is the mean of (o1 - a) (o2 - b), to which
  * noise adds nothing. The ratio is that of the means of radiance. Prints "what<TAB>value<TAB>goal<TAB>better" and writes
- * DIR/LIGHTING_N_ours.png and _true.png beside each other.
+ * DIR/LIGHTING_N_ours.png and _true.png beside each other, means of two renders, and for comparisons that noise does add
+ * to, single ones: _o1.png, _a.png, _b.png.
  *
  * Options: views=0,3,6 (numbers of held-out views), spp=64 (of each of the four), sky=FILE, remove=NAME, label=TEXT,
  * scan=OUTPUTS (those of a reconstruction of the same room on another mesh: they are compared, under the ball and the sky,
@@ -81,6 +82,22 @@ static enum status write_mean(const struct relight_bench *b, const struct religh
     return status;
 }
 
+/* Single renders: what a and b differ by is noise alone. */
+static enum status write_singles(const struct relight_bench *b, const struct relight_pictures *p, const char *name,
+                                 size_t picture, float exposure, struct error *err) {
+    static const struct {
+        int render;
+        const char *what;
+    } single[] = {{0, "o1"}, {OURS, "a"}, {OURS + 1, "b"}};
+    enum status status = STATUS_OK;
+    for (size_t i = 0; i < sizeof single / sizeof *single && status == STATUS_OK; i++) {
+        char *path = mem_printf("%s/%s_%zu_%s.png", b->dir, name, picture, single[i].what);
+        status = image_write_png(path, &p->render[single[i].render], exposure, err);
+        mem_free(path);
+    }
+    return status;
+}
+
 static enum status read_pictures(char *const out[RENDERS], size_t picture, struct relight_pictures *p,
                                  struct error *err) {
     enum status status = STATUS_OK;
@@ -110,6 +127,10 @@ static void put_row(const char *what, const char *of, const char *label, double 
 }
 
 static void put_rows(struct relight_bench *b, const char *name, const struct relight_sums *sums) {
+    if (!(sums->true_mean > 0.0)) {
+        fprintf(stderr, "%s: none of that light comes into the true room: left out (%s)\n", name, b->label);
+        return;
+    }
     double ratio = sums->ours / sums->true_mean, db = -10.0 * log10(fmax(sums->square / sums->count, 1e-6));
     put_row("PSNR free of render noise, dB", name, b->label, db, GOAL_DB, "higher");
     put_row("factor between the means", name, b->label, fmax(ratio, 1.0 / ratio), GOAL_RATIO, "lower");
@@ -137,6 +158,8 @@ static enum status compare(struct relight_bench *b, const char *name, char *cons
         }
         if (status == STATUS_OK)
             status = write_mean(b, &p, OURS, name, i, exposure, err);
+        if (status == STATUS_OK)
+            status = write_singles(b, &p, name, i, exposure, err);
         release_pictures(&p);
     }
     if (status == STATUS_OK)
