@@ -282,6 +282,20 @@ static void submit_again(struct remote_run *r) {
     }
 }
 
+/* Nothing can be decided yet; whoever waits for the job learns what it waits for. */
+static void tell_silent(struct remote_run *r) {
+    const struct remote *m = r->remote;
+    char reason[192];
+    if (r->is_told_silent || r->row.phase != REMOTE_CLAIMED)
+        return;
+    snprintf(reason, sizeof reason, "%.60s has been silent for %.0f s; %s %s", r->row.host,
+             LEASE_FACTOR * r->row.lease_sec, m->parts.site->name,
+             m->complained ? "does not answer either" : "still has the job");
+    r->is_told_silent = store_remote_trouble(m->parts.store, r->row.job_id, r->row.number, reason, NULL) == STATUS_OK;
+    if (r->is_told_silent)
+        log_warning("job %lld: attempt %d: %s", (long long)r->row.job_id, r->row.number, reason);
+}
+
 static void judge_silent(struct remote_run *r) {
     const char *name = r->remote->parts.site->name, *host = r->row.host[0] ? r->row.host : "its node";
     bool is_claimed = r->row.phase == REMOTE_CLAIMED;
@@ -307,6 +321,8 @@ void remote_judge(struct remote *m) {
             submit_again(r);
         else if (is_silent(r))
             judge_silent(r);
+        if (is_silent(r) && !r->has_verdict)
+            tell_silent(r);
         if (r->has_verdict && r->verdict.way != RUN_REFUSED)
             remote_cancel(r);
     }

@@ -28,6 +28,7 @@ struct remote_run {
     char fault[200];      /* why the last submission failed */
     bool has_verdict;     /* it has ended, as this side judges; `verdict` says how */
     bool is_closed;       /* and nobody writes any more */
+    bool is_told_silent;  /* the job may show that its node is silent */
     bool has_unread;      /* there are lines that are not read yet */
     struct run_end verdict;
 };

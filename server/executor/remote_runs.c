@@ -39,6 +39,9 @@ static void update(struct remote_run *r, const struct remote_row *row) {
     if (row->heard_count != r->row.heard_count) { /* seen later than it was: this side waits longer, never shorter */
         r->heard_at = now_sec(r->remote);
         r->unknown_count = 0;
+        if (r->is_told_silent && row->phase == REMOTE_CLAIMED &&
+            store_remote_trouble(r->remote->parts.store, row->job_id, row->number, "", NULL) == STATUS_OK)
+            r->is_told_silent = false;
     }
     r->has_unread |= row->last_seq > r->row.last_seq || row->phase == REMOTE_ENDED;
     r->row = *row;
@@ -328,6 +331,7 @@ static enum status resume(const struct executor *executor, int64_t job_id, int a
     struct remote_run *r = add_run(m, &row);
     r->tries = 1;
     r->has_unread = true;
+    r->is_told_silent = row.phase == REMOTE_CLAIMED; /* maybe, by the daemon before */
     r->submission = row.phase == REMOTE_SUBMITTING ? SUBMISSION_DOUBTED : SUBMISSION_DONE;
     *run = &r->run;
     return STATUS_OK;

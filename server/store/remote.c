@@ -216,6 +216,21 @@ static enum status enter_wish(struct store *store, void *what, struct error *err
                    "nin", (int)w->wish, w->job_id, w->number);
 }
 
+enum status store_remote_trouble(struct store *store, int64_t job_id, int number, const char *reason,
+                                 struct error *err) {
+    struct remote_row row = {0};
+    enum status status = store_begin(store, err);
+    if (status != STATUS_OK)
+        return status;
+    status = store_fence(store, job_id, number, err);
+    if (status == STATUS_OK)
+        status = remote_row_read(store, job_id, number, &row, err);
+    bool is_told = status == STATUS_OK && row.phase == REMOTE_CLAIMED;
+    if (is_told)
+        status = tell_job(store, job_id, reason, err);
+    return store_end(store, status, is_told ? job_id : STORE_NOTHING_CHANGED, err);
+}
+
 enum status store_remote_wish(struct store *store, int64_t job_id, int number, enum remote_wish wish,
                               struct error *err) {
     struct wished wished = {job_id, number, wish};

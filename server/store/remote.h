@@ -82,6 +82,10 @@ enum status store_remote_submitted(struct store *store, int64_t job_id, int numb
 /* Why it waits; the job shows "waiting in EXECUTOR: REASON" until it is claimed. Without a change nothing is written. */
 enum status store_remote_explain(struct store *store, int64_t job_id, int number, const char *reason,
                                  struct error *err);
+/* What is the matter with one that is claimed, which the job shows; "": nothing any more. Without a change nothing is
+ * written. */
+enum status store_remote_trouble(struct store *store, int64_t job_id, int number, const char *reason,
+                                 struct error *err);
 enum status store_remote_wish(struct store *store, int64_t job_id, int number, enum remote_wish wish,
                               struct error *err);
 enum status store_remote_get(struct store *store, int64_t job_id, int number, struct remote_row *row,
