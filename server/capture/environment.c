@@ -13,7 +13,8 @@ void environment_make_empty(struct environment *e, uint32_t width) {
     *e = (struct environment){0};
     image_init_rgb(&e->map, width, width / 2);
     image_init(&e->confidence, width, width / 2, 2, confidence_channels);
-    e->brightened = rgb_gray(1.0f);
+    for (size_t half = 0; half < ENVIRONMENT_HALVES; half++)
+        e->brightened[half] = rgb_gray(1.0f);
     e->is_bound = mem_calloc((size_t)width * (width / 2), sizeof *e->is_bound);
 }
 
@@ -62,12 +63,14 @@ void environment_update_figures(struct environment *e) {
     mem_free(spread);
 }
 
-void environment_brighten(struct environment *e, rgb factor) {
+void environment_brighten(struct environment *e, const rgb factor[ENVIRONMENT_HALVES]) {
     for (size_t i = 0; i < (size_t)e->map.width * e->map.height; i++) {
+        size_t half = environment_half(environment_direction(e, i % e->map.width, i / e->map.width));
         for (size_t c = 0; c < 3 && e->is_bound[i]; c++)
-            e->map.pixel[3 * i + c] *= (&factor.r)[c];
+            e->map.pixel[3 * i + c] *= (&factor[half].r)[c];
     }
-    e->brightened = rgb_mul(e->brightened, factor);
+    for (size_t half = 0; half < ENVIRONMENT_HALVES; half++)
+        e->brightened[half] = rgb_mul(e->brightened[half], factor[half]);
     fill_sphere(&e->map, &e->confidence);
     environment_update_figures(e);
 }

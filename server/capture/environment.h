@@ -23,18 +23,21 @@
 #define ENVIRONMENT_MIN_WIDTH 64   /* +25 %: no change */
 #define ENVIRONMENT_MAX_WIDTH 2048 /* +25 %: no change */
 
+/* Halves of the sphere, above the horizon and below it: sky and ground are lit differently. */
+#define ENVIRONMENT_HALVES 2
+
 struct environment {
     struct image map;        /* R G B radiance; height = width / 2; no pixels when nothing was seen; owned */
     struct image confidence; /* of the same size: `count` of photographs that show the direction, 0 where it was filled
                               * in, and `spread`, the standard deviation of log radiance among them; owned */
     bool *is_bound;          /* [height][width] all of them saturate there: the map holds a lower bound; NULL after
                               * sun_draw; owned */
-    rgb brightened;          /* factor by which lower bounds were brightened since (light_estimate.h) */
-    size_t photograph_count; /* with open pixels */
-    double seen_share;       /* of the sphere */
-    double saturated_share;  /* of what was seen: directions of which only a lower bound is known */
-    double median_spread;    /* over directions that two photographs or more show */
-    double seen_luminance, luminance; /* means over what was seen and over the sphere */
+    rgb brightened[ENVIRONMENT_HALVES]; /* factors by which lower bounds were since (light_estimate.h) */
+    size_t photograph_count;            /* with open pixels */
+    double seen_share;                  /* of the sphere */
+    double saturated_share;             /* of what was seen: directions of which only a lower bound is known */
+    double median_spread;               /* over directions that two photographs or more show */
+    double seen_luminance, luminance;   /* means over what was seen and over the sphere */
 };
 
 /* A black map of `width` x `width` / 2 of which nothing was seen, and one of the least width. */
@@ -57,8 +60,11 @@ double environment_cell_angle(const struct environment *e, size_t row);
 /* Unit direction of the centre of a pixel of the map. */
 vec3 environment_direction(const struct environment *e, size_t column, size_t row);
 
-/* Multiplies the lower bounds by `factor`, for each channel, and fills in unseen directions again. */
-void environment_brighten(struct environment *e, rgb factor);
+/* The half of a unit direction. */
+static inline size_t environment_half(vec3 direction) { return direction.y < 0.0f; }
+
+/* Multiplies the lower bounds of each half by its factor, for each channel, and fills in unseen directions again. */
+void environment_brighten(struct environment *e, const rgb factor[ENVIRONMENT_HALVES]);
 
 /* Recomputes the means, after filled-in directions changed. */
 void environment_update_figures(struct environment *e);

@@ -30,24 +30,34 @@ static void hand_over_segment(struct reconstruction *r, const struct light_lamp 
     keep_source(r, lamp->kind, segment, radiance, lamp->deviation);
 }
 
+/* Takes the factors of sky and ground over, and what they come to. */
+static void hand_over_sky(struct light_model *m) {
+    struct reconstruction *r = m->r;
+    rgb factor[ENVIRONMENT_HALVES] = {rgb_gray(1.0f), rgb_gray(1.0f)};
+    for (size_t half = 0; half < ENVIRONMENT_HALVES; half++) {
+        const struct light_lamp *lamp = light_model_sky(m, half);
+        if (!lamp)
+            continue;
+        factor[half] = lamp->radiance;
+        keep_source(r, lamp->kind, 0, rgb_scale(factor[half], (float)m->sky.bound_radiance[half]), lamp->deviation);
+    }
+    light_sky_brighten(r, factor);
+    if (r->light.factor_count < ESTIMATED_FACTORS) {
+        r->light.sky_factor[r->light.factor_count] = factor[0];
+        r->light.ground_factor[r->light.factor_count++] = factor[1];
+    }
+}
+
 static void hand_over(struct light_model *m) {
     struct reconstruction *r = m->r;
-    rgb factor = rgb_gray(1.0f);
     r->light.source_count = 0;
     for (size_t i = 0; i < m->lamp_count; i++) {
         const struct light_lamp *lamp = &m->lamp[i];
-        if (lamp->kind == ESTIMATED_SATURATED_SKY) {
-            factor = lamp->radiance;
-            keep_source(r, lamp->kind, 0, rgb_scale(factor, (float)r->environment.seen_luminance), lamp->deviation);
-        }
         for (size_t k = 0; k < lamp->segment_count && lamp->kind != ESTIMATED_SEEN; k++)
             hand_over_segment(r, lamp, lamp->segment[k]);
     }
-    if (!m->sky.estimates_bounds)
-        return;
-    light_sky_brighten(r, factor);
-    if (r->light.factor_count < sizeof r->light.sky_factor / sizeof factor)
-        r->light.sky_factor[r->light.factor_count++] = factor;
+    if (m->sky.estimates_bounds)
+        hand_over_sky(m);
 }
 
 /* --- the whole --------------------------------------------------------------------------------------------- */
@@ -87,16 +97,20 @@ void light_estimate_again(struct reconstruction *r, const struct views *views, c
 bool light_is_estimated(const struct reconstruction *r) { return r->light.source_count > 0; }
 
 void light_restore(struct reconstruction *r) {
+    const struct estimated_light *light = &r->light;
     if (rgb_mean(r->sky_factor) != 1.0f)
-        light_sky_brighten(r, r->sky_factor);
-    for (uint32_t i = 0; i < r->light.factor_count; i++)
-        light_sky_brighten(r, r->light.sky_factor[i]);
+        light_sky_brighten(r, (const rgb[]){r->sky_factor, r->sky_factor});
+    for (uint32_t i = 0; i < light->factor_count; i++) {
+        bool has_ground = !rgb_is_black(light->ground_factor[i]);
+        light_sky_brighten(
+            r, (const rgb[]){light->sky_factor[i], (has_ground ? light->ground_factor : light->sky_factor)[i]});
+    }
 }
 
 /* --- report ------------------------------------------------------------------------------------------------ */
 
 void light_report(const struct reconstruction *r) {
-    static const char *const names[] = {"hidden", "saturated", "saturated_sky", "seen"};
+    static const char *const names[] = {"hidden", "saturated", "saturated_sky", "seen", "saturated_ground"};
     cJSON *list = cJSON_AddArrayToObject(r->report, "lights");
     for (uint32_t i = 0; i < r->light.source_count; i++) {
         const struct estimated_source *s = &r->light.source[i];

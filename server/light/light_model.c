@@ -21,6 +21,11 @@
 /* Lamps that photographs measure: in pixels of their own, and in pixels that mix them with what is beside. */
 #define SEEN_DEVIATION 0.1
 #define MIXED_DEVIATION 0.3
+/* Ground over sky: the mean and the standard deviation of the logarithm of the ratio of their radiances. Ground reflects .2
+ * of what falls on it, houses .3 to .5; overcast sky is a third as bright at the horizon as above, and under a sun the
+ * ground is as bright as the sky. */
+#define GROUND_OVER_SKY 0.4
+#define GROUND_DEVIATION 0.7
 /* Unseen sky about its fill; where nothing is seen, about the room's median radiance; and between neighbouring cells. */
 #define SKY_DEVIATION 0.7
 #define SKY_DEVIATION_ALONE 2.0
@@ -76,10 +81,21 @@ static void add_saturated(struct light_model *m, uint32_t segment) {
         lamp->is_measured[c] = !e->saturated[c];
 }
 
-static void add_sky(struct light_model *m) {
-    rgb by = m->r->environment.brightened;
-    m->lamp[m->lamp_count++] = (struct light_lamp){ESTIMATED_SATURATED_SKY, .radiance = rgb_gray(1.0f),
+static const enum estimated_kind kind_of_half[ENVIRONMENT_HALVES] = {ESTIMATED_SATURATED_SKY,
+                                                                     ESTIMATED_SATURATED_GROUND};
+
+static void add_sky(struct light_model *m, size_t half) {
+    rgb by = m->r->environment.brightened[half];
+    m->lamp[m->lamp_count++] = (struct light_lamp){kind_of_half[half], .radiance = rgb_gray(1.0f),
                                                    .least = rgb_make(1.0f / by.r, 1.0f / by.g, 1.0f / by.b)};
+}
+
+const struct light_lamp *light_model_sky(const struct light_model *m, size_t half) {
+    for (size_t i = 0; i < m->lamp_count; i++) {
+        if (m->lamp[i].kind == kind_of_half[half])
+            return &m->lamp[i];
+    }
+    return NULL;
 }
 
 static void add_hidden(struct light_model *m, uint32_t segment, rgb radiance) {
@@ -158,7 +174,10 @@ void light_model_init(struct light_model *m, struct reconstruction *r, const str
     light_sky_init(&m->sky, &r->environment);
     if (r->environment.map.pixel && r->environment.saturated_share > 0.0 && !r->sky_is_fitted) {
         m->sky.estimates_bounds = true;
-        add_sky(m);
+        for (size_t half = 0; half < ENVIRONMENT_HALVES; half++) {
+            if (m->sky.bound_share[half] > 0.0)
+                add_sky(m, half);
+        }
     }
     if (again)
         choose_again(m);
@@ -213,36 +232,51 @@ static void light_lamp(struct light_model *m, struct light_lamp *lamp) {
     for (size_t k = 0; k < lamp->segment_count; k++)
         segment_light_add(&m->light, m->points.point, m->points.count, lamp->segment[k], SEGMENT_LIGHT_POINTS,
                           lamp->lit);
-    for (size_t i = 0; i < m->points.count && lamp->kind == ESTIMATED_SATURATED_SKY; i++)
-        lamp->lit[i] = m->points.point[i].saturated;
+    for (size_t half = 0; half < ENVIRONMENT_HALVES; half++) {
+        for (size_t i = 0; i < m->points.count && lamp->kind == kind_of_half[half]; i++)
+            lamp->lit[i] = m->points.point[i].saturated[half];
+    }
 }
 
 static void tie(struct light_model *m, size_t a, size_t b, double difference, double deviation) {
     m->tie[m->fit.tie_count++] = (struct joint_tie){a, b, difference, deviation};
 }
 
+/* The half whose seen directions the fill of a half continues: its own, or the other one if none of its own is seen. */
+static size_t half_filled_from(const struct light_model *m, size_t half) {
+    return m->sky.bound_share[half] < 0.0 ? 1 - half : half;
+}
+
 /* The fill continues what is seen: as far as that saturates, the fill is as much brighter as it is. */
 static void add_cell(struct light_model *m, size_t k, const float *lit) {
     const struct environment *e = &m->r->environment;
-    double fill = m->sky.fill[k], part = e->map.pixel ? fmin(fmax(e->saturated_share, 0.0), 1.0) : 0.0;
+    size_t half = half_filled_from(m, light_sky_half(k));
+    const struct light_lamp *bound = light_model_sky(m, half);
+    double fill = m->sky.fill[k], part = bound ? m->sky.bound_share[half] : 0.0;
     double mean = log(fmax(fill, 1e-3 * fmax((double)m->median_radiance, 1e-20)));
     double deviation = SKY_DEVIATION;
     if (!e->map.pixel)
         mean = log(fmax((double)m->median_radiance, 1e-20)), deviation = SKY_DEVIATION_ALONE;
-    bool follows = part > 0.0 && m->lamp_count > 0 && m->lamp[0].kind == ESTIMATED_SATURATED_SKY;
     struct joint_source source = {.mean = mean, .deviation = deviation, .least = -INFINITY, .value = mean};
-    if (follows) {
+    if (bound) {
         source.deviation = deviation / sqrt(fmax(1.0 - part, 0.01));
-        tie(m, m->first_cell + k, m->lamp[0].source, mean, deviation / sqrt(part));
+        tie(m, m->first_cell + k, bound->source, mean, deviation / sqrt(part));
     }
     joint_fit_add(&m->fit, &source, lit);
+}
+
+/* By the radiances of saturated sky and ground. */
+static void tie_ground(struct light_model *m) {
+    const struct light_lamp *sky = light_model_sky(m, 0), *ground = light_model_sky(m, 1);
+    double ratio = GROUND_OVER_SKY * m->sky.bound_radiance[0] / m->sky.bound_radiance[1];
+    if (sky && ground)
+        tie(m, ground->source, sky->source, log(ratio), GROUND_DEVIATION);
 }
 
 static void add_cells(struct light_model *m) {
     float *lit = mem_calloc(m->points.count + 1, sizeof *lit);
     m->first_cell = m->fit.source_count;
     m->has_sky = true;
-    m->fit.tie = m->tie;
     for (size_t k = 0; k < UNSEEN_CELLS; k++) {
         for (size_t i = 0; i < m->points.count; i++)
             lit[i] = m->points.point[i].sky ? m->points.point[i].sky[k] : 0.0f;
@@ -311,6 +345,8 @@ static void make_fit(struct light_model *m) {
         m->lamp[i].source = m->fit.source_count;
         joint_fit_add(&m->fit, &source, m->lamp[i].lit);
     }
+    m->fit.tie = m->tie;
+    tie_ground(m);
     if (any_escapes)
         add_cells(m);
     add_guesses(m);

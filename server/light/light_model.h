@@ -9,12 +9,13 @@
 #define LIGHT_SATURATED_MOST 16 /* lamps of each kind */
 #define LIGHT_HIDDEN_MOST 16
 #define LIGHT_SEEN_MOST 24
-#define LIGHT_LAMPS_MOST (LIGHT_SATURATED_MOST + LIGHT_HIDDEN_MOST + LIGHT_SEEN_MOST + 1)
+#define LIGHT_LAMPS_MOST (LIGHT_SATURATED_MOST + LIGHT_HIDDEN_MOST + LIGHT_SEEN_MOST + ENVIRONMENT_HALVES)
 #define LIGHT_ALIKE_MOST 16 /* segments that are one lamp */
-_Static_assert(LIGHT_SATURATED_MOST *LIGHT_ALIKE_MOST + LIGHT_HIDDEN_MOST + 1 <= ESTIMATED_MOST,
+_Static_assert(LIGHT_SATURATED_MOST *LIGHT_ALIKE_MOST + LIGHT_HIDDEN_MOST + ENVIRONMENT_HALVES <= ESTIMATED_MOST,
                "all lamps and the sky are reported");
 
-/* A segment, several that look alike, or the saturated part of the sky, whose radiance is then a factor of the map's. */
+/* A segment, several that look alike, or the saturated part of sky or ground, whose radiance is then a factor of the
+ * map's. */
 struct light_lamp {
     enum estimated_kind kind;
     size_t segment_count;
@@ -38,11 +39,11 @@ struct light_model {
     struct light_lamp lamp[LIGHT_LAMPS_MOST];
     struct joint_point *joint; /* [points.count] means of the channels; owned */
     struct joint_fit fit;
-    double patches_alike;                   /* so many patches are worth one (joint_alike.h) */
-    bool has_sky;                           /* unseen sky lights the points: */
-    size_t first_cell;                      /* its sources in the fit, UNSEEN_CELLS of them */
-    size_t first_guess;                     /* unseen surfaces: LIGHT_REGIONS factors of their fill */
-    struct joint_tie tie[3 * UNSEEN_CELLS]; /* between them, and with the saturated sky */
+    double patches_alike;                       /* so many patches are worth one (joint_alike.h) */
+    bool has_sky;                               /* unseen sky lights the points: */
+    size_t first_cell;                          /* its sources in the fit, UNSEEN_CELLS of them */
+    size_t first_guess;                         /* unseen surfaces: LIGHT_REGIONS factors of their fill */
+    struct joint_tie tie[3 * UNSEEN_CELLS + 1]; /* between them, with saturated sky and ground, and of these */
 };
 
 /* Chooses the lamps at which photographs saturate, by r->evidence (emitters_observe), and the sky if it does. With
@@ -52,6 +53,9 @@ void light_model_release(struct light_model *m);
 
 /* Whether it has lamps or sky of unknown radiance. */
 bool light_model_has_unknown(const struct light_model *m);
+
+/* The saturated part of a half of the environment; NULL: none. */
+const struct light_lamp *light_model_sky(const struct light_model *m, size_t half);
 
 /* Makes points and fit. The arguments are those of survey_init and light_points_init. */
 void light_model_survey(struct light_model *m, const struct views *views, const struct light_field *field,

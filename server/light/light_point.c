@@ -113,7 +113,7 @@ static void look_at_sky(const struct gathering *g, struct incident *in, struct l
     accel_occluded_many(accel, SKY_RAYS, in->shadow, in->occluded);
     for (size_t i = 0; i < SKY_RAYS; i++) {
         if (!in->occluded[i] && vec3_dot(in->shadow[i].direction, p->at.normal) > 0.0f)
-            light_sky_add_ray(g->sky, in->shadow[i].direction, 1.0f / SKY_RAYS, cell, &p->saturated);
+            light_sky_add_ray(g->sky, in->shadow[i].direction, 1.0f / SKY_RAYS, cell, p->saturated);
     }
     for (size_t k = 0; k < UNSEEN_CELLS; k++)
         p->escaping += cell[k];
@@ -187,14 +187,16 @@ static float **guessed_of(struct light_point *p) { return &p->guessed; }
 /* What the rays of a patch's points found, averaged: few of a point's rays find a window, and noise of a response would
  * make its source too faint (regression dilution). */
 static void average_patch(struct light_point *p, size_t count) {
-    double escaping = 0.0, saturated = 0.0;
+    double escaping = 0.0, saturated[ENVIRONMENT_HALVES] = {0.0};
     for (size_t i = 0; i < count; i++) {
         escaping += (double)p[i].escaping / (double)count;
-        saturated += (double)p[i].saturated / (double)count;
+        for (size_t half = 0; half < ENVIRONMENT_HALVES; half++)
+            saturated[half] += (double)p[i].saturated[half] / (double)count;
     }
     for (size_t i = 0; i < count; i++) {
         p[i].escaping = (float)escaping;
-        p[i].saturated = (float)saturated;
+        for (size_t half = 0; half < ENVIRONMENT_HALVES; half++)
+            p[i].saturated[half] = (float)saturated[half];
     }
     average_arrays(p, count, UNSEEN_CELLS, sky_of);
     average_arrays(p, count, 3 * LIGHT_REGIONS, guessed_of);

@@ -19,7 +19,7 @@ struct light_point {
     float *guessed;      /* [LIGHT_REGIONS][3] the same by surfaces of each region that no photograph shows, which
                                  * `known` goes without; NULL: none; owned, as the next */
     float *sky;          /* [UNSEEN_CELLS] parts of these rays that go to each cell; NULL: none do */
-    float saturated;     /* radiance of a surface of albedo 1 by saturated directions */
+    float saturated[ENVIRONMENT_HALVES]; /* radiance of a surface of albedo 1 by saturated directions */
 };
 
 struct light_points {

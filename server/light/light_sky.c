@@ -14,7 +14,20 @@ size_t light_sky_right(size_t cell) {
     return cell % UNSEEN_COLUMNS + 1 < UNSEEN_COLUMNS ? cell + 1 : cell + 1 - UNSEEN_COLUMNS;
 }
 size_t light_sky_below(size_t cell) {
-    return cell + UNSEEN_COLUMNS < UNSEEN_CELLS ? cell + UNSEEN_COLUMNS : UNSEEN_CELLS;
+    size_t below = cell + UNSEEN_COLUMNS;
+    return below < UNSEEN_CELLS && light_sky_half(below) == light_sky_half(cell) ? below : UNSEEN_CELLS;
+}
+size_t light_sky_half(size_t cell) { return cell / UNSEEN_COLUMNS >= UNSEEN_ROWS / 2; }
+
+/* The corners of a direction; those beyond the horizon are moved to the cells beside it on the direction's side. */
+static struct unseen_corners corners_of(vec3 direction) {
+    struct unseen_corners c = unseen_corners(direction);
+    size_t half = environment_half(direction);
+    for (int k = 0; k < 4; k++) {
+        if (light_sky_half(c.cell[k]) != half)
+            c.cell[k] = half ? c.cell[k] + UNSEEN_COLUMNS : c.cell[k] - UNSEEN_COLUMNS;
+    }
+    return c;
 }
 
 static size_t pixel_count(const struct environment *e) { return (size_t)e->map.width * e->map.height; }
@@ -25,6 +38,11 @@ static float kept_of_fill(const struct light_sky *s, size_t pixel) {
 }
 
 static bool is_seen(const struct environment *e, size_t pixel) { return e->confidence.pixel[2 * pixel] > 0.0f; }
+
+/* Part of the fill near what is seen that follows saturated directions, and is as much brighter as they are. */
+static float follows_bounds(const struct light_sky *s, size_t half) {
+    return s->estimates_bounds ? fmaxf((float)s->bound_share[half], 0.0f) : 0.0f;
+}
 
 static rgb map_rgb(const struct environment *e, size_t pixel) {
     const float *p = e->map.pixel + 3 * pixel;
@@ -38,7 +56,7 @@ static void average_fill(struct light_sky *s) {
     for (size_t i = 0; i < pixel_count(e); i++) {
         size_t row = i / e->map.width;
         double angle = sin(PI * ((double)row + 0.5) / (double)e->map.height);
-        struct unseen_corners c = unseen_corners(environment_direction(e, i % e->map.width, row));
+        struct unseen_corners c = corners_of(environment_direction(e, i % e->map.width, row));
         for (int k = 0; k < 4; k++) {
             double weight = angle * (double)c.weight[k], open = is_seen(e, i) ? 0.0 : weight;
             s->fill[c.cell[k]] += open * (double)rgb_mean(map_rgb(e, i));
@@ -49,6 +67,22 @@ static void average_fill(struct light_sky *s) {
         s->fill[k] = unseen[k] > 0.0 ? s->fill[k] / unseen[k] : 0.0;
 }
 
+static void measure_bounds(struct light_sky *s) {
+    const struct environment *e = s->environment;
+    double seen[ENVIRONMENT_HALVES] = {0.0}, bound[ENVIRONMENT_HALVES] = {0.0};
+    for (size_t i = 0; i < pixel_count(e); i++) {
+        size_t half = environment_half(environment_direction(e, i % e->map.width, i / e->map.width));
+        double angle = is_seen(e, i) ? environment_cell_angle(e, i / e->map.width) : 0.0;
+        seen[half] += angle;
+        bound[half] += e->is_bound[i] ? angle : 0.0;
+        s->bound_radiance[half] += e->is_bound[i] ? angle * (double)rgb_mean(map_rgb(e, i)) : 0.0;
+    }
+    for (size_t half = 0; half < ENVIRONMENT_HALVES; half++) {
+        s->bound_share[half] = seen[half] > 0.0 ? bound[half] / seen[half] : -1.0;
+        s->bound_radiance[half] /= fmax(bound[half], 1e-20);
+    }
+}
+
 void light_sky_init(struct light_sky *s, const struct environment *environment) {
     *s = (struct light_sky){.environment = environment};
     if (!environment->map.pixel)
@@ -56,6 +90,7 @@ void light_sky_init(struct light_sky *s, const struct environment *environment) 
     s->angle = mem_array(pixel_count(environment), sizeof *s->angle);
     fill_angles(&environment->confidence, s->angle);
     average_fill(s);
+    measure_bounds(s);
 }
 
 void light_sky_release(struct light_sky *s) {
@@ -70,7 +105,10 @@ bool light_sky_known(const struct light_sky *s, struct image *map) {
     image_init_rgb(map, e->map.width, e->map.height);
     memcpy(map->pixel, e->map.pixel, 3 * pixel_count(e) * sizeof *map->pixel);
     for (size_t i = 0; i < pixel_count(e); i++) {
-        float kept = !is_seen(e, i) ? kept_of_fill(s, i) : s->estimates_bounds && e->is_bound[i] ? 0.0f : 1.0f;
+        size_t half = environment_half(environment_direction(e, i % e->map.width, i / e->map.width));
+        float kept = s->estimates_bounds && e->is_bound[i] ? 0.0f : 1.0f;
+        if (!is_seen(e, i))
+            kept = kept_of_fill(s, i) * (1.0f - follows_bounds(s, half));
         for (size_t c = 0; c < 3; c++)
             map->pixel[3 * i + c] *= kept;
     }
@@ -78,22 +116,24 @@ bool light_sky_known(const struct light_sky *s, struct image *map) {
 }
 
 void light_sky_add_ray(const struct light_sky *s, vec3 direction, float share, float cell[UNSEEN_CELLS],
-                       float *saturated) {
+                       float saturated[ENVIRONMENT_HALVES]) {
     const struct environment *e = s->environment;
     if (e->map.pixel) {
-        size_t pixel = environment_cell(e, direction);
-        if (is_seen(e, pixel)) {
-            *saturated += s->estimates_bounds && e->is_bound[pixel] ? share * rgb_mean(map_rgb(e, pixel)) : 0.0f;
+        size_t pixel = environment_cell(e, direction), half = environment_half(direction);
+        float kept = kept_of_fill(s, pixel), bound = is_seen(e, pixel) ? 0.0f : kept * follows_bounds(s, half);
+        if (is_seen(e, pixel) && s->estimates_bounds && e->is_bound[pixel])
+            bound = 1.0f;
+        saturated[half] += bound * share * rgb_mean(map_rgb(e, pixel));
+        if (is_seen(e, pixel))
             return;
-        }
-        share *= 1.0f - kept_of_fill(s, pixel);
+        share *= 1.0f - kept;
     }
-    struct unseen_corners c = unseen_corners(direction);
+    struct unseen_corners c = corners_of(direction);
     for (int k = 0; k < 4; k++)
         cell[c.cell[k]] += share * c.weight[k];
 }
 
-void light_sky_brighten(struct reconstruction *r, rgb factor) {
+void light_sky_brighten(struct reconstruction *r, const rgb factor[ENVIRONMENT_HALVES]) {
     environment_brighten(&r->environment, factor);
     world_set_environment(&r->world, &r->environment.map, r->pool);
 }

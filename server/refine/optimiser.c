@@ -48,7 +48,8 @@ static void keep_common(struct optimiser *o) {
     optimiser_keep(o, "emission.adam", o->emission.adam.record, adam_bytes(&o->emission.adam));
     optimiser_keep(o, "emission.evidence", in->evidence, segments * sizeof *in->evidence);
     optimiser_keep(o, "environment.factor", in->sky_factor, sizeof *in->sky_factor);
-    keep_since(o, 3, "light", in->light, sizeof *in->light);
+    keep_since(o, 3, "light", in->light, offsetof(struct estimated_light, ground_factor));
+    keep_since(o, 5, "light.ground", in->light->ground_factor, sizeof in->light->ground_factor);
     keep_since(o, 4, "deviation", m->deviation, texels * sizeof *m->deviation);
     optimiser_keep(o, "sun.irradiance", in->sun_irradiance, sizeof *in->sun_irradiance);
     optimiser_keep(o, "emission.is_emitter", in->is_emitter, segments * sizeof *in->is_emitter);

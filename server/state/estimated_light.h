@@ -11,24 +11,27 @@
 
 /* Sources, at most. */
 #define ESTIMATED_MOST 288
+#define ESTIMATED_FACTORS 4
 
 enum estimated_kind {
-    ESTIMATED_HIDDEN,        /* a segment that no photograph shows */
-    ESTIMATED_SATURATED,     /* a segment at which every photograph saturates */
-    ESTIMATED_SATURATED_SKY, /* the directions at which they do */
-    ESTIMATED_SEEN           /* a segment whose radiance is measured, but for its error */
+    ESTIMATED_HIDDEN,          /* a segment that no photograph shows */
+    ESTIMATED_SATURATED,       /* a segment at which every photograph saturates */
+    ESTIMATED_SATURATED_SKY,   /* the directions above the horizon at which they do */
+    ESTIMATED_SEEN,            /* a segment whose radiance is measured, but for its error */
+    ESTIMATED_SATURATED_GROUND /* the directions below the horizon at which they do */
 };
 
 struct estimated_source {
     uint32_t kind, segment; /* segment: of the first two kinds */
-    rgb radiance;           /* of the sky: the mean */
+    rgb radiance;           /* of sky and ground: the mean */
     float deviation;        /* standard deviation of its logarithm */
 };
 
 struct estimated_light {
     uint32_t source_count, factor_count;
     struct estimated_source source[ESTIMATED_MOST];
-    rgb sky_factor[4]; /* by which solve brightened the saturated sky, one after another */
+    rgb sky_factor[ESTIMATED_FACTORS];    /* by which solve brightened the saturated sky, one after another */
+    rgb ground_factor[ESTIMATED_FACTORS]; /* the same of the ground; 0: as the sky, in checkpoints before format 5 */
 };
 
 #endif

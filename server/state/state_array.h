@@ -9,8 +9,9 @@
  *   1: the present arrays without the following two.
  *   2: adds "plan", the planned and done amounts of each part of the work, and STATE_SURFACE.
  *   3: adds "light", the estimated sources of light.
- *   4: adds "deviation", of base colour. */
-#define STATE_FORMAT 4
+ *   4: adds "deviation", of base colour.
+ *   5: adds "light.ground", by what saturated ground was brightened: before, as the sky was. */
+#define STATE_FORMAT 5
 
 /* Name of an array of eight bytes: a hash of the surface parametrisation. A checkpoint with another one cannot be used
  * (each attempt makes the atlas again, and versions of the program may differ in it). */

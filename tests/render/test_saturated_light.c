@@ -1,5 +1,5 @@
-/* light_estimate.h: a lamp at which every photograph saturates is as bright as what it lights tells, and so is a sky;
- * where some photograph measured them, what they light is not asked. A bar before a white sky that some photographs
+/* light_estimate.h: a lamp at which every photograph saturates is as bright as what it lights tells, and so are sky and
+ * ground; where some photograph measured them, what they light is not asked. A bar before a white sky that some photographs
  * show as white is no lamp. Of lamps that are alike none is brighter than the others. The same for any number of threads. */
 #include "server/state/evidence.h"
 #include "server/state/reconstruction.h"
@@ -79,11 +79,12 @@ static void test_polished_wood(struct parallel *pool) {
 
 static vec3 look_at_window(int frame) { return (vec3){1.0f + 2.0f * fmodf((float)frame * 0.618f, 1.0f), 2.0f, 0.0f}; }
 
-/* Mean of the map where photographs look out. */
-static float seen_sky(const struct environment *e) {
+/* Mean of the map where photographs look out, above the horizon or below. */
+static float seen_sky(const struct environment *e, size_t half) {
     float sum = 0.0f, count = 0.0f;
     for (size_t i = 0; i < (size_t)e->map.width * e->map.height; i++) {
-        if (e->confidence.pixel[2 * i] == 0.0f)
+        vec3 direction = environment_direction(e, i % e->map.width, i / e->map.width);
+        if (e->confidence.pixel[2 * i] == 0.0f || environment_half(direction) != half)
             continue;
         sum += e->map.pixel[3 * i];
         count += 1.0f;
@@ -109,22 +110,28 @@ static void check_resumes(struct scene *scene, const struct reconstruction *whol
     settings_release(&s);
 }
 
-static void test_sky(struct parallel *pool) {
+/* Sky and ground of these radiances, through a window. */
+static void test_sky(struct parallel *pool, float above, float below) {
     struct scene scene = {0};
     struct image sky;
     make_mesh_with_window(&scene.mesh);
     image_init_rgb(&sky, 64, 32);
     for (size_t i = 0; i < 3 * 64 * 32; i++)
-        sky.pixel[i] = SKY_RADIANCE;
+        sky.pixel[i] = i < 3 * 64 * 16 ? above : below;
     photograph_mesh(&scene, rgb_gray(0.0f), &sky, look_anywhere, pool);
     saturate(&scene, CLIP);
     struct reconstruction r;
     shell_solve(&scene, 0, &r);
-    CHECK_NEAR(seen_sky(&r.environment), SKY_RADIANCE, 0.15f * SKY_RADIANCE);
+    float sky_found = seen_sky(&r.environment, 0), ground_found = seen_sky(&r.environment, 1);
+    printf("sky of %g, ground of %g: %.2f, %.2f\n", (double)above, (double)below, (double)sky_found,
+           (double)ground_found);
+    CHECK_NEAR(sky_found, above, 0.15f * above);
+    CHECK_NEAR(ground_found, below, 0.3f * below);
     for (size_t s = 0; s < r.segments.count; s++)
         CHECK_THAT(!r.is_emitter[s], "segment %zu", s);
     check_floor(&r, 0.15f); /* the sky beside what is seen is a guess as well */
-    check_resumes(&scene, &r);
+    if (above != below)
+        check_resumes(&scene, &r);
     reconstruct_release(&r);
     image_release(&sky);
     scene_release(&scene);
@@ -207,7 +214,8 @@ int main(void) {
     scene_release(&scene);
     if (!IS_BRIEF) {
         test_polished_wood(pool);
-        test_sky(pool);
+        test_sky(pool, SKY_RADIANCE, SKY_RADIANCE);
+        test_sky(pool, SKY_RADIANCE, 3.0f);
         test_pair(pool);
         test_bar(pool);
     }
