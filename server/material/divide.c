@@ -3,9 +3,11 @@
 
 #include <float.h>
 #include <math.h>
+#include <string.h>
 
 #include "common/image.h"
 #include "common/mem.h"
+#include "common/quantile.h"
 #include "server/capture/best.h"
 #include "server/gather/highlight.h"
 #include "server/material/color_prior.h"
@@ -31,6 +33,8 @@
 /* Base colour assumed for the noise weights. With a texel's own, bright texels would outweigh dark ones wherever
  * neighbours are averaged, and dark tiles between white joints would turn grey. */
 #define TYPICAL_BASE_COLOR 0.5f /* +25 %: +0.02 dB */
+/* Base colour of white paint: of a texel that saturates it lies between its lower bound and this. */
+#define WHITE_BASE_COLOR 0.85f
 /* Lower bounds of Lambert radiance, parts of the median radiance: of the divisor, and for use by detail.h. */
 #define MIN_LAMBERT 1e-4f        /* +25 %: no change */
 #define MIN_LAMBERT_DETAIL 1e-3f /* +25 %: no change */
@@ -87,7 +91,7 @@ struct divide_candidate {
     struct view view;
     rgb observed, unit_diffuse;
     float weight, mixing;
-    bool sharp;
+    bool sharp, saturated[3]; /* by channel: `observed` is a lower bound */
 };
 
 /* The photographs of a texel with the greatest weights. */
@@ -97,7 +101,11 @@ struct divide_candidates {
     struct divide_candidate candidate[MEASURED_OBSERVATIONS];
 };
 
-/* Adds photograph `train` of the texel if it has a valid sample there and is among the best. */
+static bool is_saturated(const struct divide_candidate *c) {
+    return c->saturated[0] || c->saturated[1] || c->saturated[2];
+}
+
+/* Adds photograph `train` of the texel if it has a sample there and is among the best. */
 static void add_candidate(const struct divide *d, uint32_t segment, const struct surface_point *at,
                           const struct irradiance *light, uint32_t train, struct divide_candidates *of) {
     const struct photograph *photo = photograph_of(d, train);
@@ -111,12 +119,12 @@ static void add_candidate(const struct divide *d, uint32_t segment, const struct
     /* An upper bound of the weight: edges and mixing only lower it. Saves the visibility ray. */
     if (!best_takes(&of->best, c.view.weight * noise_weight(d->noise, d->views, &c.view, typical, 0.0f), train) ||
         !views_unoccluded(d->views, train, at->position, at->normal) ||
-        photograph_has_firefly(photo, c.view.x, c.view.y) || !photograph_sample(photo, c.view.x, c.view.y, &s) ||
-        photograph_sample_saturates(&s))
+        photograph_has_firefly(photo, c.view.x, c.view.y) || !photograph_sample(photo, c.view.x, c.view.y, &s))
         return;
     c.observed = s.radiance;
+    memcpy(c.saturated, s.saturated, sizeof c.saturated);
     c.mixing = views_mixing(d->views, &c.view, at->triangle, c.observed);
-    c.sharp = sharpen(d, &c.view, at->triangle, &c.observed);
+    c.sharp = !is_saturated(&c) && sharpen(d, &c.view, at->triangle, &c.observed);
     float times_typical = rgb_mean(c.observed) / fmaxf(rgb_mean(typical), MIN_LAMBERT * d->views->median_radiance);
     c.weight = c.view.weight * views_trust(d->views, &c.view, at->triangle) *
                noise_weight(d->noise, d->views, &c.view, typical, c.mixing * times_typical * times_typical);
@@ -157,6 +165,46 @@ static struct robust_sample observation_of(const struct divide *d, uint32_t texe
                                   .mixing = c->mixing * rgb_dot(base, base)};
 }
 
+/* Base colour of a surface that is at least as bright as an observation says: the middle of the range up to white. */
+static struct robust_sample above_bound(struct robust_sample sample, const bool saturated[3]) {
+    for (int c = 0; c < 3; c++) {
+        float *value = &(&sample.value.r)[c];
+        if (saturated[c])
+            *value = sqrtf(fmaxf(*value, 0.0f) * fmaxf(*value, WHITE_BASE_COLOR));
+    }
+    return sample;
+}
+
+/* Whether most of the looks at a texel say no more than a lower bound, by the median of their brightness. */
+static bool is_bound(const struct divide_candidates *of, const struct measured_observations *observations) {
+    struct bounded gray[MEASURED_OBSERVATIONS];
+    float median;
+    bool any = false;
+    for (size_t i = 0; i < observations->count; i++) {
+        gray[i] = (struct bounded){observations->observation[i].gray, is_saturated(&of->candidate[i])};
+        any = any || gray[i].is_bound;
+    }
+    return any && !quantile_bounded_median(gray, observations->count, &median);
+}
+
+/* Leaves out the observations that saturate. But if the median is a lower bound those that do not are what noise or a
+ * shadow has left below, and would say that white is grey: then only the greatest bound is kept. */
+static void settle_bounds(const struct divide_candidates *of, struct measured_observations *observations) {
+    bool bound = is_bound(of, observations);
+    struct robust_sample *observation = observations->observation, greatest = {.gray = -INFINITY};
+    size_t kept = 0, count = observations->count;
+    for (size_t i = 0; i < count; i++) {
+        const struct divide_candidate *c = &of->candidate[i];
+        if (bound && is_saturated(c) && observation[i].gray > greatest.gray)
+            greatest = above_bound(observation[i], c->saturated);
+        else if (!bound && !is_saturated(c))
+            observation[kept++] = observation[i];
+    }
+    if (bound)
+        observation[kept++] = greatest;
+    observations->count = kept;
+}
+
 static void observe_all(const struct divide *d, uint32_t texel, struct incident *scratch, struct irradiance *light,
                         struct measured_observations *observations) {
     struct surface_point at;
@@ -170,6 +218,7 @@ static void observe_all(const struct divide *d, uint32_t texel, struct incident 
     for (; observations->count < candidates.best.count; observations->count++)
         observations->observation[observations->count] =
             observation_of(d, texel, &at, &candidates.candidate[observations->count], scratch);
+    settle_bounds(&candidates, observations);
 }
 
 rgb divide_color(const struct divide *d, uint32_t texel) {
@@ -250,7 +299,7 @@ static void diffuse_texel(const void *user, uint32_t texel) {
     const struct diffuse_job *job = user;
     const struct measured *m = &job->divide->measured[texel];
     rgb lambert;
-    if (source_texel(job->divide, texel) != texel || !(m->weight > 0.0f) ||
+    if (source_texel(job->divide, texel) != texel || !(m->weight > 0.0f) || job->divide->fused->is_bound[texel] ||
         !divide_lambert(job->divide, texel, &lambert))
         return;
     job->diffuse->count[texel] = m->weight;

@@ -1,6 +1,7 @@
 /* divide.h: base colour in closed form. A plane under light from one direction, photographed from many: what each shows is
  * base colour times the reflection model, and that base colour comes back, whatever exposure, gain and vignette a
- * photograph has; saturated and masked pixels do not tell; the error that the probes share is in the texel's noise;
+ * photograph has; saturated and masked pixels do not tell, unless
+ * most saturate: then no less is told than their lower bound; the error that the probes share is in the texel's noise;
  * what is sent out, and what white paint would show, follow. */
 #include "server/material/divide.h"
 #include "server/render/bsdf.h"
@@ -39,7 +40,9 @@ static void expose(struct photograph *photo, float exposure, rgb gain) {
     }
 }
 
-enum faults { NONE, EXPOSED, SATURATED, MASKED };
+static rgb paint_dark(void *user, vec3 place) { return rgb_scale(paint(user, place), 0.5f); }
+
+enum faults { NONE, EXPOSED, BRACKETED, MOSTLY_SATURATED, SATURATED, MASKED };
 
 static void photograph_plane(struct plane_rig *rig, enum faults faults) {
     static uint8_t mask[PLANE_PIXELS * PLANE_PIXELS]; /* all 0: nothing may be used */
@@ -48,7 +51,13 @@ static void photograph_plane(struct plane_rig *rig, enum faults faults) {
     for (int i = 0; i < PHOTOGRAPHS; i++) {
         float turn = 2.4f * (float)i, slant = 1.1f * (float)i / PHOTOGRAPHS;
         vec3 from = {3.0f * sinf(slant) * cosf(turn), 3.0f * sinf(slant) * sinf(turn), 3.0f * cosf(slant)};
-        struct photograph *photo = plane_rig_add(rig, from, (vec3){0.1f, 0.1f, 0.0f}, 0.05f, paint, &from);
+        /* Three of four saturate: of those that are exposed longer at half of what is there. */
+        bool saturates = (faults == BRACKETED || faults == MOSTLY_SATURATED) && i % 4 != 0;
+        bool is_dark = faults == BRACKETED ? saturates : faults == MOSTLY_SATURATED && !saturates;
+        struct photograph *photo =
+            plane_rig_add(rig, from, (vec3){0.1f, 0.1f, 0.0f}, 0.05f, is_dark ? paint_dark : paint, &from);
+        if (saturates)
+            photo->is_hdr = false, photo->clip = image_float_from_half(photo->pixel[0][2]) * 0.5f; /* blue alone */
         if (faults == EXPOSED)
             expose(photo, ldexpf(1.0f, i % 5 - 3), rgb_make(1.3f, 1.0f, 0.8f - 0.1f * (float)(i % 2)));
         if (faults < SATURATED)
@@ -97,6 +106,26 @@ static void test_base_color(enum faults faults) {
     plane_rig_release(&rig);
 }
 
+/* Three of four photographs count as saturated in blue; the others show half of all. */
+static void test_bound(void) {
+    struct plane_rig rig;
+    struct probes probes;
+    float typical;
+    photograph_plane(&rig, MOSTLY_SATURATED);
+    probes_init(&probes, 8, &rig.scene.mesh, &rig.r.atlas, &rig.r.inverse, &rig.r.fused);
+    for (size_t i = 0; i < probes.count; i++)
+        irradiance_add(&probes.probe[i].light, (vec3){0, 0, 1}, to_light(), flux);
+    struct divide divide;
+    rgb found = measured_value(plane_rig_divide(&rig, &probes, &typical, &divide));
+    CHECK_NEAR(found.r, base_color.r, 0.01f * base_color.r);
+    CHECK_NEAR(found.g, base_color.g, 0.01f * base_color.g);
+    float middle = sqrtf(base_color.b * 0.85f); /* of the range from the bound, which is what is stored, to white */
+    CHECK_NEAR(found.b, middle, 0.05f * middle);
+    mem_free(divide.measured);
+    probes_release(&probes);
+    plane_rig_release(&rig);
+}
+
 /* Of an emitter, or in the dark, nothing is measured that is no number. */
 static void test_nothing(void) {
     struct plane_rig rig;
@@ -120,8 +149,10 @@ static void test_nothing(void) {
 int main(void) {
     test_base_color(NONE);
     test_base_color(EXPOSED);
+    test_base_color(BRACKETED);
     test_base_color(SATURATED);
     test_base_color(MASKED);
+    test_bound();
     test_nothing();
     return check_result();
 }
