@@ -114,9 +114,12 @@ void light_report(const struct reconstruction *r) {
     cJSON *list = cJSON_AddArrayToObject(r->report, "lights");
     for (uint32_t i = 0; i < r->light.source_count; i++) {
         const struct estimated_source *s = &r->light.source[i];
+        bool is_segment = s->kind == ESTIMATED_HIDDEN || s->kind == ESTIMATED_SATURATED;
+        if (is_segment && !r->is_emitter[s->segment])
+            continue;
         cJSON *entry = cJSON_CreateObject();
         json_add_string(entry, "kind", names[s->kind]);
-        if (s->kind == ESTIMATED_HIDDEN || s->kind == ESTIMATED_SATURATED) {
+        if (is_segment) {
             json_add_int(entry, "segment", (int64_t)s->segment);
             json_add_int(entry, "object_id", r->segments.id[s->segment]);
         }

@@ -25,7 +25,8 @@ bool light_is_estimated(const struct reconstruction *r);
 /* After a resume: makes the environment what it was at the checkpoint. */
 void light_restore(struct reconstruction *r);
 
-/* Adds the sources and their deviations to the report ("lights"). */
+/* Adds the sources and their deviations to the report ("lights"); of segments those that are emitters: of white surfaces
+ * that saturate, solve finds that they are none. */
 void light_report(const struct reconstruction *r);
 
 #endif
