@@ -107,6 +107,12 @@ $(B)/embed/page.c: server/web Makefile
 	  echo 'const struct embedded_file embedded_page[] = {'; \
 	  for n in $$names; do s=$$(symbols "$$n"); \
 	    echo "    {\"$$n\", embedded_$$s, &embedded_$${s}_size},"; done; echo '    {0}};'; } > $@
+# What tells a daemon and a node apart that were built from other sources; declared in common/source_digest.h.
+SOURCES = $(sort $(COMMON_SRC) $(SERVER_SRC) $(wildcard common/*.h server/*.h server/*/*.h server/*/*/*.h))
+$(B)/embed/source_digest.c: $(SOURCES)
+	@mkdir -p $(@D)
+	@{ printf '#include "common/protocol.h"\n#include "common/source_digest.h"\n'; \
+	   printf 'const char source_version[] = UNBAKE_VERSION " (sources %.16s)";\n' "$$(cat $(SOURCES) | sha256sum)"; } > $@
 $(B)/obj/embed/%.o: $(B)/embed/%.c
 	@mkdir -p $(@D)
 	$(CC) $(ALL_CFLAGS) -MMD -MP -c -o $@ $<
@@ -114,7 +120,7 @@ $(B)/obj/embed/%.o: $(B)/embed/%.c
 $(B)/libcommon.a: $(call obj,$(COMMON_SRC))
 	@rm -f $@
 	ar rcs $@ $^
-$(B)/libserver.a: $(call obj,$(SERVER_LIB_SRC)) $(patsubst %,$(B)/obj/embed/%.o,$(EMBEDDED) three.module.js page)
+$(B)/libserver.a: $(call obj,$(SERVER_LIB_SRC)) $(patsubst %,$(B)/obj/embed/%.o,$(EMBEDDED) three.module.js page source_digest)
 	@rm -f $@
 	ar rcs $@ $^
 $(B)/libclient.a: $(call obj,$(CLIENT_LIB_SRC))

@@ -18,7 +18,7 @@
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
-#include "common/protocol.h"
+#include "common/source_digest.h"
 #include "server/admin/admin.h"
 #include "server/commands.h"
 #include "server/daemon_options.h"
@@ -38,7 +38,7 @@
 static void print_version(void) {
     struct library list[LIBRARY_COUNT];
     libraries_list(list);
-    printf("unbaked %s\n", UNBAKE_VERSION);
+    printf("unbaked %s\n", source_version);
     for (size_t i = 0; i < LIBRARY_COUNT; i++)
         printf("%s %s\n", list[i].name, list[i].version);
 }
@@ -222,7 +222,7 @@ static void prepare_signals(void) {
 
 static void log_start(const struct daemon *d) {
     char *text = libraries_text();
-    log_info("unbaked %s (%s)", UNBAKE_VERSION, text);
+    log_info("unbaked %s, %s", source_version, text);
     log_info("data folder %s", d->config->data_dir);
     mem_free(text);
 }

@@ -11,8 +11,8 @@
 #include "common/file.h"
 #include "common/json.h"
 #include "common/mem.h"
-#include "common/protocol.h"
 #include "common/request.h"
+#include "common/source_digest.h"
 #include "server/executor/command.h"
 #include "server/executor/listed.h"
 
@@ -65,7 +65,7 @@ enum status probe_run(const struct node_probe *probe, struct error *err) {
     gethostname(host, sizeof host - 1);
     cJSON *said = cJSON_CreateObject();
     json_add_string(said, "host", host);
-    json_add_string(said, "version", UNBAKE_VERSION);
+    json_add_string(said, "version", source_version);
     json_add_int(said, "unix_ms", clock_unix_ms());
     json_add_string(said, "url_error", status == STATUS_OK ? "" : why.message);
     char *text = json_text(said);
@@ -212,8 +212,8 @@ static void try_shared(struct attempt_at *t, const char *file) {
     (void)json_number(probe, "unix_ms", "probe", 0.0, &unix_ms, NULL);
     struct stat info;
     double apart = stat(file, &info) == 0 ? 1e-3 * unix_ms - (double)info.st_mtim.tv_sec : 0.0;
-    snprintf(text, sizeof text, "%s wrote to it; its unbaked is %s, here it is %s", host, version, UNBAKE_VERSION);
-    say(t, strcmp(version, UNBAKE_VERSION) == 0, "shared", text);
+    snprintf(text, sizeof text, "%s wrote to it; its unbaked is %s, here it is %s", host, version, source_version);
+    say(t, strcmp(version, source_version) == 0, "shared", text);
     snprintf(text, sizeof text, "the clock of %s and that of the folder are %.1f s apart", host, apart);
     say(t, apart < CLOCK_SEC && apart > -CLOCK_SEC, "clocks", text);
     snprintf(text, sizeof text, *url_error ? "%.60s: %.180s" : "%.60s reaches %.180s", host,

@@ -12,6 +12,7 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "common/protocol.h"
+#include "common/source_digest.h"
 #include "common/utf8.h"
 #include "server/worker/progress.h"
 
@@ -144,7 +145,7 @@ enum status link_claim(struct attempt_link *l, const char *host, int threads, cJ
     struct reply reply;
     double sent;
     cJSON *body = cJSON_CreateObject();
-    json_add_string(body, "version", UNBAKE_VERSION);
+    json_add_string(body, "version", source_version);
     json_add_string(body, "host", host);
     json_add_int(body, "threads", threads);
     reply_init(&reply);

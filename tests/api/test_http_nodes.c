@@ -3,6 +3,7 @@
 #include <sys/stat.h>
 
 #include "common/sha256.h"
+#include "common/source_digest.h"
 #include "server/data/layout.h"
 #include "server/net/field.h"
 #include "server/store/remote.h"
@@ -11,8 +12,8 @@
 #define TOKEN "secret-of-this-attempt"
 #define ANN "Authorization: Bearer " TOKEN "\r\nUnbake-Claimant: 00112233445566778899\r\n"
 #define BOB "Authorization: Bearer " TOKEN "\r\nUnbake-Claimant: ffffffffffffffffffff\r\n"
-#define VERSION "{\"version\":\"" UNBAKE_VERSION "\",\"host\":\"node7\"}"
 
+static char version[128]; /* a claim by a node of this version */
 static int64_t job;
 static int number;
 static struct buf reply;
@@ -106,15 +107,15 @@ static void check_claims(struct rig *rig) {
     begin(rig);
     IS(post(rig, "report", ANN, "{\"seq\":1}"), 409); /* not before the claim */
     IS(ask(rig, "GET", "scene", ANN, "", 0), 409);
-    IS(post(rig, "claim", "Unbake-Claimant: 00112233445566778899\r\n", VERSION), 401);
-    IS(post(rig, "claim", "Authorization: Bearer wrong\r\nUnbake-Claimant: 00112233445566778899\r\n", VERSION), 401);
-    IS(post(rig, "claim", "Authorization: Bearer " TOKEN "\r\n", VERSION), 400);
-    IS(post(rig, "claim", ANN, VERSION), 200);
+    IS(post(rig, "claim", "Unbake-Claimant: 00112233445566778899\r\n", version), 401);
+    IS(post(rig, "claim", "Authorization: Bearer wrong\r\nUnbake-Claimant: 00112233445566778899\r\n", version), 401);
+    IS(post(rig, "claim", "Authorization: Bearer " TOKEN "\r\n", version), 400);
+    IS(post(rig, "claim", ANN, version), 200);
     SAYS("\"kind\":\"reconstruct\"");
     SAYS("\"lease_sec\":60");
     CHECK(!strstr(rig_body(&reply), "/secret/path"));
-    IS(post(rig, "claim", ANN, VERSION), 200); /* its reply was lost */
-    IS(post(rig, "claim", BOB, VERSION), 409);
+    IS(post(rig, "claim", ANN, version), 200); /* its reply was lost */
+    IS(post(rig, "claim", BOB, version), 409);
     SAYS("claimed by another");
     IS(post(rig, "report", BOB, "{\"seq\":1}"), 409);
     IS(put(rig, "outputs/a.exr", BOB, "x", "x"), 409);
@@ -123,12 +124,17 @@ static void check_claims(struct rig *rig) {
 
     begin(rig);
     IS(post(rig, "claim", ANN, "{\"version\":\"0.0.1\",\"host\":\"old\"}"), 409);
-    SAYS("unbaked on old has version 0.0.1, the daemon has " UNBAKE_VERSION);
-    IS(post(rig, "claim", ANN, VERSION), 409);
+    SAYS("unbaked on old has version 0.0.1, the daemon has " UNBAKE_VERSION " (sources ");
+    IS(post(rig, "claim", ANN, version), 409);
     struct remote_row row;
     struct error err;
     CHECK(store_remote_get(rig->store, job, number, &row, &err) == STATUS_OK);
     CHECK_STRING(row.end.way, "refused");
+
+    begin(rig);
+    IS(post(rig, "claim", ANN, "{\"version\":\"" UNBAKE_VERSION " (sources 0123456789abcdef)\",\"host\":\"old\"}"),
+       409);
+    SAYS("has version " UNBAKE_VERSION " (sources 0123456789abcdef), the daemon has " UNBAKE_VERSION " (sources ");
 }
 
 static void check_lines(void *wanted, const char *lines) { CHECK_STRING(lines, (const char *)wanted); }
@@ -136,7 +142,7 @@ static void check_lines(void *wanted, const char *lines) { CHECK_STRING(lines, (
 static void check_reports(struct rig *rig) {
     struct error err;
     begin(rig);
-    IS(post(rig, "claim", ANN, VERSION), 200);
+    IS(post(rig, "claim", ANN, version), 200);
     IS(post(rig, "report", ANN, "{\"seq\":2}"), 409); /* a gap */
     SAYS("does not follow");
     for (int i = 0; i < 2; i++) { /* the second: its reply was lost */
@@ -178,7 +184,7 @@ static void check_reports(struct rig *rig) {
 
 static void check_outputs(struct rig *rig) {
     begin(rig);
-    IS(post(rig, "claim", ANN, VERSION), 200);
+    IS(post(rig, "claim", ANN, version), 200);
     for (int i = 0; i < 2; i++)
         IS(put(rig, "outputs/preview/b_c.png", ANN, "picture", "picture"), 204);
     HOLDS("out/preview/b_c.png", "picture");
@@ -225,7 +231,7 @@ static void check_checkpoints(struct rig *rig) {
     begin(rig);
     char *dir = layout_attempt(rig->dir, job, number), *db = layout_checkpoint(dir);
     rig_must(file_replace(db, "database", 8, &err), &err, "checkpoint.db");
-    IS(post(rig, "claim", ANN, VERSION), 200);
+    IS(post(rig, "claim", ANN, version), 200);
     IS(ask(rig, "GET", "checkpoint", ANN, "", 0), 200);
     SAYS("\"name\":\"checkpoint.db\",\"bytes\":8,\"sha256\":\"");
     IS(ask(rig, "GET", "checkpoint/checkpoint.db", ANN "Range: bytes=4-\r\n", "", 0), 206);
@@ -258,7 +264,7 @@ static void check_scene(struct rig *rig) {
     rig_must(file_replace(b, "0123456789", 10, &err), &err, "b");
     CHECK(symlink("/etc/passwd", link) == 0);
     begin(rig);
-    IS(post(rig, "claim", ANN, VERSION), 200);
+    IS(post(rig, "claim", ANN, version), 200);
     IS(ask(rig, "GET", "scene", ANN, "", 0), 200);
     sha256_of("0123456789", 10, hex);
     SAYS("\"scene_id\":\"" RIG_SCENE "\"");
@@ -292,17 +298,18 @@ static void check_tokens(struct rig *rig) {
     begin(rig);
     rig_must(store_token_add(rig->store, "root", ROLE_ADMIN, 0, token, &id, &err), &err, "store_token_add");
     snprintf(fields, sizeof fields, "Authorization: Bearer %s\r\nUnbake-Claimant: 00112233445566778899\r\n", token);
-    IS(post(rig, "claim", fields, VERSION), 401);
-    IS(post(rig, "claim", ANN, VERSION), 200);
+    IS(post(rig, "claim", fields, version), 401);
+    IS(post(rig, "claim", ANN, version), 200);
     buf_release(&reply);
     IS(rig_get(rig, "/v1/jobs", "Authorization: Bearer " TOKEN "\r\n", &reply), 401);
     number++;
-    IS(post(rig, "claim", ANN, VERSION), 401); /* of no other attempt */
+    IS(post(rig, "claim", ANN, version), 401); /* of no other attempt */
 }
 
 int main(void) {
     struct rig rig;
     rig_start(&rig, &rig_patient, 15.0);
+    snprintf(version, sizeof version, "{\"version\":\"%s\",\"host\":\"node7\"}", source_version);
     buf_init(&reply, (size_t)64 << 20);
     check_claims(&rig);
     check_reports(&rig);

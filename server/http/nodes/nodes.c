@@ -7,7 +7,7 @@
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
-#include "common/protocol.h"
+#include "common/source_digest.h"
 #include "server/data/layout.h"
 #include "server/http/handlers.h"
 #include "server/http/nodes/node.h"
@@ -33,7 +33,7 @@ static enum status read_order(struct api *api, const struct node_key *key, cJSON
 static struct response *refuse_version(struct api *api, struct request *r, const struct node_key *key,
                                        const char *version, const char *host) {
     struct error err;
-    char *reason = mem_printf("unbaked on %s has version %.40s, the daemon has " UNBAKE_VERSION, host, version);
+    char *reason = mem_printf("unbaked on %s has version %.60s, the daemon has %s", host, version, source_version);
     enum status status = store_remote_refuse(api->store, &key->key, reason, &err);
     struct response *reply = status != STATUS_OK
                                  ? node_refusal(api, r, &err)
@@ -77,7 +77,7 @@ struct response *nodes_claim(struct api *api, struct request *r) {
         for (char *at = host; *at; at++)
             if (*at < ' ' || *at > '~')
                 *at = '?';
-        reply = strcmp(version, UNBAKE_VERSION) == 0 ? claim(api, r, &key, host)
+        reply = strcmp(version, source_version) == 0 ? claim(api, r, &key, host)
                                                      : refuse_version(api, r, &key, version, host);
     }
     cJSON_Delete(body);
