@@ -7,7 +7,7 @@
 # left out, and that is said.
 #
 # RELIGHT_ROOMS    "demo staircase2 bathroom staircase2-scan bathroom-scan staircase2-phone bathroom-phone"
-# RELIGHT_QUALITY  of the reconstructions (draft)
+# RELIGHT_QUALITY  of the reconstructions (standard)
 # RELIGHT_TEXTURE  their texture_size (1024)
 # RELIGHT_SPP      samples a pixel of each of the four renders (64)
 #
@@ -47,7 +47,7 @@ window() {
 recover() {
     [ -e "$build/relight/$1/out/report.json" ] ||
         reconstruct "$2" "$build/relight/$1/out" "texture_size=${RELIGHT_TEXTURE:-1024}" \
-            "quality=${RELIGHT_QUALITY:-draft}" report_samples=1
+            "quality=${RELIGHT_QUALITY:-standard}" report_samples=1
 }
 
 measure() { # ROOM

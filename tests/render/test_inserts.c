@@ -172,6 +172,18 @@ static void test_gltf(void) {
     relit_remove(dir);
 }
 
+static void refused(const char *dir, const char *file, const char *why, const char *hint) {
+    char *text = mem_printf("{" COMMON ",\"insert.1.file\":\"%s/%s\"}", dir, file);
+    cJSON *tree = cJSON_Parse(text);
+    struct relight_job job = {.outputs = dir, .settings = tree, .out = dir};
+    err = (struct error){.message = ""};
+    CHECK_THAT(relight_run(&job, NULL, pool, &err) == STATUS_INPUT && strstr(err.message, why) &&
+                   strstr(err.hint, hint),
+               "%s", err.message);
+    cJSON_Delete(tree);
+    mem_free(text);
+}
+
 static void test_obj(void) {
     static const char obj[] = "mtllib m.mtl\nv -1 -1 0\nv 0 -1 0\nv 0 1 0\nv -1 1 0\nv 1 -1 0\nv 1 1 0\n"
                               "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl left\nf 1/1 2/2 3/3 4/4\n"
@@ -206,15 +218,10 @@ static void test_obj(void) {
     pass(dir, "two.obj", "", "emission", &image);
     is_near(&image, 6, 4, rgb_make(1.0f, 2.0f, 3.0f), 0.01, "emission");
     image_release(&image);
-    put_file(dir, "m.mtl", "newmtl left\nKd spectral a.rfl\n", 32);
-    struct relight_job job = {.outputs = dir, .out = dir};
-    char *text = mem_printf("{" COMMON ",\"insert.1.file\":\"%s/two.obj\"}", dir);
-    cJSON *tree = cJSON_Parse(text);
-    job.settings = tree;
-    CHECK_THAT(relight_run(&job, NULL, pool, &err) == STATUS_INPUT && strstr(err.message, "Kd spectral"), "%s",
-               err.message);
-    cJSON_Delete(tree);
-    mem_free(text);
+    put_file(dir, "m.mtl", "newmtl left\nmap_Kd gone.png\n", 28);
+    refused(dir, "two.obj", "gone.png is not there", "attach.1");
+    put_file(dir, "m.mtl", "newmtl left\nKd spectral a.rfl\n", 30);
+    refused(dir, "two.obj", "Kd spectral", "");
     relit_remove(dir);
 }
 

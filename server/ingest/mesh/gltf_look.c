@@ -208,10 +208,9 @@ static enum status read_material(struct gltf_file *g, const cJSON *material, boo
         return STATUS_OK;
     leave_out(material, look);
     if (gltf_extension(material, "KHR_materials_pbrSpecularGlossiness") && !member(material, "pbrMetallicRoughness")) {
-        status = error_set(err, STATUS_INPUT,
-                           "%s: material \"%s\" is of KHR_materials_pbrSpecularGlossiness, which is not read", g->name,
-                           look->material[number].name);
-        return error_hint(err, "convert it to metal and roughness: gltf-transform metalrough IN.glb OUT.glb"), status;
+        error_set(err, STATUS_INPUT, "%s: material \"%s\" is of KHR_materials_pbrSpecularGlossiness, which is not read",
+                  g->name, look->material[number].name);
+        return error_hint(err, "convert it to metal and roughness: gltf-transform metalrough IN.glb OUT.glb");
     }
     for (size_t i = 0; i < SLOT_COUNT && status == STATUS_OK; i++)
         status = read_slot(g, material, &slots[i], look, &look->material[number], err);

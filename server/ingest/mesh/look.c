@@ -131,8 +131,10 @@ enum status look_read_image(struct mesh_look *look, const char *folder, const ch
     enum status status = path_clean_foreign(name, &clean, err);
     if (status == STATUS_OK)
         path = find_file(folder, clean);
-    if (status == STATUS_OK && !path)
-        status = error_set(err, STATUS_INPUT, "%s: its picture %s is not there", of, clean);
+    if (status == STATUS_OK && !path) {
+        error_set(err, STATUS_INPUT, "%s: its picture %s is not there", of, clean);
+        status = error_hint(err, "it belongs beside the mesh; attach.1 gives it to a job");
+    }
     if (status == STATUS_OK)
         status = is_color ? image_read(path, &image, &info, err) : image_read_stored(path, &image, err);
     if (status == STATUS_OK)
