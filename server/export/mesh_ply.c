@@ -1,11 +1,37 @@
 /* mesh_ply.c -- see mesh_ply.h. */
 #include "server/export/mesh_ply.h"
 
+#include "common/buf.h"
 #include "server/export/parts.h"
 #include "server/export/sink.h"
 
-static void put_header(struct sink *out, const struct mesh *mesh, size_t vertex_count) {
+/* On one line each. */
+static void put_names(struct sink *out, const struct mesh *mesh, const struct segments *segments) {
+    struct buf text;
+    buf_init(&text, PLY_NAMES_BYTES);
+    for (size_t s = 0; s < segments->count; s++) {
+        const char *name = segments_name(segments, mesh, s);
+        if (!name)
+            continue;
+        size_t before = text.length;
+        buf_printf(&text, "comment segment %zu %s", s, name);
+        for (size_t i = before; i < text.length; i++)
+            if ((unsigned char)text.data[i] < ' ')
+                text.data[i] = ' ';
+        buf_puts(&text, "\n");
+        if (text.overflowed) {
+            text.length = before;
+            break;
+        }
+    }
+    sink_bytes(out, text.data, text.length);
+    buf_release(&text);
+}
+
+static void put_header(struct sink *out, const struct mesh *mesh, const struct segments *segments,
+                       size_t vertex_count) {
     sink_printf(out, "ply\nformat binary_little_endian 1.0\n");
+    put_names(out, mesh, segments);
     sink_offset(out, "comment", mesh->offset, "\n");
     sink_printf(out,
                 "comment s t: atlas coordinates, origin lower left\n%s"
@@ -30,7 +56,7 @@ enum status mesh_ply_write(const char *path, const struct mesh *mesh, const stru
     if (status != STATUS_OK)
         return status;
     seams_make(&seams, mesh, atlas, NULL);
-    put_header(&out, mesh, seams.vertex_count);
+    put_header(&out, mesh, segments, seams.vertex_count);
     for (size_t v = 0; v < seams.vertex_count; v++) {
         sink_vec3(&out, seams_position(&seams, mesh, v));
         if (mesh->normal)

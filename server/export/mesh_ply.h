@@ -6,6 +6,8 @@
  *   face:   triangles, list uchar int vertex_indices; int segment as in the report; int face, the face of the input
  *           that the triangle is part of.
  *
+ * Comments "segment N NAME" have what the input calls a segment, up to PLY_NAMES_BYTES of them.
+ *
  * Triangles are in the input's order, without those dropped by mesh_check. */
 #ifndef UNBAKE_EXPORT_MESH_PLY_H
 #define UNBAKE_EXPORT_MESH_PLY_H
@@ -14,6 +16,8 @@
 #include "server/scene/atlas.h"
 #include "server/scene/mesh.h"
 #include "server/scene/segment.h"
+
+#define PLY_NAMES_BYTES 65536 /* readers hold a header in memory; ours take 1 MiB */
 
 /* Replaces the file atomically. The same input gives the same bytes. */
 enum status mesh_ply_write(const char *path, const struct mesh *mesh, const struct segments *segments,

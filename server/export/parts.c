@@ -7,6 +7,7 @@
 
 #include "common/mem.h"
 #include "common/rng.h"
+#include "common/utf8.h"
 
 #define NONE UINT32_MAX
 
@@ -121,15 +122,28 @@ void parts_release(struct parts *p) {
     *p = (struct parts){0};
 }
 
+static bool is_of_labels(uint32_t c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
+           (c >= 0x80 && utf8_kind(c) == UTF8_VISIBLE);
+}
+
 void parts_label(const struct segments *segments, const struct mesh *mesh, uint32_t segment,
                  char label[PARTS_LABEL_BYTES]) {
     const char *name = segments_name(segments, mesh, segment);
-    int length = snprintf(label, PARTS_LABEL_BYTES, "segment_%u%s", segment, name ? "_" : "");
-    for (; name && *name && length + 1 < PARTS_LABEL_BYTES; name++) {
-        bool is_plain = (*name >= 'a' && *name <= 'z') || (*name >= 'A' && *name <= 'Z') ||
-                        (*name >= '0' && *name <= '9') || *name == '-';
-        if (is_plain || label[length - 1] != '_') /* other characters in a row are one _ */
-            label[length++] = is_plain ? *name : '_';
+    size_t length = (size_t)snprintf(label, PARTS_LABEL_BYTES, "segment_%u%s", segment, name ? "_" : "");
+    while (name && *name) {
+        uint32_t character;
+        size_t size = utf8_next(name, strlen(name), &character);
+        bool is_plain = size > 0 && is_of_labels(character);
+        if (length + size + 1 >= PARTS_LABEL_BYTES)
+            break;
+        if (is_plain) {
+            memcpy(label + length, name, size);
+            length += size;
+        } else if (label[length - 1] != '_') { /* other characters in a row are one _ */
+            label[length++] = '_';
+        }
+        name += size > 0 ? size : 1;
     }
     while (label[length - 1] == '_')
         length--;

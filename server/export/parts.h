@@ -47,7 +47,7 @@ void parts_release(struct parts *parts);
 #define PARTS_LABEL_BYTES 96
 
 /* A name for files that take few characters: "segment_3", or "segment_3_wall_paint" where the input calls it
- * "wall/paint". Unique, of letters, digits, - and _. */
+ * "wall/paint". Unique, of letters, digits, -, _ and visible characters beyond ASCII, in UTF-8. */
 void parts_label(const struct segments *segments, const struct mesh *mesh, uint32_t segment,
                  char label[PARTS_LABEL_BYTES]);
 

@@ -83,7 +83,7 @@ static const char *value_title(const char *name) {
 }
 
 static void put_titles(struct buf *out, const struct curve *c, const char *name) {
-    buf_printf(out, "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">steps of the optimiser</text>",
+    buf_printf(out, "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">share of the optimiser's steps</text>",
                (LEFT + WIDTH - RIGHT) / 2, HEIGHT - 4);
     buf_printf(out, "<text x=\"%d\" y=\"%d\">%s%s</text>", LEFT + 6, TOP + 12, value_title(name),
                c->logarithmic ? ", logarithmic" : "");

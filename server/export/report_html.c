@@ -37,7 +37,8 @@ static const char style[] =
     "svg path{fill:none;stroke:var(--accent);stroke-width:1.6;vector-effect:non-scaling-stroke}"
     "svg line{stroke:var(--line)}"
     ".verdict{font-size:1.05rem;margin:1rem 0}"
-    "@media(max-width:34rem){body{padding:1rem .7rem 3rem}h1{font-size:1.4rem}}"
+    "@media(max-width:34rem){body{padding:1rem .7rem 3rem}h1{font-size:1.4rem}"
+    ".spare{display:none}.tall{max-height:80vh;overflow-y:auto}.tall th,.tall td{padding-right:.4rem}}"
     "@media print{.card,figure{break-inside:avoid}}";
 
 /* A card scrolls where its table is too wide: by keyboard too, and so it has a name. */
@@ -75,6 +76,8 @@ static void put_figure(struct buf *out, const cJSON *figure) {
     } known[] = {
         {"msre", "mean squared relative error", ", 0 is best"},
         {"msre_noise_left", "give or take, by noise of the re-render", ""},
+        {"msre_at_outlines", "of that beside outlines", ""},
+        {"outline_share", "share of pixels beside outlines", ""},
         {"msre_render_noise", "that noise, which is not in the error", ""},
         {"msre_photograph_noise", "noise of the photograph, which is", ""},
         {"psnr_db", "PSNR in dB", ", 25 and more is good"},
@@ -91,6 +94,18 @@ static void put_figure(struct buf *out, const cJSON *figure) {
     html_number(out, figure->valuedouble);
     buf_puts(out, good);
     buf_puts(out, ";&ensp;");
+}
+
+/* Those that say most, or the others, in the order of the report. */
+static void put_figures(struct buf *out, const cJSON *view, bool main) {
+    static const char *const chosen[] = {"msre", "psnr_db", "ssim"};
+    for (const cJSON *m = view ? view->child : NULL; m; m = m->next) {
+        bool is_chosen = false;
+        for (size_t i = 0; i < sizeof chosen / sizeof *chosen; i++)
+            is_chosen = is_chosen || strcmp(chosen[i], m->string) == 0;
+        if (cJSON_IsNumber(m) && is_chosen == main)
+            put_figure(out, m);
+    }
 }
 
 static enum status put_comparisons(struct buf *out, const struct report_page *page, struct error *err) {
@@ -110,12 +125,14 @@ static enum status put_comparisons(struct buf *out, const struct report_page *pa
         buf_puts(out, "<figcaption>");
         html_text(out, page->comparison[i].title);
         buf_puts(out, "<span>");
-        for (const cJSON *m = view ? view->child : NULL; m; m = m->next) {
-            if (!cJSON_IsNumber(m))
-                continue;
-            put_figure(out, m);
+        put_figures(out, view, true);
+        buf_puts(out, "</span>");
+        if (view && view->child) {
+            buf_puts(out, "<details><summary>more figures</summary><span>");
+            put_figures(out, view, false);
+            buf_puts(out, "</span></details>");
         }
-        buf_puts(out, "</span></figcaption></figure>");
+        buf_puts(out, "</figcaption></figure>");
         view = view ? view->next : NULL;
     }
     buf_puts(out, "</div>");
@@ -174,11 +191,13 @@ static void put_swatch(struct buf *out, const cJSON *color) {
         buf_printf(out, "%s%.0f", i ? "," : "", 255.0 * fmax(s, 0.0));
     }
     buf_puts(out, ")\"></span>");
-    buf_printf(out, "%.3g %.3g %.3g", c[0], c[1], c[2]);
+    buf_printf(out, "<span class=spare>%.3g %.3g %.3g</span>", c[0], c[1], c[2]);
 }
 
 static void put_segment(struct buf *out, const cJSON *segment) {
-    static const char *const plain[] = {"area_m2", "texels", "roughness", "specular"};
+    static const struct {
+        const char *key, *class;
+    } plain[] = {{"area_m2", "n"}, {"texels", "\"n spare\""}, {"roughness", "n"}, {"specular", "n"}};
     buf_puts(out, "<tr><td>");
     html_value(out, cJSON_GetObjectItemCaseSensitive(segment, "id"));
     const cJSON *name = cJSON_GetObjectItemCaseSensitive(segment, "name");
@@ -188,8 +207,8 @@ static void put_segment(struct buf *out, const cJSON *segment) {
     }
     buf_puts(out, "</td>");
     for (size_t i = 0; i < sizeof plain / sizeof *plain; i++) {
-        buf_puts(out, "<td class=n>");
-        html_value(out, cJSON_GetObjectItemCaseSensitive(segment, plain[i]));
+        buf_printf(out, "<td class=%s>", plain[i].class);
+        html_value(out, cJSON_GetObjectItemCaseSensitive(segment, plain[i].key));
         buf_puts(out, "</td>");
     }
     buf_puts(out, "<td>");
@@ -208,10 +227,10 @@ static void put_segments(struct buf *out, const cJSON *segments) {
     for (const cJSON *s = segments->child; s; s = s->next)
         emitters += cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(s, "emitter"));
     buf_puts(out, "<h2>Segments</h2>");
-    begin_card(out, "", "segments");
+    begin_card(out, " tall", "segments");
     buf_printf(out,
                "<p class=soft>%d segments, %d of them "
-               "emitters.</p><table><tr><th>object</th><th class=n>area, m²</th><th class=n>texels"
+               "emitters.</p><table><tr><th>object</th><th class=n>area, m²</th><th class=\"n spare\">texels"
                "</th><th class=n>roughness</th><th class=n>specular</th><th>mean base colour</th>"
                "<th>emission, radiance</th></tr>",
                count, emitters);

@@ -15,6 +15,9 @@
 #define FEW_PHOTOGRAPHS 20  /* of the training; fewer is said */
 #define UNSEEN_LIGHT 0.05   /* of the rays that leave the room where no photograph shows what is there */
 #define UNCERTAIN_LIGHT 0.3 /* relative deviation of a source's radiance */
+#define NAMES_SHOWN 4       /* of lamps */
+#define OUTLINE_PART 0.25   /* of the error of held-out views beside outlines; */
+#define OUTLINE_TIMES 2.0   /* and of what as many pixels elsewhere have */
 #define NOISE_DISTURBS 0.2  /* standard error of the error of held-out views, by the re-renders' noise */
 
 /* A number by its path of two names; NAN where it is not there. */
@@ -28,6 +31,28 @@ static bool is_true(const cJSON *object, const char *name) {
     return cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(object, name));
 }
 
+/* In brackets, once each; nothing without names. */
+static void put_lamp_names(struct buf *out, const cJSON *segments) {
+    const char *shown[NAMES_SHOWN];
+    const cJSON *s;
+    size_t count = 0;
+    bool has_more = false;
+    cJSON_ArrayForEach(s, segments) {
+        const char *name = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(s, "name"));
+        bool is_new = name && is_true(s, "emitter");
+        for (size_t i = 0; i < count && is_new; i++)
+            is_new = strcmp(shown[i], name) != 0;
+        has_more = has_more || (is_new && count == NAMES_SHOWN);
+        if (!is_new || count == NAMES_SHOWN)
+            continue;
+        buf_puts(out, count == 0 ? " (" : ", ");
+        html_text(out, name);
+        shown[count++] = name;
+    }
+    if (count > 0)
+        buf_puts(out, has_more ? ", …)" : ")");
+}
+
 static void put_found(struct buf *out, const cJSON *report) {
     const cJSON *segments = cJSON_GetObjectItemCaseSensitive(report, "segments"), *s;
     int count = cJSON_GetArraySize(segments), lamps = 0;
@@ -38,6 +63,7 @@ static void put_found(struct buf *out, const cJSON *report) {
         buf_puts(out, "no segment shines");
     else
         buf_printf(out, lamps == 1 ? "1 of them shines" : "%d of them shine", lamps);
+    put_lamp_names(out, segments);
     if (is_true(cJSON_GetObjectItemCaseSensitive(report, "sun"), "found"))
         buf_puts(out, "; the sun shines in");
     buf_puts(out, ".</p>");
@@ -103,6 +129,20 @@ static void put_lights(struct buf *out, const cJSON *report, int *reasons) {
     *reasons += (hidden > 0) + (saturated > 0) + (uncertain > 0);
 }
 
+/* Error that lies beside outlines is of poses and mesh, not of materials. */
+static void put_outlines(struct buf *out, const cJSON *report, int *reasons) {
+    double part = number_at(report, "metrics", "msre_at_outlines") / number_at(report, "metrics", "msre");
+    double pixels = number_at(report, "metrics", "outline_share");
+    if (!(part > OUTLINE_PART && part > OUTLINE_TIMES * pixels))
+        return;
+    buf_printf(
+        out,
+        "<li>%.0f %% of the error lies beside outlines, on %.0f %% of the pixels: mesh and photographs do not meet "
+        "there to the pixel.</li>",
+        100.0 * fmin(part, 1.0), 100.0 * pixels);
+    *reasons += 1;
+}
+
 static void put_weak(struct buf *out, const cJSON *report) {
     double seen = number_at(report, "seen_surface_share", NULL);
     double photographs = number_at(report, "prepare", "training_photographs");
@@ -124,6 +164,7 @@ static void put_weak(struct buf *out, const cJSON *report) {
                    100.0 * unseen);
         reasons++;
     }
+    put_outlines(out, report, &reasons);
     put_lights(out, report, &reasons);
     if (reasons == 0 && seen >= SEEN_WHOLE)
         buf_puts(out, "<li>No weakness is known: photographs show all of the surface.</li>");

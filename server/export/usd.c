@@ -3,6 +3,7 @@
 #include "server/export/usd.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "common/mem.h"
 #include "common/protocol.h"
@@ -34,11 +35,22 @@ static void put_string(struct sink *out, const char *text) {
     sink_printf(out, "\"");
 }
 
-/* parts_label with _ for -, which names of prims may not have. */
+/* parts_label with _ for what names of prims may not have: -, and for older readers all beyond ASCII. */
 static void prim_name(const struct export_input *in, uint32_t segment, char label[PARTS_LABEL_BYTES]) {
     parts_label(in->segments, in->mesh, segment, label);
     for (char *c = label; *c; c++)
-        *c = *c == '-' ? '_' : *c;
+        *c = *c == '-' || (unsigned char)*c >= 0x80 ? '_' : *c;
+    for (size_t length = strlen(label); label[length - 1] == '_'; length--)
+        label[length - 1] = '\0';
+}
+
+/* Among a prim's metadata: what the input calls it; NULL: nothing. */
+static void put_display_name(struct sink *out, const char *name) {
+    if (!name)
+        return;
+    sink_printf(out, "            displayName = ");
+    put_string(out, name);
+    sink_printf(out, "\n");
 }
 
 /* --- meshes ------------------------------------------------------------------------------------ */
@@ -94,11 +106,7 @@ static void put_mesh(struct sink *out, const struct export_input *in, const stru
                 "                int64 object_id = %lld\n"
                 "            }\n",
                 name, emits ? ", \"MeshLightAPI\"" : "", part->segment, (long long)in->segments->id[part->segment]);
-    if (own) {
-        sink_printf(out, "            displayName = ");
-        put_string(out, own);
-        sink_printf(out, "\n");
-    }
+    put_display_name(out, own);
     sink_printf(out,
                 "        )\n        {\n"
                 "            uniform token subdivisionScheme = \"none\"\n"
@@ -169,8 +177,10 @@ static void put_material(struct sink *out, const struct export_input *in, uint32
     double root = sqrt(0.08 * (double)m->specular[segment]);
     char name[PARTS_LABEL_BYTES];
     prim_name(in, segment, name);
+    sink_printf(out, "        def Material \"%s\" (\n", name);
+    put_display_name(out, segments_name(in->segments, in->mesh, segment));
     sink_printf(out,
-                "        def Material \"%s\"\n        {\n"
+                "        )\n        {\n"
                 "            token outputs:surface.connect = </Room/Materials/%s/surface.outputs:surface>\n"
                 "            def Shader \"surface\"\n            {\n"
                 "                uniform token info:id = \"UsdPreviewSurface\"\n"
@@ -179,7 +189,7 @@ static void put_material(struct sink *out, const struct export_input *in, uint32
                 "                float inputs:metallic = 0\n"
                 "                float inputs:roughness = " SINK_FLOAT "\n"
                 "                float inputs:ior = " SINK_FLOAT "\n",
-                name, name, name, (double)m->roughness[segment], (1.0 + root) / (1.0 - root));
+                name, name, (double)m->roughness[segment], (1.0 + root) / (1.0 - root));
     put_emission(out, name, rgb_scale(m->emission[segment], (float)unit_of(in)), scale > 0.0);
     sink_printf(out, "                token outputs:surface\n            }\n");
     put_texture(out, name, "base_color", textures->base_color, 1.0);

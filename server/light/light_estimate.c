@@ -122,6 +122,9 @@ void light_report(const struct reconstruction *r) {
         if (is_segment) {
             json_add_int(entry, "segment", (int64_t)s->segment);
             json_add_int(entry, "object_id", r->segments.id[s->segment]);
+            const char *name = segments_name(&r->segments, &r->scene->mesh, s->segment);
+            if (name)
+                json_add_string(entry, "name", name);
         }
         const double radiance[3] = {(double)s->radiance.r, (double)s->radiance.g, (double)s->radiance.b};
         json_add(entry, "radiance", cJSON_CreateDoubleArray(radiance, 3));

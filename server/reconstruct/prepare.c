@@ -132,6 +132,9 @@ static void report_split(const struct prepare *p, const struct split *split) {
         cJSON *entry = cJSON_CreateObject();
         json_add_int(entry, "segment", (int64_t)(split->old_count + i));
         json_add_int(entry, "of_segment", (int64_t)split->whole[i]);
+        const char *name = segments_name(&p->r->segments, &p->r->scene->mesh, split->whole[i]);
+        if (name)
+            json_add_string(entry, "name", name);
         cJSON_AddItemToArray(list, entry);
     }
     char line[128];

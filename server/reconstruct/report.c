@@ -9,6 +9,7 @@
 #include "common/quantile.h"
 #include "server/capture/luminance_unit.h"
 #include "server/reconstruct/held_render.h"
+#include "server/reconstruct/outlines.h"
 #include "server/reconstruct/metrics.h"
 #include "server/render/path.h"
 #include "server/scene/photograph_reduce.h"
@@ -138,6 +139,10 @@ static void measure_view(const struct reconstruction *r, const struct photograph
     view->psnr_db = psnr.value;
     view->psnr_noise_left_db = psnr.noise;
     view->ssim = metrics_ssim(&view->photograph, halves, exposure);
+    struct outline_error outlines =
+        outlines_of_view(r->world.accel, &photo->camera, r->pool, &view->photograph, halves, median);
+    view->msre_at_outlines = outlines.msre_part;
+    view->outline_share = outlines.pixel_share;
     image_release(&noise);
 }
 
@@ -228,10 +233,13 @@ static void mean_add(struct metric_mean *mean, double value) {
 
 struct held_out_means {
     struct metric_mean msre, noise_left, render_noise, photograph_noise, psnr_db, ssim; /* noise_left: of squares */
+    struct metric_mean at_outlines, outline_share;
 };
 
 static void means_add(struct held_out_means *means, const struct held_out *view) {
     mean_add(&means->msre, view->msre);
+    mean_add(&means->at_outlines, view->msre_at_outlines);
+    mean_add(&means->outline_share, view->outline_share);
     mean_add(&means->noise_left, view->msre_noise_left * view->msre_noise_left);
     mean_add(&means->render_noise, view->msre_render_noise);
     mean_add(&means->photograph_noise, view->msre_photograph_noise);
@@ -249,6 +257,8 @@ static cJSON *view_entry(const struct held_out *view) {
     json_add_number(entry, "msre_noise_left", view->msre_noise_left);
     json_add_number(entry, "msre_render_noise", view->msre_render_noise);
     json_add_number(entry, "msre_photograph_noise", view->msre_photograph_noise);
+    json_add_number(entry, "msre_at_outlines", view->msre_at_outlines);
+    json_add_number(entry, "outline_share", view->outline_share);
     json_add_number(entry, "psnr_db", view->psnr_db);
     json_add_number(entry, "psnr_noise_left_db", view->psnr_noise_left_db);
     json_add_number(entry, "ssim", view->ssim);
@@ -266,6 +276,8 @@ static void report_means(const struct held_out_means *means, size_t view_count, 
     json_add_number(metrics, "msre_noise_left", sqrt(means->noise_left.sum) / means->noise_left.count);
     json_add_number(metrics, "msre_render_noise", means->render_noise.sum / means->render_noise.count);
     json_add_number(metrics, "msre_photograph_noise", means->photograph_noise.sum / means->photograph_noise.count);
+    json_add_number(metrics, "msre_at_outlines", means->at_outlines.sum / means->at_outlines.count);
+    json_add_number(metrics, "outline_share", means->outline_share.sum / means->outline_share.count);
     json_add_number(metrics, "psnr_db", means->psnr_db.sum / means->psnr_db.count);
     json_add_number(metrics, "ssim", means->ssim.sum / means->ssim.count);
     hooks->metric(hooks->user, "msre", 0, means->msre.sum / count);
@@ -317,7 +329,11 @@ void report_grey_card(struct reconstruction *r, const struct reconstruct_hooks *
     json_add_int(object, "x", card->pixel.x);
     json_add_int(object, "y", card->pixel.y);
     json_add(object, "point", cJSON_CreateDoubleArray(place, 3));
-    json_add_int(object, "segment", r->segments.of_triangle[card->triangle]);
+    uint32_t segment = r->segments.of_triangle[card->triangle];
+    const char *name = segments_name(&r->segments, &r->scene->mesh, segment);
+    json_add_int(object, "segment", segment);
+    if (name)
+        json_add_string(object, "name", name);
     json_add_number(object, "reflectance", card->pixel.value);
     json_add_number(object, "base_color", found);
     json_add_number(object, "ratio", ratio);

@@ -1,6 +1,6 @@
 // ply.js -- reads scene.ply as server/export/mesh_ply.h writes it: binary, little-endian, triangles, each with its segment.
 
-const HEADER_MOST = 4096; // bytes
+const HEADER_MOST = 1 << 17; // bytes: it has the names of segments
 const FLOAT_BYTES = 4, FACE_BYTES = 1 + 3 * 4 + 2 * 4; // 3, three indices, segment, face of the input
 
 // {count, position[9 count], uv[6 count], segment[count]}: the corners of `count` triangles, one after another.

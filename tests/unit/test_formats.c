@@ -10,6 +10,7 @@
 #include "common/image.h"
 #include "common/json.h"
 #include "common/mem.h"
+#include "common/utf8.h"
 #include "server/demo/room.h"
 #include "server/export/emission_texture.h"
 #include "server/export/glb.h"
@@ -359,6 +360,11 @@ static void test_named(const char *dir, struct export_input *in, struct mesh *ro
         {"scene.obj", "\no segment_1\n"},
         {"scene.mtl", "newmtl segment_0_wall_north-side_1\n"},
         {"scene.xml", "<shape type=\"serialized\" id=\"segment_0_wall_north-side_1\">"},
+        {"scene.obj", "\no segment_2_\xe5\xa2\x99\n"},
+        {"scene.usda", "displayName = \"wall/north-side 1\"\n        )\n        {\n            uniform token sub"},
+        {"scene.usda", "displayName = \"wall/north-side 1\"\n        )\n        {\n            token outputs:surface"},
+        {"scene.usda", "def Mesh \"segment_2\" ("},
+        {"scene.glb", "\"name\":\"\xe5\xa2\x99\""},
         {"scene.glb", "\"name\":\"wall/north-side 1\""},
         {"scene.glb", "\"name\":\"segment 1\""},
         {"scene.glb", "\"extras\":{\"segment\":0,\"object_id\":0}"},
@@ -374,7 +380,19 @@ static void test_named(const char *dir, struct export_input *in, struct mesh *ro
     in->segments = &named;
     CHECK(named.id[0] == 0 && named.id[1] == 1);
     parts_label(&named, room, 2, label);
-    CHECK_STRING(label, "segment_2");
+    CHECK_STRING(label, "segment_2_\xe5\xa2\x99");
+    name[1] = "a\xff" /* no UTF-8 */ "b\xe2\x80\x8f\xe2\x80\xa8"
+              "c";
+    parts_label(&named, room, 1, label);
+    CHECK_STRING(label, "segment_1_a_b_c");
+    char longest[61 + 3 * 32] = {0};
+    memset(longest, 'x', 60);
+    for (int i = 0; i < 12; i++)
+        memcpy(longest + 60 + 3 * i, "\xe5\xa2\x99", 3);
+    name[1] = longest;
+    parts_label(&named, room, 1, label);
+    CHECK_THAT(utf8_valid(label, strlen(label), NULL) && strlen(label) > PARTS_LABEL_BYTES - 5, "%s", label);
+    name[1] = "";
     CHECK(segments_name(&named, room, 1) == NULL && segments_name(&automatic, room, 0) == NULL);
     for (size_t i = 0; i < sizeof table / sizeof *table; i++) {
         struct error err = {.message = ""};

@@ -68,6 +68,10 @@ int main(void) {
     make_mesh(&mesh);
     mesh.object_id = mem_calloc(4, sizeof *mesh.object_id);
     mesh.object_id[2] = mesh.object_id[3] = 9;
+    mesh.name_count = 10;
+    mesh.name = mem_array(10, sizeof *mesh.name);
+    for (size_t i = 0; i < 10; i++)
+        mesh.name[i] = mem_strdup(i == 9 ? "lamp\n1" : "");
     segments_from_object_id(&segments, &mesh);
     CHECK(atlas_make(&atlas, &mesh, &segments, 64, 0.0f, ATLAS_PADDING, &err) == STATUS_OK);
 
@@ -80,6 +84,8 @@ int main(void) {
     buf_init(&file, 1 << 20);
     CHECK(file_read(path, &file, &err) == STATUS_OK);
     CHECK(memmem(file.data, file.length, "\ncomment TextureFile base_color.png\n", 36) != NULL);
+    CHECK(memmem(file.data, file.length, "\ncomment segment 1 lamp 1\n", 26) &&
+          !strstr(file.data, "comment segment 0"));
     check_file(buf_text(&file), file.length, &mesh, &segments, &atlas);
     unlink(path);
     CHECK(mesh_ply_write("/nowhere/at/all.ply", &mesh, &segments, &atlas, &err) != STATUS_OK);

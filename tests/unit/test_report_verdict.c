@@ -45,6 +45,14 @@ int main(void) {
     CHECK(says(holes, "2 holes of the mesh were filled, 3.2 m2"));
     CHECK(says(holes, "1 opening of the mesh, 0.5 m2, is taken for a way out"));
     CHECK(!says(good, "of the mesh"));
+    CHECK(!says(bad, "outlines") && !says(good, "outlines"));
+    const char *outlines = "{\"metrics\": {\"held_out_views\": 1, \"psnr_db\": 25, \"msre\": 0.1, "
+                           "\"msre_at_outlines\": 0.06, \"outline_share\": 0.05}, \"seen_surface_share\": 1,"
+                           "\"segments\": [{\"emitter\": true, \"name\": \"lamp <a>\"}, {\"name\": \"wall\"}, "
+                           "{\"emitter\": true, \"name\": \"lamp <a>\"}, {\"emitter\": true}]}";
+    CHECK(says(outlines, "60 % of the error lies beside outlines, on 5 % of the pixels"));
+    CHECK(!says(outlines, "No weakness is known"));
+    CHECK(says(outlines, "of 4 segments; 3 of them shine (lamp &lt;a&gt;)."));
     CHECK(says("{}", "No photograph was held out"));
     CHECK(!says("{}", "of the surface"));
     return check_result();
