@@ -40,7 +40,7 @@ static bool reserve(struct sink *s, uint64_t length) {
 }
 
 void sink_bytes(struct sink *s, const void *data, size_t length) {
-    if (!reserve(s, length))
+    if (length == 0 || !reserve(s, length)) /* crc32 of NULL is that of nothing: it would begin anew */
         return;
     s->checksum = (uint32_t)crc32_z(s->checksum, data, length);
     if (fwrite_unlocked(data, 1, length, s->file) != length)

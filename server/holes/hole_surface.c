@@ -175,6 +175,8 @@ static void add_triangle(struct mesh *mesh, struct segments *segments, uint32_t 
     mesh->face[t] = MESH_NO_FACE;
     if (mesh->object_id)
         mesh->object_id[t] = mesh->object_id[pattern];
+    for (int k = 0; k < 3 && mesh->uv; k++)
+        mesh->uv[t][k] = (vec2){NAN, NAN}; /* the input's picture has no place for it */
     segments->of_triangle[t] = segments->of_triangle[pattern];
 }
 
@@ -189,6 +191,8 @@ static void add_triangles(const struct hole_patch *p, struct mesh *mesh, struct 
     mesh->face = mem_realloc_array(mesh->face, total, sizeof *mesh->face);
     if (mesh->object_id)
         mesh->object_id = mem_realloc_array(mesh->object_id, total, sizeof *mesh->object_id);
+    if (mesh->uv)
+        mesh->uv = mem_realloc_array(mesh->uv, total, sizeof *mesh->uv);
     segments->of_triangle = mem_realloc_array(segments->of_triangle, total, sizeof *segments->of_triangle);
     for (uint32_t i = 0; i < cells; i++) {
         if (p->state[i] == CELL_EMPTY)

@@ -79,7 +79,9 @@ static void take(struct holed *room, size_t frame) {
 static void make(struct holed *room, enum shown shown, int threads) {
     struct error err = {0};
     *room = (struct holed){.shown = shown, .pool = parallel_new(threads)};
-    make_mesh_with_window(&room->scene.mesh);
+    struct mesh *mesh = &room->scene.mesh;
+    make_mesh_with_window(mesh);
+    mesh->uv = mem_calloc(mesh->triangle_count, sizeof *mesh->uv);
     segments_from_object_id(&room->segments, &room->scene.mesh);
     CHECK(accel_new(&room->accel, &room->scene.mesh, room->pool, &err) == STATUS_OK);
     room->scene.photograph = mem_calloc(TEST_FRAMES, sizeof *room->scene.photograph);
@@ -130,7 +132,7 @@ static void check_closed(const struct holed *room, size_t before) {
         for (int c = 0; c < 3; c++)
             farthest_m = fmaxf(farthest_m, fabsf(mesh->position[mesh->index[t][c]].z));
         wrong += !(mesh_cross(mesh, t).z > 0.0f) || mesh->object_id[t] != WALL || mesh->face[t] != MESH_NO_FACE ||
-                 room->segments.id[room->segments.of_triangle[t]] != WALL;
+                 room->segments.id[room->segments.of_triangle[t]] != WALL || mesh_has_uv(mesh, t);
     }
     CHECK_THAT(wrong == 0, "%zu triangles face away, or continue no wall", wrong);
     CHECK_THAT(farthest_m < 0.002f, "%.4f m off the wall", (double)farthest_m);
