@@ -9,11 +9,12 @@
 
 /* A round: so many paths that stopping and looking cost little, and so few that they are soon done. */
 #define ROUND_PATHS 4e6
+#define FIRST_PATHS 1e6      /* of the first round, which is the first preview */
 #define ROUND_LEAST_SPP 4 /* FILM_GROUPS: there are standard errors */
 #define ROUND_MOST_SPP 64
 
 static uint32_t round_spp(const struct camera *camera, uint32_t done, uint32_t most) {
-    double spp = ROUND_PATHS / ((double)camera->width * camera->height);
+    double spp = (done > 0 ? ROUND_PATHS : FIRST_PATHS) / ((double)camera->width * camera->height);
     uint32_t wanted = spp < ROUND_MOST_SPP ? (uint32_t)spp : ROUND_MOST_SPP;
     wanted = wanted / FILM_GROUPS * FILM_GROUPS;
     wanted = wanted > ROUND_LEAST_SPP ? wanted : ROUND_LEAST_SPP;

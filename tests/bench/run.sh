@@ -32,6 +32,9 @@ for bench in "$build"/tests/bench/bench_*; do
     esac
 done
 
+echo "== a relit preview" >&2
+collect tests/bench/relit_preview.sh "$build"
+
 if [ "${LONG:-}" = 1 ]; then
     echo "== memory" >&2
     collect tests/bench/memory.sh "$build"
