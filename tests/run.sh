@@ -20,7 +20,7 @@ render/test_emitters render/test_hidden_lamp render/test_changing_light render/t
 unit/test_outputs_read_back unit/test_fit unit/test_check_pictures api/test_http_faults chaos/test_clock
 api/test_backup api/test_axe api/test_page api/test_webhook_library
 chaos/test_start_faults chaos/test_worker_calls chaos/test_worker_kill chaos/test_node api/test_node_site api/test_node_disk api/test_node_tls chaos/test_slurm
-api/test_render api/test_render_parts api/test_retention render/test_calibrate_light unit/test_atlas unit/test_inverse_uv
+api/test_render api/test_render_parts chaos/test_render_kill api/test_retention render/test_calibrate_light unit/test_atlas unit/test_inverse_uv
 unit/test_worker_faults chaos/test_disk_faults unit/test_attempt_faults api/test_client_sweep chaos/test_daemon_kill
 chaos/test_power_cut unit/test_scheduler_faults unit/test_scheduler_retries unit/test_delivery render/test_detail
 api/test_client_commands api/test_client_scripts"
