@@ -235,6 +235,12 @@ static void print_job(struct client *c, const cJSON *job, const cJSON *outputs) 
         snprintf(text, sizeof text, "%s, %.0f%%, %s left", member_text(job, "stage"), percent_done(job), left);
         field_print(c, "stage", text);
     }
+    const cJSON *parts = cJSON_GetObjectItemCaseSensitive(job, "parts");
+    if (cJSON_IsObject(parts)) {
+        snprintf(text, sizeof text, "%.0f of %.0f done", member_number(parts, "done", 0.0),
+                 member_number(parts, "count", 0.0));
+        field_print(c, "parts", text);
+    }
     field_print(c, "owner", member_text(job, "owner"));
     print_webhook(c, job);
     field_print(c, "shared", cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(job, "shared")) ? "yes" : "");

@@ -54,8 +54,8 @@ static enum status add_frame(struct cameras *v, const struct frame *frame, const
 }
 
 /* The frames that `which` lists: numbers and names separated by commas, or all. */
-static enum status add_frames(struct cameras *v, const struct frames *t, const char *which, const char *path,
-                              const double offset[3], struct error *err) {
+static enum status add_frames(struct cameras *v, const struct frames *t, const char *which, const char *setting,
+                              const char *path, const double offset[3], struct error *err) {
     enum status status = STATUS_OK;
     if (strcmp(which, "all") == 0) {
         for (size_t i = 0; i < t->frame_count && status == STATUS_OK; i++)
@@ -69,8 +69,8 @@ static enum status add_frames(struct cameras *v, const struct frames *t, const c
         if (frame)
             status = add_frame(v, frame, path, offset, err);
         else
-            status =
-                error_set(err, STATUS_NOT_FOUND, "%s: has no view \"%s\" among its %zu", path, word, t->frame_count);
+            status = error_set(err, STATUS_INPUT, "setting %s: %s has no view \"%s\" among its %zu", setting, path,
+                               word, t->frame_count);
         mem_free(word);
         if (at[length] == '\0')
             break;
@@ -107,26 +107,34 @@ static vec3 choose_up(const cJSON *settings, const struct frames *t) {
     return vec3_make(*up == 'x' ? 1.0f : 0.0f, *up == 'y' ? 1.0f : 0.0f, *up == 'z' ? 1.0f : 0.0f);
 }
 
+static const char *name_of(const char *path) {
+    const char *slash = strrchr(path, '/');
+    return slash ? slash + 1 : path;
+}
+
 static enum status read_frames(const struct relight_job *job, const char *path, const double offset[3],
                                struct cameras *v, struct error *err) {
     struct findings findings = {.problems = cJSON_CreateArray()};
     struct frames t = {0};
     cJSON *tree = NULL;
-    bool is_path = render_settings_has(job->settings, "path");
+    const char *setting = render_settings_has(job->settings, "path") ? "path" : "view";
+    const char *shown = job->files ? name_of(path) : path; /* where it lies on a server is not its user's affair */
     enum status status = json_read(path, TRANSFORMS_MAX_BYTES, &tree, err);
+    if (status == STATUS_NOT_FOUND)
+        status = error_set(err, STATUS_INPUT, "setting cameras: the reconstruction has no %s", shown);
     if (status == STATUS_OK) {
-        transforms_read(tree, path, &t, &findings);
+        transforms_read(tree, shown, &t, &findings);
         const cJSON *first = cJSON_GetArrayItem(findings.problems, 0);
         if (findings.problem_count > 0)
-            status = error_set(err, STATUS_INPUT, "%s: %s", path,
+            status = error_set(err, STATUS_INPUT, "%s: %s", shown,
                                cJSON_GetStringValue(cJSON_GetObjectItem(first, "reason")));
     }
     if (status == STATUS_OK) {
         v->compass = compass_of(choose_up(job->settings, &t));
-        status = add_frames(v, &t, render_settings_text(job->settings, is_path ? "path" : "view"), path, offset, err);
+        status = add_frames(v, &t, render_settings_text(job->settings, setting), setting, shown, offset, err);
     }
     if (status == STATUS_OK && v->count == 0)
-        status = error_set(err, STATUS_NOT_FOUND, "%s: has no view", path);
+        status = error_set(err, STATUS_INPUT, "setting cameras: %s has no view", shown);
     frames_release(&t);
     cJSON_Delete(findings.problems);
     findings_release(&findings);

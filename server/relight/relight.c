@@ -294,6 +294,12 @@ static enum status check_denoiser(const struct relight_state *r, struct error *e
     return status;
 }
 
+static enum status say_dark(struct error *err) {
+    enum status status = error_set(err, STATUS_INPUT, "Nothing shines: the picture will be black.");
+    error_hint(err, "light an emitter (light.N=on), add a lamp (lamp.1.kind=sphere), or give an environment");
+    return status;
+}
+
 /* Views, room and output; what was made is released by run_close, also after a failure. */
 static enum status run_open(struct relight_state *r, struct error *err) {
     struct mesh mesh = {0};
@@ -312,7 +318,7 @@ static enum status run_open(struct relight_state *r, struct error *err) {
     if (status == STATUS_OK && r->needs_light)
         status = use_sun(r, r->suns / 2, err);
     if (status == STATUS_OK && r->needs_light && !shines(r))
-        status = error_set(err, STATUS_INPUT, "Nothing shines: the picture will be black.");
+        status = say_dark(err);
     if (status == STATUS_OK)
         status = choose_exposure(r, err);
     if (render_settings_bool(r->job->settings, "denoise") && r->job->denoiser)

@@ -71,7 +71,7 @@ export class JobView {
     const wanted = job.wanted === "run" || TERMINAL.includes(job.state) ? "" : `, to ${job.wanted}`;
     this.at("state").textContent = job.state + wanted;
     this.at("stage").textContent = job.state !== "running" ? "" :
-      [job.stage, job.eta_sec !== null ? `${duration(job.eta_sec)} left` : ""].filter(Boolean).join(", ");
+      [job.stage, job.parts ? `${job.parts.done} of ${job.parts.count} parts` : "", job.eta_sec !== null ? `${duration(job.eta_sec)} left` : ""].filter(Boolean).join(", ");
     this.at("job-progress").value = job.state === "succeeded" ? 1 : job.progress;
     this.at("job-progress").hidden = TERMINAL.includes(job.state);
     this.at("reason").textContent = [job.reason, job.hint].filter(Boolean).join(". ");

@@ -29,6 +29,8 @@ call GET '/v1/settings?kind=render'; expect 200; equal "$(field '[.items[].name]
 call GET '/v1/settings?kind=evaluate'; expect 400
 run 4 render 1 --set nothing=1 --spp 0
 has "$err" "settings.nothing"; has "$err" "settings.spp"
+post 422 '{"kind":"render","source":1,"settings":{"executor":"nowhere","parts":1001}}'
+equal "$(names)" "settings.executor settings.parts"
 run 7 render 1 --environment "$work/none.hdr"
 
 # --- a picture, and what it is beforehand ---
@@ -90,6 +92,21 @@ run 0 get "$id" -q -o "$work/broken"
 run 0 render 1 $lamp $many -q -o "$work/whole"
 diff -r -x preview "$work/broken" "$work/whole" || fail "broken off and gone on with, it differs"
 equal "$(find "$work/whole" -name '*.exr' | wc -l)" 8 "pictures"
+
+# --- what is wrong with the room, or not in it, is said once, and without where it lies here ---
+cannot() { # cannot PART ARGUMENT...: the render fails with its first attempt
+    local part=$1
+    shift
+    run 1 render 1 "$@" -o "$work/none"
+    has "$out" "$part"
+    [ ! -e "$work/none" ] || fail "a render that failed has left files"
+    equal "$("$build/unbake" list --kind render --json | jq -c '.[0] | [.attempt, .attempts_left]')" '[1,9]' "attempts of what cannot be"
+}
+# shellcheck disable=SC2086
+cannot 'setting view: views.json has no view "99" among its' $lamp --view 99
+cannot "Nothing shines" --lights off --environment none
+call GET "/v1/jobs?kind=render"; has "$(field '.items[0].hint')" "add a lamp"
+cannot "setting remove: the room has segments" --set remove=99
 
 # --- a small render does not wait behind a reconstruction, a large one does ---
 run 0 submit "$work/room" --set texture_size=64 --set texels_per_metre=2 --set iterations=1000000000 --set texels_per_iteration=64 -q

@@ -29,17 +29,18 @@ pid_of() { grep "job $id: attempt $1 runs as process" "$work/log" | sed 's/.*pro
 
 # --- at once on this machine; the worker of one part is killed ---
 # shellcheck disable=SC2086
-run 0 render 1 $many --set parts=3 --set executor=process -q; id=$out
+run 0 render 1 $many --set parts=2 --set executor=process -q; id=$out
 wait_for 60 rendered 2
 [ "$(workers)" -ge 3 ] || fail "its parts do not run at once"
-equal "$(field_of "$id" '[.state, .parts.count]')" '["running",3]' "a job in parts"
+equal "$(field_of "$id" '[.state, .parts.count]')" '["running",2]' "a job in parts"
 kill -KILL "$(pid_of 2)"
 wait_for 120 job_is "$id" succeeded
 same "$id" local
-equal "$(field_of "$id" '[.attempts_left, .parts]')" '[3,{"count":3,"done":3}]' "the job at its end"
+run 0 show "$id"; has "$out" "2 of 2 done"
+equal "$(field_of "$id" '[.attempts_left, .parts]')" '[3,{"count":2,"done":2}]' "the job at its end"
 call GET "/v1/jobs/$id/events" -H 'Last-Event-ID: 0'
-has "$(cat "$work/body")" "part 1 of 3 is tried again: killed from outside"
-has "$(cat "$work/body")" "part 3 of 3 is done"
+has "$(cat "$work/body")" "part 1 of 2 is tried again: killed from outside"
+has "$(cat "$work/body")" "part 2 of 2 is done"
 equal "$(sed -n 's/^data: {"state":"\([a-z]*\)".*/\1/p' "$work/body" | xargs)" "queued running succeeded" "its states"
 equal "$(curl -s "$url/v1/jobs/$id/log" | grep -c 'unbaked worker')" 0 "faults in its log"
 

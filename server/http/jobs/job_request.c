@@ -204,8 +204,8 @@ void job_request_settings(const struct job_request *w, struct settings *settings
     cJSON_Delete(problems);
 }
 
-void job_request_executor(const struct settings *settings, const char *names, cJSON *params) {
-    const char *wish = settings_text(settings, "executor"), *at = names ? names : "";
+void job_request_executor(const char *wish, const char *names, cJSON *params) {
+    const char *at = names ? names : "";
     size_t length = strlen(wish);
     while (length > 0 && *(at += strspn(at, " ,\t"))) {
         size_t each = strcspn(at, " ,\t");

@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "common/mem.h"
+#include "common/render_settings.h"
 #include "common/settings.h"
 #include "common/sha256.h"
 #include "server/data/work_file.h"
@@ -85,9 +86,13 @@ static void check_settings(struct job_submission *s) {
     switch (s->w.kind) {
     case JOB_RECONSTRUCT:
         job_request_settings(&s->w, &s->settings, s->params);
-        job_request_executor(&s->settings, s->api->config.executors, s->params);
+        job_request_executor(settings_text(&s->settings, "executor"), s->api->config.executors, s->params);
         break;
-    case JOB_RENDER: render_request_read(&s->render, s->w.settings, s->params); break;
+    case JOB_RENDER:
+        render_request_read(&s->render, s->w.settings, s->params);
+        if (s->w.settings)
+            job_request_executor(render_settings_text(s->w.settings, "executor"), s->api->config.executors, s->params);
+        break;
     case JOB_EVALUATE:
         if (s->w.settings && (!cJSON_IsObject(s->w.settings) || s->w.settings->child))
             problem_param(s->params, "settings", NULL, "an evaluation has no settings");
