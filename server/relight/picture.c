@@ -9,7 +9,7 @@
 
 /* A round: so many paths that stopping and looking cost little, and so few that they are soon done. */
 #define ROUND_PATHS 4e6
-#define FIRST_PATHS 1e6      /* of the first round, which is the first preview */
+#define FIRST_PATHS 1e6   /* of the first round, which is the first preview */
 #define ROUND_LEAST_SPP 4 /* FILM_GROUPS: there are standard errors */
 #define ROUND_MOST_SPP 64
 
