@@ -98,7 +98,7 @@ END
 kill_steps() {
     local pid
     for pid in $(pgrep -x slurmstepd); do
-        tr '\0' '\n' <"/proc/$pid/environ" 2>/dev/null | grep -qxF "SLURM_CONF=$dir/slurm.conf" || continue
+        { tr '\0' '\n' <"/proc/$pid/environ"; } 2>/dev/null | grep -qxF "SLURM_CONF=$dir/slurm.conf" || continue
         pkill -KILL -P "$pid" || true
         kill -KILL "$pid" 2>/dev/null || true
     done
