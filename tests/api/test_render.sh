@@ -70,6 +70,16 @@ run 0 render 1 --environment "$work/maps/day.png" --spp 4 -q -o "$work/d"
 cmp "$work/c/00000_radiance.png" "$work/d/00000_radiance.png" || fail "--file and a path differ"
 run 2 render 1 --spp 4 --file "$work/sky.png"
 
+# --- a mesh with its own materials, which are in a file of their own ---
+printf 'mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n' >"$work/m.obj"
+printf 'newmtl red\nKd 1 0 0\nd 0.5\n' >"$work/m.mtl"
+# shellcheck disable=SC2086
+run 0 render 1 $lamp --spp 4 --set insert.1.file="$work/m.obj" --set attach.1="$work/m.mtl" -q; id=$out
+wait_for 60 job_is "$id" succeeded
+run 0 get "$id" -q -o "$work/m"
+equal "$(jq -c '[.settings["insert.1.file"], .settings["attach.1"]]' "$work/m/views.json")" '["m.obj","m.mtl"]' "files"
+run 0 logs "$id"; has "$out" 'not rendered: transparency (1)'
+
 # --- a worker dies in the middle of several pictures: those that are done stay, and all bytes are the same ---
 many="--set cameras=photographs --view all --size 64x48 --spp 600 --set format=both"
 # shellcheck disable=SC2086
