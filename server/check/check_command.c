@@ -95,7 +95,7 @@ static enum status find_facts(const struct arguments *a, const struct scene_chec
     check_table_add(*facts, room, settings, (double)machine_memory_available(""), pool);
     enum status status = dir ? file_make_dirs(dir, err) : STATUS_OK;
     if (dir && status == STATUS_OK)
-        status = check_pictures_write(room, dir, pool, cJSON_AddArrayToObject(*facts, "previews"), err);
+        status = check_pictures_write(room, dir, pool, cJSON_AddArrayToObject(*facts, "previews"), NULL, NULL, err);
     json_add_number(*facts, "load_sec", room->load_sec);
     json_add_number(*facts, "fit_sec", room->fit_sec);
     json_add_number(*facts, "pictures_sec", clock_sec() - begin);
@@ -111,7 +111,7 @@ static enum status check(const struct arguments *a, const struct reading *readin
     cJSON *problems = cJSON_CreateArray(), *facts = NULL;
     bool as_json = arguments_have(a, "--json");
     pixels_use(pixels, &limits);
-    enum status status = scene_check(&room, a->words[0], reading, &limits, pool, problems, err);
+    enum status status = scene_check(&room, a->words[0], reading, &limits, pool, problems, NULL, NULL, err);
     *fits = status == STATUS_OK && room.fit.verdict != FIT_NO;
     if (status == STATUS_OK) {
         status = find_facts(a, &room, settings, pool, &facts, err);

@@ -109,10 +109,14 @@ static enum status write_exposures(const struct scene_check *room, const char *d
 }
 
 enum status check_pictures_write(const struct scene_check *room, const char *dir, struct parallel *pool,
-                                 cJSON *previews, struct error *err) {
+                                 cJSON *previews, check_pictures_drawn *drawn, void *user, struct error *err) {
     enum status status = write_overlays(room, dir, pool, previews, err);
+    if (status == STATUS_OK && drawn)
+        drawn(user);
     if (status == STATUS_OK)
         status = write_plan(room, dir, pool, previews, err);
+    if (status == STATUS_OK && drawn)
+        drawn(user);
     if (status == STATUS_OK)
         status = write_exposures(room, dir, previews, err);
     return status;

@@ -9,6 +9,8 @@ static enum status load(struct scene_check *room, const char *dir, const struct 
     double begin = clock_sec();
     enum status status = bundle_load(dir, &room->reading, limits, pool, &room->scene, problems, err);
     room->load_sec += clock_sec() - begin;
+    if (status == STATUS_OK && room->read)
+        room->read(room->user, &room->scene);
     begin = clock_sec();
     if (status == STATUS_OK)
         status = accel_new(&room->accel, &room->scene.mesh, pool, err);
@@ -71,8 +73,10 @@ static enum status take(struct scene_check *room, const char *dir, const struct 
 }
 
 enum status scene_check(struct scene_check *room, const char *dir, const struct reading *reading,
-                        const struct bundle_limits *limits, struct parallel *pool, cJSON *problems, struct error *err) {
-    *room = (struct scene_check){.reading = reading_copy(reading), .given_reading = reading_default()};
+                        const struct bundle_limits *limits, struct parallel *pool, cJSON *problems,
+                        scene_check_read *read, void *user, struct error *err) {
+    *room = (struct scene_check){
+        .reading = reading_copy(reading), .given_reading = reading_default(), .read = read, .user = user};
     enum status status = load(room, dir, limits, pool, problems, err);
     if (status == STATUS_OK && room->fit.is_overwhelming)
         status = take(room, dir, limits, pool, problems, err);

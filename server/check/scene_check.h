@@ -14,12 +14,18 @@ struct scene_check {
     struct fit_result given; /* of the scene as it was given, where a remedy was taken */
     struct reading given_reading;
     double load_sec, fit_sec;
+    void (*read)(void *user, const struct scene *scene);
+    void *user;
 };
 
+/* Told when the bundle is read, before it is judged; again where a remedy was taken. */
+typedef void scene_check_read(void *user, const struct scene *scene);
+
 /* As bundle_load; *room is the caller's (scene_check_release) in any case. Members of the reading that the user gave
- * are never replaced: their remedy is only told. */
+ * are never replaced: their remedy is only told. `read` may be NULL. */
 enum status scene_check(struct scene_check *check, const char *dir, const struct reading *reading,
-                        const struct bundle_limits *limits, struct parallel *pool, cJSON *problems, struct error *err);
+                        const struct bundle_limits *limits, struct parallel *pool, cJSON *problems,
+                        scene_check_read *read, void *user, struct error *err);
 void scene_check_release(struct scene_check *check);
 
 /* {"fit": ..., "reading": ...} for the scene's facts; the caller's. */

@@ -296,6 +296,18 @@ static bool note_counters(const struct message_listener *l, const cJSON *line) {
     return is_rays;
 }
 
+/* For who watches the check; the last ones are entered when it ends. */
+static void note_facts(const struct message_listener *l) {
+    struct attempt *a = l->attempt;
+    struct error err;
+    if (!a->facts)
+        return;
+    char *text = json_text(a->facts);
+    if (store_scene_tell(l->store, a->scene_id, a->reading, text, &err) != STATUS_OK)
+        complain(a, "scene", &err);
+    mem_free(text);
+}
+
 /* A worker that works as intended never sends unknown lines. Logged once. */
 static void say_unread(struct attempt *a, const char *what) {
     if (!a->said_unread && a->job_id)
@@ -352,6 +364,7 @@ static void take_line(void *user, const char *text, size_t length) {
     } else if (strcmp(type, "scene") == 0) {
         cJSON_Delete(a->facts);
         a->facts = cJSON_DetachItemFromObjectCaseSensitive(line, "facts");
+        note_facts(l);
     }
     cJSON_Delete(kept);
     cJSON_Delete(line);

@@ -130,6 +130,19 @@ static enum status conclude(struct store *store, const char *id, const char *rea
     return store_end(store, status, 0, err);
 }
 
+enum status store_scene_tell(struct store *store, const char *id, const char *reading, const char *facts,
+                             struct error *err) {
+    int64_t overtaken = 0;
+    enum status status = store_begin(store, err);
+    if (status != STATUS_OK)
+        return status;
+    status = store_scene_is_overtaken(store, id, reading, &overtaken, err);
+    if (status == STATUS_OK && !overtaken)
+        status = sql_run(&store->sql, err, "UPDATE scenes SET facts = ? WHERE id = ? AND state = ?", "ttn", facts, id,
+                         (int)SCENE_CHECKING);
+    return store_end(store, status, STORE_NOTHING_CHANGED, err);
+}
+
 enum status store_scene_ready(struct store *store, const char *id, const char *reading, const char *facts,
                               struct error *err) {
     return conclude(store, id, reading, SCENE_READY, "[]", facts, err);

@@ -106,7 +106,7 @@ function showCheck() {
   showLines("check-warnings", warnings);
   $("check-remedy").hidden = !fit?.remedy_text && !fit?.remedy;
   $("remedy-text").textContent = (fit?.taken ? "Done by itself: " : "") + (fit?.remedy_text ?? JSON.stringify(fit?.remedy ?? ""));
-  $("apply-remedy").hidden = !fit?.remedy || Boolean(fit.taken);
+  $("apply-remedy").hidden = !fit?.remedy || Boolean(fit.taken) || scene.state === "checking";
   $("start").hidden = !isReady;
   if (isReady) showSettings($("first-settings"), $("other-settings"));
   $("start-button").textContent = fit?.verdict === "no" ? "Start all the same" : "Start";

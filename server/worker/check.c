@@ -53,19 +53,38 @@ static double memory_of_jobs(const struct order *order) {
     return (double)(order->memory_bytes > 0 && order->memory_bytes < available ? order->memory_bytes : available);
 }
 
-/* The facts, with the pictures that were drawn of them. */
+/* Facts by now, for who watches the check. */
+struct told {
+    struct progress *progress;
+    const cJSON *facts;
+};
+
+static void tell_read(void *user, const struct scene *scene) {
+    const struct told *told = user;
+    progress_scene(told->progress, facts_of(scene));
+}
+
+static void tell_drawn(void *user) {
+    const struct told *told = user;
+    progress_scene(told->progress, cJSON_Duplicate(told->facts, true));
+}
+
+/* The facts, with the pictures that were drawn of them, as they come; they are final with the last line. */
 static enum status tell_facts(struct progress *progress, const struct order *order, const struct scene_check *room,
                               struct parallel *pool, struct error *err) {
     char *previews = layout_previews(order->dir);
     cJSON *facts = facts_of(&room->scene);
+    struct told told = {progress, facts};
     struct settings settings; /* of a job for which nothing is set */
     settings_init(&settings);
     scene_check_facts(room, facts);
     check_table_add(facts, room, &settings, memory_of_jobs(order), pool);
     settings_release(&settings);
+    tell_drawn(&told); /* nothing so far */
     enum status status = file_make_dirs(previews, err);
     if (status == STATUS_OK)
-        status = check_pictures_write(room, previews, pool, cJSON_AddArrayToObject(facts, "previews"), err);
+        status = check_pictures_write(room, previews, pool, cJSON_AddArrayToObject(facts, "previews"), tell_drawn,
+                                      &told, err);
     if (status == STATUS_OK)
         status = flush(order->dir, err);
     if (status == STATUS_OK)
@@ -92,7 +111,8 @@ enum status task_check(const struct order *order, struct progress *progress, str
     if (status == STATUS_OK)
         status = bundle_unpack(archive, files, &limits, err);
     if (status == STATUS_OK) {
-        status = scene_check(&room, files, &reading, &limits, pool, problems, err);
+        struct told told = {.progress = progress};
+        status = scene_check(&room, files, &reading, &limits, pool, problems, tell_read, &told, err);
         tell_problems(progress, problems);
         if (status == STATUS_OK)
             status = tell_facts(progress, order, &room, pool, err);

@@ -12,7 +12,7 @@
  *   {"type":"plan","pictures":500,"parts":8,"digest":"…"}   a render that is better done in parts (store/parts.h); it ends
  *   {"type":"space","bytes":…}   what it takes of the disk besides the files in its folder
  *   {"type":"problem","file":"images/003.png","reason":"…","hint":"…"}   (scene checks)
- *   {"type":"scene","facts":{"triangle_count":…,"frame_count":…,…}}  (scene checks, last)
+ *   {"type":"scene","facts":{"triangle_count":…,"frame_count":…,…}}  (scene checks: what is known by now, at last all of it)
  *   {"type":"end","status":"ok|input|no-space|…","message":"…","hint":"…"}
  *
  * A line is at most PROGRESS_LINE_MAX bytes. Signals go the other way: SIGTERM checkpoint and

@@ -73,6 +73,8 @@ static enum status patch_scene(void) {
 static enum status read_scene_otherwise(void) {
     return store_scene_patch(store, &alice, SCENE_A, &(struct scene_patch){.reading = "{\"axes\":\"opencv\"}"}, &err);
 }
+static enum status tell_overtaken(void) { return store_scene_tell(store, SCENE_A, "{}", "{\"a\":1}", &err); }
+static enum status tell_checking(void) { return store_scene_tell(store, SCENE_A, NULL, "{\"b\":2}", &err); }
 static enum status conclude_overtaken(void) { return store_scene_ready(store, SCENE_A, "{}", "{}", &err); }
 static enum status access_scene(void) {
     enum access access;
@@ -426,6 +428,8 @@ static const struct step {
     STEP(add_scene),
     STEP(ready),
     STEP(read_scene_otherwise),
+    STEP(tell_overtaken),
+    STEP(tell_checking),
     STEP(conclude_overtaken),
     STEP(ready),
     STEP(other_ready),

@@ -50,7 +50,7 @@ static struct outcome load(const char *name, struct parallel *pool) {
     struct buf said;
     cJSON *problems = cJSON_CreateArray(), *problem;
     char *dir = mem_printf("%s/captures/%s", data_folder(), name);
-    enum status status = scene_check(&room, dir, &reading, &limits, pool, problems, &err);
+    enum status status = scene_check(&room, dir, &reading, &limits, pool, problems, NULL, NULL, &err);
     CHECK_THAT(status == STATUS_OK || status == STATUS_INPUT, "%s: %s", name, err.message);
     buf_init(&said, 1 << 20);
     for (size_t i = 0; i < room.scene.warning_count; i++)

@@ -51,7 +51,7 @@ static void test_files(const struct scene_check *room, struct parallel *pool) {
     struct error err = {0};
     cJSON *previews = cJSON_CreateArray();
     CHECK(mkdtemp(dir) != NULL);
-    CHECK_THAT(check_pictures_write(room, dir, pool, previews, &err) == STATUS_OK, "%s", err.message);
+    CHECK_THAT(check_pictures_write(room, dir, pool, previews, NULL, NULL, &err) == STATUS_OK, "%s", err.message);
     CHECK(cJSON_GetArraySize(previews) == CHECK_OVERLAYS + 2);
     const cJSON *preview;
     cJSON_ArrayForEach(preview, previews) {

@@ -140,7 +140,12 @@ static void test_reading(void) {
     OK(store_scene_reject(store, SCENE_A, "{}", "[{\"file\":\"a\"}]", "{}", &err));
     OK(store_scene_postpone(store, SCENE_A, "{}", "[{\"file\":\"a\"}]", &err));
     check_scene(store, SCENE_CHECKING, OPENCV, "{}");
+    OK(store_scene_tell(store, SCENE_A, "{}", "{\"n\":1}", &err)); /* overtaken, too */
+    check_scene(store, SCENE_CHECKING, OPENCV, "{}");
+    OK(store_scene_tell(store, SCENE_A, OPENCV, "{\"n\":0}", &err)); /* seen while it is checked */
+    check_scene(store, SCENE_CHECKING, OPENCV, "{\"n\":0}");
     OK(store_scene_reject(store, SCENE_A, OPENCV, "[{\"file\":\"a\"}]", "{\"warnings\":[\"w\"]}", &err));
+    OK(store_scene_tell(store, SCENE_A, OPENCV, "{\"n\":0}", &err)); /* too late */
     check_scene(store, SCENE_REJECTED, OPENCV, "{\"warnings\":[\"w\"]}");
     OK(read_as(store, NULL, OPENCV)); /* the same, once more */
     check_scene(store, SCENE_CHECKING, OPENCV, "{}");
