@@ -4,9 +4,9 @@
 #include <math.h>
 #include <string.h>
 
+#include "common/cholesky.h"
 #include "common/mem.h"
 #include "common/quantile.h"
-#include "server/capture/conjugate.h"
 #include "server/scene/latlong.h"
 
 #define COLUMNS UNSEEN_COLUMNS
@@ -110,18 +110,6 @@ struct normal {
     double matrix[CELLS][CELLS], residual[CELLS];
 };
 
-static void multiply(const void *user, const double *x, double *out) {
-    const struct normal *n = user;
-    for (size_t i = 0; i < CELLS; i++)
-        out[i] = conjugate_dot(n->matrix[i], x, CELLS);
-}
-
-static void precondition(const void *user, const double *residual, double *out) {
-    const struct normal *n = user;
-    for (size_t i = 0; i < CELLS; i++)
-        out[i] = residual[i] / n->matrix[i][i];
-}
-
 /* Pulls the difference of two unknowns, or of one and a constant, to zero. */
 static void tie(struct normal *n, size_t a, size_t b, double difference, double weight) {
     n->matrix[a][a] += weight;
@@ -154,7 +142,7 @@ static void add_point(struct normal *n, const struct unseen_point *p, const doub
 }
 
 static void step(struct fit *f, struct normal *n, double *log_base, double *mean) {
-    double *cell = f->cell, move[CELLS] = {0};
+    double *cell = f->cell;
     double inertia = INERTIA * (double)f->count, smoothness = SMOOTHNESS * (double)f->count;
     memset(n, 0, sizeof *n);
     for (size_t i = 0; i < f->count; i++)
@@ -169,10 +157,11 @@ static void step(struct fit *f, struct normal *n, double *log_base, double *mean
         if (k + COLUMNS < CELLS)
             tie(n, k, k + COLUMNS, cell[k] - cell[k + COLUMNS], smoothness);
     }
-    struct conjugate_system system = {CELLS, multiply, precondition, n};
-    conjugate_solve(&system, CELLS, 0.0, n->residual, move);
+    if (!cholesky_factor(CELLS, CELLS, &n->matrix[0][0]))
+        return;
+    cholesky_solve(CELLS, CELLS, &n->matrix[0][0], n->residual);
     for (size_t k = 0; k < CELLS; k++)
-        cell[k] += fmin(fmax(move[k], -LONGEST_STEP), LONGEST_STEP);
+        cell[k] += fmin(fmax(n->residual[k], -LONGEST_STEP), LONGEST_STEP);
 }
 
 void unseen_fit(const struct unseen_point *point, size_t count, size_t segment_count, double log_radiance[CELLS]) {
