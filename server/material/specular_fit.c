@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "common/mem.h"
+#include "server/material/specular_misfit.h"
 #include "server/material/specular_observation.h"
 #include "server/material/specular_posterior.h"
 
@@ -13,12 +14,6 @@
 #define POINTS_ENOUGH 32 /* +25 %: no change */
 #define PART_ENOUGH 8    /* +25 %: 0 dB, roughness -0.14, specular -0.20 */
 #define MIN_VIEWS 3      /* observations of a point; to 4: +0.06 dB, roughness +1.45, specular +1.60 */
-/* Scale of the robust residual (weight 1/4 at one scale): parts of the texel's radiance and of the room's median. */
-#define SCALE_RELATIVE 0.12f /* +25 %: 0 dB, roughness -0.22, specular -0.28 */
-#define SCALE_MEDIAN 0.005f  /* +25 %: 0 dB */
-/* Upper bound of base colour in the fit. Above 1 because incident light may be underestimated: with a bound of 1 white
- * surfaces would be explained by highlights that do not exist. */
-#define MAX_BASE_COLOR 1.25f /* +25 %: +0.04 dB, roughness +0.05 */
 /* Standard error, as a part of the misfit, from errors that all texels of a segment share: incident light, base colour
  * and, where every pixel is near an edge, light of other surfaces. Near window bars and door frames the true material's
  * misfit is up to a tenth above that of a diffuse one. */
@@ -35,26 +30,22 @@
 #define DARKER_ERRORS 3.0      /* +25 %: no change */
 
 #define ROUGHNESSES HIGHLIGHT_ROUGHNESSES
-#define SPECULARS (HIGHLIGHT_SPECULARS + 1) /* the first is 0: no highlight */
+#define SPECULARS SPECULAR_LEVELS
 
 static const float specular_of[SPECULARS] = {0.0f, 0.125f, 0.25f, 0.5f, 0.75f, 1.0f};
 
-/* Indices into the levels of roughness and specular. */
-struct candidate_levels {
-    size_t k, m;
+static const struct specular_candidate_levels diffuse_candidate = {ROUGHNESSES - 1, 0};
+
+/* Points of one segment. */
+struct segment_points {
+    struct specular_points points; /* with room for [points wanted] samples */
+    bool is_observed;              /* its material can be fitted; otherwise these points only tell whether it is dark */
 };
 
-static const struct candidate_levels diffuse_candidate = {ROUGHNESSES - 1, 0};
-
-typedef float misfits[ROUGHNESSES][SPECULARS]; /* of a point, by the candidates */
-
-/* Points of one segment and their misfits. */
-struct segment_points {
-    size_t count;
-    bool is_observed; /* its material can be fitted; otherwise these points only tell whether it is dark */
-    double floor;     /* MISFIT_FLOOR or MISFIT_FLOOR_EDGE */
-    struct specular_sample *sample; /* borrowed, [points wanted] */
-    misfits *misfit;                /* likewise */
+/* A sample to be fitted. */
+struct fitted_sample {
+    uint32_t sample;
+    size_t first_left; /* of its observations */
 };
 
 struct specular_job {
@@ -63,65 +54,27 @@ struct specular_job {
     struct specular_observer observer;
     struct segment_points *points;  /* [segment_count]; owned */
     struct specular_sample *sample; /* of all segments; owned */
-    misfits *misfit;                /* likewise */
-    uint32_t *used;                 /* samples to be fitted, [used_count]; owned */
+    struct fitted_sample *used;     /* [used_count] in the order of the segments; owned */
     size_t used_count;
+    specular_leavings *left;            /* of all observations of these; owned */
     struct specular_evidence *evidence; /* [segment_count]; owned */
 };
 
 /* --- misfits ------------------------------------------------------------------------------------ */
 
-/* Robust misfit of one channel of a sample under roughness k and specular m, with the base colour that fits its views
- * best (iteratively reweighted least squares; Geman and McClure's function). */
-static float misfit_channel(const struct specular_sample *s, const struct specular_prediction *prediction, size_t k,
-                            size_t m, int channel, float median) {
-    float diffuse[SPECULAR_VIEWS], unit_diffuse[SPECULAR_VIEWS], weight[SPECULAR_VIEWS], mean = 0.0f, misfit = 0.0f;
-    for (size_t i = 0; i < s->count; i++) {
-        const struct specular_prediction *p = &prediction[i];
-        float highlight = m == 0 ? 0.0f : (&p->highlight.radiance[k][m - 1].r)[channel];
-        diffuse[i] = (&s->view[i].observed.r)[channel] - highlight;
-        unit_diffuse[i] = (&p->unit_diffuse[k].r)[channel];
-        weight[i] = 1.0f;
-        mean += (&s->view[i].observed.r)[channel] / (float)s->count;
-    }
-    float scale = SCALE_RELATIVE * mean + SCALE_MEDIAN * median;
-    for (int sweep = 0; sweep < 4; sweep++) {
-        float over = 0.0f, under = 1e-20f;
-        for (size_t i = 0; i < s->count; i++) {
-            over += weight[i] * unit_diffuse[i] * diffuse[i];
-            under += weight[i] * unit_diffuse[i] * unit_diffuse[i];
-        }
-        float base = clampf(over / under, 0.0f, MAX_BASE_COLOR);
-        misfit = 0.0f;
-        for (size_t i = 0; i < s->count; i++) {
-            float e = (diffuse[i] - base * unit_diffuse[i]) / scale, influence = 1.0f / (1.0f + e * e);
-            weight[i] = influence * influence;
-            misfit += e * e * influence;
-        }
-    }
-    return misfit;
-}
-
 /* One sample is the unit of parallel work: it takes some milliseconds, a segment up to a thousand times as long. */
 static void find_misfits(void *user, size_t index, int thread) {
     const struct specular_job *job = user;
-    const struct specular_sample *s = &job->sample[job->used[index]];
-    misfits *misfit = &job->misfit[job->used[index]];
+    const struct specular_sample *s = &job->sample[job->used[index].sample];
     struct specular_prediction prediction[SPECULAR_VIEWS];
-    float median = job->observer.in.views->median_radiance;
     specular_predict(&job->observer, s, thread, prediction);
-    for (size_t k = 0; k < ROUGHNESSES; k++) {
-        for (size_t m = 0; m < SPECULARS; m++) {
-            (*misfit)[k][m] = 0.0f;
-            for (int c = 0; c < 3; c++)
-                (*misfit)[k][m] += misfit_channel(s, prediction, k, m, c, median);
-        }
-    }
+    specular_misfit_find(s, prediction, job->observer.in.views->median_radiance,
+                         &job->left[job->used[index].first_left]);
 }
 
 /* Samples points of a segment; false where fewer than two have enough observations. */
 static bool sample_points(const struct specular_job *job, size_t segment, struct specular_criteria criteria) {
-    struct segment_points *e = &job->points[segment];
+    struct specular_points *e = &job->points[segment].points;
     e->count = specular_observe(&job->observer, segment, criteria, e->sample);
     e->floor = criteria.edge == 0 ? MISFIT_FLOOR : MISFIT_FLOOR_EDGE;
     return e->count >= 2;
@@ -137,7 +90,7 @@ static bool sample_enough(const struct specular_job *job, size_t segment) {
         bool enough_points = false;
         for (criteria.edge = 0; criteria.edge < VIEWS_EDGE; criteria.edge++) {
             enough_points = sample_points(job, segment, criteria);
-            if (job->points[segment].count >= enough)
+            if (job->points[segment].points.count >= enough)
                 return true;
         }
         if (criteria.patch <= SPECULAR_MIN_PATCH)
@@ -145,22 +98,14 @@ static bool sample_enough(const struct specular_job *job, size_t segment) {
     }
 }
 
-/* Sum of a candidate's misfits over the points. */
-static double misfit_of(const struct segment_points *e, struct candidate_levels c) {
-    double sum = 0.0;
-    for (size_t i = 0; i < e->count; i++)
-        sum += (double)e->misfit[i][c.k][c.m];
-    return sum;
-}
-
 /* The candidate of the least misfit. */
-static struct candidate_levels best_of(const struct segment_points *e) {
-    struct candidate_levels best = diffuse_candidate;
-    double least = misfit_of(e, diffuse_candidate);
+static struct specular_candidate_levels best_of(const struct specular_points *e) {
+    struct specular_candidate_levels best = diffuse_candidate;
+    double least = specular_misfit_sum(e, diffuse_candidate);
     for (size_t k = 0; k < ROUGHNESSES && specular_levels.roughness[k] <= SPECULAR_MAX_ROUGHNESS; k++) {
         for (size_t m = 1; m < SPECULARS; m++) {
-            struct candidate_levels c = {k, m};
-            double misfit = misfit_of(e, c);
+            struct specular_candidate_levels c = {k, m};
+            double misfit = specular_misfit_sum(e, c);
             if (misfit < least)
                 best = c, least = misfit;
         }
@@ -168,25 +113,10 @@ static struct candidate_levels best_of(const struct segment_points *e) {
     return best;
 }
 
-/* Misfit of candidate `a` less that of `b`: as a part of a's, and in standard errors over the points. */
-static void compare(const struct segment_points *e, struct candidate_levels a, struct candidate_levels b, double *part,
-                    double *errors) {
-    double total = 0.0, gain = 0.0, squares = 0.0, n = (double)e->count;
-    for (size_t i = 0; i < e->count; i++) {
-        double without = (double)e->misfit[i][a.k][a.m], d = without - (double)e->misfit[i][b.k][b.m];
-        total += without;
-        gain += d;
-        squares += d * d;
-    }
-    double floor = e->floor * total;
-    *part = gain / fmax(total, 1e-30);
-    *errors = gain / sqrt(fmax(squares - gain * gain / n + floor * floor, 1e-30));
-}
-
 /* Likelihood of the observations under a candidate, relative to the best one: its excess misfit as a normal deviate. */
-static double likelihood(const struct segment_points *e, struct candidate_levels c, struct candidate_levels best) {
-    double part, errors;
-    compare(e, c, best, &part, &errors);
+static double likelihood(const struct specular_points *e, struct specular_candidate_levels c,
+                         struct specular_candidate_levels best) {
+    double errors = specular_misfit_gain(e, c, best).errors;
     return errors > 0.0 ? exp(-0.5 * errors * errors) : 1.0;
 }
 
@@ -214,21 +144,22 @@ static double between(double left, double middle, double right) {
 }
 
 /* Roughness of the best candidate, refined between the levels. */
-static double roughness_about(const struct segment_points *e, struct candidate_levels best) {
+static double roughness_about(const struct specular_points *e, struct specular_candidate_levels best) {
     const float *level = specular_levels.roughness;
     size_t k = best.k, m = best.m;
     double middle = (double)level[k];
     if (m == 0 || k == 0 || k + 1 == ROUGHNESSES)
         return middle;
-    double offset = between(misfit_of(e, (struct candidate_levels){k - 1, m}), misfit_of(e, best),
-                            misfit_of(e, (struct candidate_levels){k + 1, m}));
+    double offset =
+        between(specular_misfit_sum(e, (struct specular_candidate_levels){k - 1, m}), specular_misfit_sum(e, best),
+                specular_misfit_sum(e, (struct specular_candidate_levels){k + 1, m}));
     return middle + offset * (offset < 0.0 ? middle - (double)level[k - 1] : (double)level[k + 1] - middle);
 }
 
-static void set_evidence(const struct specular_job *job, size_t segment, const struct segment_points *e) {
+static void set_evidence(const struct specular_job *job, size_t segment, const struct specular_points *e) {
     const struct specular_observer *l = &job->observer;
     struct specular_evidence *evidence = &job->evidence[segment];
-    struct candidate_levels best = best_of(e);
+    struct specular_candidate_levels best = best_of(e);
     evidence->is_observed = true;
     evidence->part = (double)by_segment_count(&l->texels, segment) / (double)l->in.surface.inverse->valid_count;
     evidence->base_color = mean_base_color(l, &job->materials->base_color, segment);
@@ -237,7 +168,8 @@ static void set_evidence(const struct specular_job *job, size_t segment, const s
     evidence->likelihood[SPECULAR_DIFFUSE] = likelihood(e, diffuse_candidate, best);
     for (size_t k = 0; k < ROUGHNESSES; k++)
         for (size_t m = 1; m < SPECULARS; m++)
-            evidence->likelihood[specular_candidate(k, m - 1)] = likelihood(e, (struct candidate_levels){k, m}, best);
+            evidence->likelihood[specular_candidate(k, m - 1)] =
+                likelihood(e, (struct specular_candidate_levels){k, m}, best);
 }
 
 static void set_lobe(struct materials *materials, size_t segment, double roughness, double specular) {
@@ -254,22 +186,21 @@ static void sample_segment(void *user, size_t segment, int thread) {
         return;
     e->is_observed = sample_enough(job, segment);
     if (!e->is_observed && !sample_points(job, segment, (struct specular_criteria){SPECULAR_MIN_PATCH, VIEWS_EDGE, 1}))
-        e->count = 0;
+        e->points.count = 0;
 }
 
 /* Whether a segment without clean observations is darker than the material for unknown segments allows, which reflects
  * a window at grazing angles. This test is one-sided: base colour explains anything brighter. */
-static bool is_too_dark(const struct segment_points *e) {
-    struct candidate_levels guess = {0, 0};
-    double part, errors;
+static bool is_too_dark(const struct specular_points *e) {
+    struct specular_candidate_levels guess = {0, 0};
     if (e->count == 0)
         return false;
     while (specular_levels.roughness[guess.k] < UNKNOWN_ROUGHNESS)
         guess.k++;
     while (specular_of[guess.m] < UNKNOWN_SPECULAR)
         guess.m++;
-    compare(e, diffuse_candidate, guess, &part, &errors);
-    return part < -DARKER_PART && errors < -DARKER_ERRORS;
+    struct specular_gain gain = specular_misfit_gain(e, diffuse_candidate, guess);
+    return gain.part < -DARKER_PART && gain.errors < -DARKER_ERRORS;
 }
 
 static void measure_segment(void *user, size_t segment, int thread) {
@@ -277,8 +208,8 @@ static void measure_segment(void *user, size_t segment, int thread) {
     const struct segment_points *e = &job->points[segment];
     (void)thread;
     if (e->is_observed)
-        set_evidence(job, segment, e);
-    if (job->is_emitter[segment] || (!e->is_observed && is_too_dark(e)))
+        set_evidence(job, segment, &e->points);
+    if (job->is_emitter[segment] || (!e->is_observed && is_too_dark(&e->points)))
         set_lobe(job->materials, segment, 1.0, 0.0);
     else
         set_lobe(job->materials, segment, UNKNOWN_ROUGHNESS, UNKNOWN_SPECULAR);
@@ -304,19 +235,27 @@ static void make_room(struct specular_job *job, size_t segments) {
         total += specular_points_wanted(&job->observer, i);
     job->points = mem_calloc(segments, sizeof *job->points);
     job->sample = mem_array(total, sizeof *job->sample);
-    job->misfit = mem_array(total, sizeof *job->misfit);
     job->used = mem_array(total, sizeof *job->used);
     for (size_t i = 0; i < segments; i++) {
-        job->points[i].sample = &job->sample[first];
-        job->points[i].misfit = &job->misfit[first];
+        job->points[i].points.sample = &job->sample[first];
         first += specular_points_wanted(&job->observer, i);
     }
 }
 
+/* Lists the samples that were observed, and makes room for their misfits. */
 static void list_used(struct specular_job *job, size_t segments) {
-    for (size_t i = 0; i < segments; i++)
-        for (size_t k = 0; k < job->points[i].count; k++)
-            job->used[job->used_count++] = (uint32_t)(job->points[i].sample - job->sample + (ptrdiff_t)k);
+    size_t observations = 0;
+    for (size_t i = 0; i < segments; i++) {
+        const struct specular_points *e = &job->points[i].points;
+        for (size_t k = 0; k < e->count; k++) {
+            uint32_t sample = (uint32_t)(e->sample - job->sample + (ptrdiff_t)k);
+            job->used[job->used_count++] = (struct fitted_sample){sample, observations};
+            observations += e->sample[k].count;
+        }
+    }
+    job->left = mem_array(observations + 1, sizeof *job->left);
+    for (size_t i = 0, at = 0; i < segments; at += job->points[i++].points.count)
+        job->points[i].points.left = &job->left[at < job->used_count ? job->used[at].first_left : observations];
 }
 
 void specular_fit(const struct specular_input *input, const bool *is_emitter, struct materials *materials,
@@ -332,7 +271,7 @@ void specular_fit(const struct specular_input *input, const bool *is_emitter, st
     parallel_for(pool, segments, measure_segment, &job);
     parallel_for(pool, segments, fit_segment, &job);
     mem_free(job.used);
-    mem_free(job.misfit);
+    mem_free(job.left);
     mem_free(job.sample);
     mem_free(job.points);
     mem_free(job.evidence);

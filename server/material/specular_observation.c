@@ -132,6 +132,7 @@ static bool observe_texel(const struct specular_observer *l, uint32_t texel, str
     if (patch.count == 0)
         return false;
     const struct surface_point *middle = &patch.at[patch.count / 2];
+    sample->position = middle->position;
     size_t view_count = views_pick(l->in.views, middle->position, middle->normal, texel, VIEWS_TRIED, view);
     for (size_t i = 0; i < view_count && sample->count < SPECULAR_VIEWS; i++) {
         if (patch_observed(l->in.views, &view[i], &patch, criteria.edge, &sample->view[sample->count].observed))

@@ -28,7 +28,8 @@ extern const struct highlight_levels specular_levels;
 /* A sample point of a segment, and what photographs show there: means over a square patch. */
 struct specular_sample {
     uint32_t texel;
-    float patch; /* side of the patch, texels */
+    vec3 position; /* of the middle of its patch, m */
+    float patch;   /* side of the patch, texels */
     uint32_t count;
     struct {
         uint32_t train; /* index into views.train */

@@ -1,5 +1,5 @@
 /* specular_fit.h: roughness and specular of a plane under a disc of distant light, from photographs that show what the reflection
- * model says, integrated over the disc: a polished, a satin and a matt one come back. */
+ * model says, integrated over the disc: a polished, a satin, an eggshell and a matt one come back. */
 #include "server/material/specular_fit.h"
 #include "server/render/bsdf.h"
 #include "server/scene/latlong.h"
@@ -81,9 +81,10 @@ static void test_fit(const struct image *sky, const struct disc *disc, float rou
     specular_fit(&input, r->is_emitter, &r->materials, r->pool);
     printf("roughness %.3f specular %.3f, true %.3f %.3f\n", (double)r->materials.roughness[0],
            (double)r->materials.specular[0], (double)roughness, (double)specular);
-    CHECK_NEAR(r->materials.specular[0], specular, 0.06f);
+    float off = roughness > 0.7f ? 2.0f : 1.0f; /* so wide a highlight is not told apart that well */
+    CHECK_NEAR(r->materials.specular[0], specular, 0.06f * off);
     if (specular > 0.0f)
-        CHECK_NEAR(r->materials.roughness[0], roughness, 0.03f);
+        CHECK_NEAR(r->materials.roughness[0], roughness, 0.03f * off);
     mem_free(sent);
     probes_release(&probes);
     plane_rig_release(&rig);
@@ -95,6 +96,7 @@ int main(void) {
     make_sky(&sky, &disc);
     test_fit(&sky, &disc, 0.25f, 0.5f);
     test_fit(&sky, &disc, 0.45f, 1.0f);
+    test_fit(&sky, &disc, 0.8f, 0.6f);
     test_fit(&sky, &disc, 1.0f, 0.0f);
     image_release(&sky);
     return check_result();
