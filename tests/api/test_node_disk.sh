@@ -48,5 +48,6 @@ blocked "while it writes a checkpoint" "$disk/work/*No space left"
 rm "$disk/filler"
 run 0 resume "$job"
 same "after three full disks" 4
+equal "$(ls -d "$data/jobs/$job"/attempt-* | wc -l)" 1 "folders of attempts"
 [ $failures = 0 ] || cat "$work/nodes.log"
 finish
