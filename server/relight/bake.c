@@ -59,6 +59,10 @@ static enum status make_atlas(const struct mesh *mesh, const struct mesh_look *l
         density[t] = finest > 0.0f ? fmaxf(density[t] / finest, LEAST_DENSITY) : 1.0f;
     double size = fmin(fmax(ceil(sqrt(sum / UTILISATION)), MIN_SIZE), BAKE_MAX_SIZE);
     enum status status = atlas_make_uneven(atlas, mesh, segments, (uint32_t)size, density, ATLAS_PADDING, err);
+    while (status == STATUS_INPUT && size < BAKE_MAX_SIZE) { /* of a mesh in many pieces each takes some texels */
+        size = fmin(2.0 * size, BAKE_MAX_SIZE);
+        status = atlas_make_uneven(atlas, mesh, segments, (uint32_t)size, density, ATLAS_PADDING, err);
+    }
     mem_free(density);
     return status;
 }

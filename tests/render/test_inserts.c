@@ -225,6 +225,26 @@ static void test_obj(void) {
     relit_remove(dir);
 }
 
+/* A picture of four texels on a thousand pieces, each of which needs texels of its own. */
+static void test_pieces(void) {
+    static const float red[4][3] = {{1, 0, 0}, {1, 0, 0}, {1, 0, 0}, {1, 0, 0}};
+    struct image image;
+    struct buf text;
+    char *dir = dark_room();
+    put_picture(dir, "r.png", red);
+    put_file(dir, "r.mtl", "newmtl r\nmap_Kd r.png\n", 22);
+    buf_init(&text, 1 << 20);
+    buf_printf(&text, "mtllib r.mtl\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl r\n");
+    for (int i = 0; i < 1000; i++)
+        buf_printf(&text, "v -1 -1 %g\nv 1 -1 %g\nv -1 1 %g\nf -3/1 -2/2 -1/3\n", -0.001 * i, -0.001 * i, -0.001 * i);
+    put_file(dir, "pieces.obj", text.data, text.length);
+    pass(dir, "pieces.obj", "", "base_color", &image);
+    is_near(&image, 1, 6, rgb_make(1.0f, 0.0f, 0.0f), 0.02, "one of many pieces");
+    image_release(&image);
+    buf_release(&text);
+    relit_remove(dir);
+}
+
 /* Mean of a render from the middle of the plane. */
 static double lit_plane(const char *dir, const char *more) {
     struct image image;
@@ -298,6 +318,7 @@ int main(void) {
     pool = parallel_new(1);
     test_gltf();
     test_obj();
+    test_pieces();
     test_emission();
     test_furnace();
     parallel_free(pool);

@@ -13,8 +13,8 @@ struct mtl_reader {
     const char *name, *folder;
     struct mesh_look *look;
     bool *found;
-    struct look_material *current;              /* NULL: one that no face uses */
-    bool has_roughness, has_specular, is_matte; /* of it; matte: illum 0 or 1 */
+    struct look_material *current;                         /* NULL: one that no face uses */
+    bool has_color, has_roughness, has_specular, is_matte; /* of it; matte: illum 0 or 1 */
     struct error *err;
 };
 
@@ -117,7 +117,7 @@ static void end_material(struct mtl_reader *r) {
     struct look_material *m = r->current;
     if (!m)
         return;
-    if (m->map[LOOK_BASE_COLOR].is_there && rgb_is_black(m->base_color))
+    if (m->map[LOOK_BASE_COLOR].is_there && (!r->has_color || rgb_is_black(m->base_color)))
         m->base_color = rgb_gray(1.0f);
     if (m->map[LOOK_EMISSION].is_there && rgb_is_black(m->emission))
         m->emission = rgb_gray(1.0f);
@@ -135,7 +135,7 @@ static void end_material(struct mtl_reader *r) {
 static void begin_material(struct mtl_reader *r, const char *name) {
     end_material(r);
     r->current = NULL;
-    r->has_roughness = r->has_specular = r->is_matte = false;
+    r->has_color = r->has_roughness = r->has_specular = r->is_matte = false;
     for (size_t i = 0; i < r->look->material_count; i++)
         if (!r->found[i] && strcmp(r->look->material[i].name, name) == 0) {
             r->current = &r->look->material[i];
@@ -189,8 +189,10 @@ static enum status read_line(struct mtl_reader *r, const char *line) {
     }
     if (!m)
         return STATUS_OK;
-    if ((text = after(line, "Kd")) != NULL)
+    if ((text = after(line, "Kd")) != NULL) {
+        r->has_color = true;
         return read_color(r, line, text, &m->base_color);
+    }
     if ((text = after(line, "Ke")) != NULL)
         return read_color(r, line, text, &m->emission);
     if ((text = after(line, "Ks")) != NULL)
