@@ -12,8 +12,8 @@ struct trust {
     /* Errors of channels that are at most one, two of the deviations that confidence.exr states for them; a normal
      * distribution has 68 and 95 % of them there. */
     size_t within_one, within_two, judged;
-    /* Where 5 x 5 pixels of the truth show one object of one base colour: squares of what the recovered one differs by
-     * from its mean over them, over channels; pixels that differ by more than TRUST_SPECK in a channel. */
+    /* Where 5 x 5 pixels of the truth show one object of about one base colour: squares of what the recovered one's error
+     * differs by from its mean over them, over channels; pixels where that is more than TRUST_SPECK in a channel. */
     double plain_squares;
     size_t plain_pixels, specks;
 };
