@@ -8,7 +8,8 @@
 #include "server/executor/site.h"
 #include "server/store/remote.h"
 
-/* Whether the attempt, which was taken from its node, has run for about time_min without a checkpoint that came here. */
+/* Whether the attempt, which was taken from its node, has run for about time_min without a checkpoint, or a picture,
+ * that came here. */
 bool time_limit_is_futile(const struct site *site, const char *data_dir, const struct remote_row *row);
 
 #endif

@@ -206,8 +206,8 @@ static struct link_end judge(struct relay *r, enum status status, const struct e
     } else if (was_taken_back(r, has_run)) {
         end.way = "preempted";
         end.reason = "its machine was taken back";
-    } else if (status ==
-               STATUS_CANCELLED) { /* as the daemon wished, before it began or while a file could not be sent */
+    } else if (status == STATUS_CANCELLED) {
+        /* As the daemon wished, before it began or while a file could not be sent. */
         bool is_cancelled = r->link.wish == LINK_CANCEL;
         end.way = is_cancelled ? "signal" : "exit";
         end.code = is_cancelled ? SIGKILL : PROGRESS_EXIT_STOPPED;

@@ -1,10 +1,12 @@
 /* test_time_limit.c -- an attempt whose site's time was up: futile only where nothing was saved since it was claimed. */
 #include <fcntl.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "common/file.h"
 #include "common/mem.h"
 #include "server/data/layout.h"
+#include "server/data/picture_record.h"
 #include "server/executor/time_limit.h"
 #include "tests/check.h"
 
@@ -34,6 +36,12 @@ int main(void) {
     times[1].tv_sec = CLAIMED_MS / 1000 + 100;
     CHECK(utimensat(AT_FDCWD, part, times, 0) == 0);
     CHECK(!time_limit_is_futile(&minutes, dir, &row));
+    CHECK(unlink(part) == 0 && time_limit_is_futile(&minutes, dir, &row));
+    char *out = layout_out(attempt), *record = layout_output(attempt, PICTURE_RECORD); /* a render's pictures */
+    CHECK(file_make_dirs(out, &err) == STATUS_OK && file_replace(record, "x", 1, &err) == STATUS_OK);
+    CHECK(!time_limit_is_futile(&minutes, dir, &row));
+    mem_free(record);
+    mem_free(out);
     row.claimed_ms = 0; /* it never began */
     CHECK(!time_limit_is_futile(&minutes, dir, &row));
     CHECK(file_remove_tree(dir, &err) == STATUS_OK);
