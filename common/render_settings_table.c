@@ -78,7 +78,7 @@ static const struct render_setting table[] = {
      "the whole sphere around each camera, equirectangular and level"},
     {"parts", RENDER_INT, "parts", 0, 1000, 0, NULL, "0",
      "jobs: in how many parts the pictures are rendered, at once where there are places; 0: as many as the daemon finds "
-     "good; the pictures are the same"},
+     "good; a small render is in one always, and the pictures are the same"},
     {"passes", RENDER_LIST, "", 0, 0, 0,
      "radiance|base_color|roughness|specular|emission|normal|depth|position|segment|direct|indirect", "radiance",
      "what is rendered of each view"},

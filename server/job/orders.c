@@ -22,10 +22,23 @@ cJSON *orders_new(const char *kind, const struct scheduler_config *config, int t
     return order;
 }
 
-/* What the job's owner may still take of the disk beside the job; of a part its share of that, since the others take
- * theirs at the same time. 0: no limit. */
+/* Pictures of the part that earlier attempts have done; an attempt renders one at least. */
+static enum status find_done(const struct job_work *work, const struct scheduler_config *config, int64_t *done,
+                             struct error *err) {
+    const struct job_part *part = work->part;
+    *done = 0;
+    if (part->part == 0)
+        return STATUS_OK;
+    enum status status = attempt_folder_pictures_done(config->data_dir, work->job->id, part->digest, part->first,
+                                                      part->count, done, err);
+    *done = *done < part->count ? *done : part->count - 1;
+    return status;
+}
+
+/* What the job's owner may still take of the disk beside the job; of a part its share of that, for the pictures that are
+ * not done, since the others take theirs at the same time. 0: no limit. */
 static enum status disk_left(const struct job_work *work, const struct scheduler_config *config, struct store *store,
-                             uint64_t *bytes, struct error *err) {
+                             int64_t done, uint64_t *bytes, struct error *err) {
     const struct job *job = work->job;
     uint64_t kept = 0;
     *bytes = 0;
@@ -34,7 +47,7 @@ static enum status disk_left(const struct job_work *work, const struct scheduler
     enum status status = store_user_bytes(store, job->owner_id, NULL, job->id, &kept, err);
     double left = kept < config->user_max_bytes ? (double)(config->user_max_bytes - kept) : 1.0;
     if (work->part->part > 0)
-        left *= (double)work->part->count / (double)work->part->pictures;
+        left *= (double)(work->part->count - done) / (double)work->part->pictures;
     *bytes = (uint64_t)fmax(1.0, left);
     return status;
 }
@@ -62,12 +75,11 @@ static void complete_order(cJSON *order, const struct scheduler_config *config, 
 
 /* What a render's order has besides: its part, or how it may split, which a small one does not. What its pictures are does
  * not depend on the settings that say where and in how many parts it runs: these stay here. */
-static enum status add_parts(cJSON *order, const struct job_work *work, const struct scheduler_config *config,
-                             struct error *err) {
+static void add_parts(cJSON *order, const struct job_work *work, const struct scheduler_config *config, int64_t done) {
     const struct job *job = work->job;
     const struct job_part *part = work->part;
     cJSON *settings = cJSON_GetObjectItemCaseSensitive(order, "settings");
-    int64_t parts = (int64_t)render_settings_number(settings, "parts"), done = 0;
+    int64_t parts = (int64_t)render_settings_number(settings, "parts");
     bool is_small = job->cost > 0.0 && job->cost <= config->small_render_cost;
     cJSON_DeleteItemFromObjectCaseSensitive(settings, "parts");
     cJSON_DeleteItemFromObjectCaseSensitive(settings, "executor");
@@ -77,14 +89,11 @@ static enum status add_parts(cJSON *order, const struct job_work *work, const st
         json_add_number(split, "paths", config->render_part_cost);
     }
     if (part->part == 0)
-        return STATUS_OK;
-    enum status status =
-        attempt_folder_pictures_done(config->data_dir, job->id, part->digest, part->first, part->count, &done, err);
+        return;
     cJSON *member = cJSON_AddObjectToObject(order, "part");
     json_add_int(member, "first", part->first);
     json_add_int(member, "count", part->count);
-    json_add_int(member, "done", done < part->count ? done : part->count - 1); /* an attempt renders one at least */
-    return status;
+    json_add_int(member, "done", done);
 }
 
 enum status orders_of_job(const struct job_work *work, const struct scheduler_config *config, struct store *store,
@@ -94,7 +103,10 @@ enum status orders_of_job(const struct job_work *work, const struct scheduler_co
     cJSON *settings;
     uint64_t disk_bytes;
     *order = NULL;
-    enum status status = disk_left(work, config, store, &disk_bytes, err);
+    int64_t done;
+    enum status status = find_done(work, config, &done, err);
+    if (status == STATUS_OK)
+        status = disk_left(work, config, store, done, &disk_bytes, err);
     if (status == STATUS_OK)
         status = json_parse(job->settings, strlen(job->settings), "the job's settings", &settings, err);
     if (status != STATUS_OK)
@@ -104,7 +116,7 @@ enum status orders_of_job(const struct job_work *work, const struct scheduler_co
     cJSON *smaller = memory_reduce(job->kind, settings, job->memory_step, &thread_count, &reduced);
     *order = new_job_order(work, config, thread_count, disk_bytes, smaller);
     if (job->kind == JOB_RENDER)
-        status = add_parts(*order, work, config, err);
+        add_parts(*order, work, config, done);
     else
         json_add(*order, "reading", fit_reading(work->scene));
     if (job->kind == JOB_RECONSTRUCT)
