@@ -113,7 +113,7 @@ static void take_photograph(struct hole_looks *looks, size_t *capacity, struct h
             continue;
         if (!isfinite(pixel->distance_m) && pixel->radiance > dark)
             add_look(looks, capacity,
-                     &(struct hole_look){pixel->direction, value, train, HOLE_NO_CELL, pixel->is_saturated});
+                     &(struct hole_look){pixel->direction, value, train, HOLE_NO_CELL, pixel->is_saturated, false});
         else if (passes(i % columns, i / columns))
             for (size_t k = 0; k < grid->plane_count; k++)
                 tell_plane(grid, k, origin, pixel, value);
@@ -166,15 +166,25 @@ static uint32_t nearest_cell(const struct hole_looks *looks, const struct hole_l
     return nearest;
 }
 
+/* Cells are refused for good: a look stays with its cell until that is, and one that has none left gets none again. */
+static void assign(struct hole_look *look, const struct hole_looks *looks, const struct hole_grid *grid) {
+    bool has_cell = look->cell != HOLE_NO_CELL && !grid->cell[look->cell].is_refused;
+    if (has_cell || look->is_out)
+        return;
+    look->cell = nearest_cell(looks, look, grid);
+    look->is_out = look->cell == HOLE_NO_CELL;
+}
+
 void hole_looks_assign(struct hole_looks *looks, struct hole_grid *grid) {
     for (uint32_t i = 0; i < grid->cell_count; i++) {
-        grid->cell[i].open = (struct hole_mean){0};
+        if (grid->cell[i].opened > 0)
+            grid->cell[i].open = (struct hole_mean){0};
         grid->cell[i].opened = 0;
     }
     for (size_t i = 0, end; i < looks->count; i = end) {
         for (end = i; end < looks->count && looks->look[end].train == looks->look[i].train; end++) {
             struct hole_look *look = &looks->look[end];
-            look->cell = nearest_cell(looks, look, grid);
+            assign(look, looks, grid);
             if (look->cell == HOLE_NO_CELL)
                 continue;
             hole_mean_add(&grid->cell[look->cell].open, look->value);

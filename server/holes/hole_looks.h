@@ -14,11 +14,11 @@
 
 /* A pixel whose ray meets no surface and that is not dark. */
 struct hole_look {
-    vec3 direction; /* unit */
-    float value;    /* log radiance */
-    uint32_t train; /* index into views.train; looks are in its order */
-    uint32_t cell;  /* that it is taken to see, or HOLE_NO_CELL */
-    bool is_saturated;
+    vec3 direction;            /* unit */
+    float value;               /* log radiance */
+    uint32_t train;            /* index into views.train; looks are in its order */
+    uint32_t cell;             /* that it is taken to see, or HOLE_NO_CELL */
+    bool is_saturated, is_out; /* is_out: no cell on its way is left */
 };
 
 struct hole_looks {
