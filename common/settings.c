@@ -62,9 +62,9 @@ static const struct setting table[] = {
      "of a grey card); where all light is measured it is a check, in the report"},
     {"hold_out_every", SETTING_INT, "frames", 0, 1000000, NULL, "10", NULL,
      "where the capture holds out no frame, every how many-th is; 0: none"},
-    {"holes", SETTING_CHOICE, "", 0, 0, "auto|fill|keep", "auto", NULL,
-     "holes of the mesh that photographs look through: filled where the photographs show that a wall, floor or ceiling goes "
-     "on in them; all that lie in one; or none, so that they are windows"},
+    {"holes", SETTING_CHOICE, "", 0, 0, "auto|fill|keep", "keep", NULL,
+     "holes of the mesh that photographs look through: auto fills those where photographs show that a wall, floor or ceiling "
+     "goes on; fill all that lie in one; keep none, so that they are windows"},
     {"iterations", SETTING_INT, "", 0, 1e9, NULL, "0", NULL,
      "optimiser steps; 0: as many as refine_looks or listing1_looks take"},
     {"listing1_looks", SETTING_INT, "looks", 1, 1000000000, NULL, "4000", "listing1",

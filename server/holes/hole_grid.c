@@ -71,16 +71,27 @@ static void cover_row(void *user, size_t index, int thread) {
         cover_cell(job, p, (uint32_t)index * p->columns + column);
 }
 
-void hole_grid_init(struct hole_grid *grid, const struct mesh *mesh, const struct accel *accel, struct parallel *pool) {
+/* The room's extent, and what lies BEYOND it, but no more than what is asked for. */
+static void find_bounds(const struct mesh *mesh, const vec3 within[2], vec3 *lower, vec3 *upper) {
+    mesh_bounds(mesh, lower, upper);
+    vec3 size = vec3_sub(*upper, *lower);
+    *lower = vec3_mad(*lower, -BEYOND, size);
+    *upper = vec3_mad(*upper, BEYOND, size);
+    if (!within)
+        return;
+    *lower = (vec3){fmaxf(lower->x, within[0].x), fmaxf(lower->y, within[0].y), fmaxf(lower->z, within[0].z)};
+    *upper = (vec3){fminf(upper->x, within[1].x), fminf(upper->y, within[1].y), fminf(upper->z, within[1].z)};
+}
+
+void hole_grid_init(struct hole_grid *grid, const struct mesh *mesh, const struct accel *accel, const vec3 within[2],
+                    struct parallel *pool) {
     struct room_plane plane[ROOM_PLANES_MAX];
     vec3 lower, upper;
     size_t rows = 0;
     mesh_bounds(mesh, &lower, &upper);
-    vec3 size = vec3_sub(upper, lower);
-    *grid = (struct hole_grid){.side_m = SIDE_SHARE * vec3_length(size)};
+    *grid = (struct hole_grid){.side_m = SIDE_SHARE * vec3_length(vec3_sub(upper, lower))};
     grid->plane_count = room_planes_find(mesh, FIT_CELLS * grid->side_m, plane);
-    lower = vec3_mad(lower, -BEYOND, size);
-    upper = vec3_mad(upper, BEYOND, size);
+    find_bounds(mesh, within, &lower, &upper);
     for (size_t k = 0; k < grid->plane_count; k++) {
         grid->plane[k].plane = plane[k];
         place_cells(grid, &grid->plane[k], lower, upper);

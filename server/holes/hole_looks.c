@@ -4,7 +4,9 @@
 #include "common/mem.h"
 #include "common/quantile.h"
 
-#define PIXELS 80000.0 /* of a photograph: 320 x 240, which has a cell in a few pixels */
+/* Pixels that are looked at: of a photograph, 320 x 240, which has a cell in a few; of all, for time and memory. */
+#define PIXELS 80000.0
+#define ALL_PIXELS 1e7
 /* Radiance, as a share of the photographs' median, below which a pixel shows nothing: a surface as dark adds a hundredth
  * to the light that it takes away. Also what logarithms are taken after it is added, so that they are finite. */
 #define DARK_SHARE 0.01f
@@ -100,7 +102,7 @@ static void take_photograph(struct hole_looks *looks, size_t *capacity, struct h
     const struct views *views = looks->views;
     const struct photograph *photo = &views->scene->photograph[views->train[train]];
     double pixels = (double)photo->camera.width * photo->camera.height;
-    uint32_t step = (uint32_t)fmax(1.0, ceil(sqrt(pixels / PIXELS)));
+    uint32_t step = (uint32_t)fmax(1.0, ceil(sqrt(pixels / fmin(PIXELS, ALL_PIXELS / (double)views->train_count))));
     uint32_t columns = (photo->camera.width + step - 1) / step, rows = (photo->camera.height + step - 1) / step;
     struct look_job job = {views, train, photo, step, columns, mem_array((size_t)columns * rows, sizeof *job.pixel)};
     vec3 origin = camera_origin(&photo->camera);

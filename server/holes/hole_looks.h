@@ -27,7 +27,7 @@ struct hole_looks {
     struct hole_look *look; /* [count]; owned */
 };
 
-/* Looks at up to 80,000 pixels of each photograph. Exposures and poses must be known. */
+/* Looks at up to 80,000 pixels of each photograph, and ten million of all. Exposures and poses must be known. */
 void hole_looks_take(struct hole_looks *looks, struct hole_grid *grid, const struct views *views,
                      struct parallel *pool);
 void hole_looks_release(struct hole_looks *looks);

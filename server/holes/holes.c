@@ -55,14 +55,14 @@ static void report(struct holes_found *found, const struct hole_grid *grid, cons
 }
 
 void holes_fill(struct scene *scene, struct segments *segments, const struct views *views, bool fills_all,
-                struct parallel *pool, struct holes_found *found) {
+                const vec3 within[2], struct parallel *pool, struct holes_found *found) {
     struct hole_grid grid;
     struct hole_looks looks;
     struct hole_regions holes, kept;
     *found = (struct holes_found){0};
     if (!any_open(views))
         return;
-    hole_grid_init(&grid, &scene->mesh, views->accel, pool);
+    hole_grid_init(&grid, &scene->mesh, views->accel, within, pool);
     hole_looks_take(&looks, &grid, views, pool);
     hole_regions_find(&holes, &kept, &grid, &looks, fills_all);
     report(found, &grid, &holes, &kept);

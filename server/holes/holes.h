@@ -24,9 +24,10 @@ struct holes_found {
 };
 
 /* Fills holes of scene->mesh, whose triangles `segments` divides and `views` see: the mesh, whose arrays may be moved, and
- * the segments grow. `fills_all`: also what is an opening by the evidence. Poses and exposures must be known. When triangles were
+ * the segments grow. `fills_all`: also what is an opening by the evidence. `within`: lower
+ * and upper corner of a box that nothing is filled outside of; NULL: none. Poses and exposures must be known. When triangles were
  * added, what was made of the mesh must be made again. The same for any number of threads. */
 void holes_fill(struct scene *scene, struct segments *segments, const struct views *views, bool fills_all,
-                struct parallel *pool, struct holes_found *found);
+                const vec3 within[2], struct parallel *pool, struct holes_found *found);
 
 #endif

@@ -284,13 +284,21 @@ static void report_holes(const struct prepare *p, struct holes_found *found) {
         p->pace->hooks->log(p->pace->hooks->user, line);
 }
 
-/* Fills holes of the mesh, and makes again what was made of it. */
+/* Fills holes of the mesh, but none that crop cut, and makes again what was made of it. */
 static enum status fill_holes(struct prepare *p, struct error *err) {
     struct reconstruction *r = p->r;
     struct holes_found found;
+    double lower[3], upper[3];
+    vec3 box[2];
     if (settings_is(r->settings, "holes", "keep"))
         return STATUS_OK;
-    holes_fill(r->scene, &r->segments, p->views, settings_is(r->settings, "holes", "fill"), r->pool, &found);
+    bool is_cropped = settings_box(r->settings, "crop", lower, upper);
+    for (int k = 0; k < 2 && is_cropped; k++) { /* in the coordinates of the input (mesh.h) */
+        const double *c = k == 0 ? lower : upper, *offset = r->scene->mesh.offset;
+        box[k] = vec3_make((float)(c[0] - offset[0]), (float)(c[1] - offset[1]), (float)(c[2] - offset[2]));
+    }
+    holes_fill(r->scene, &r->segments, p->views, settings_is(r->settings, "holes", "fill"), is_cropped ? box : NULL,
+               r->pool, &found);
     report_holes(p, &found);
     return found.triangles > 0 ? remake_surface(p, NULL, err) : STATUS_OK;
 }

@@ -115,7 +115,7 @@ static void release(struct holed *room) {
 /* Fills; returns the number of triangles there were before. */
 static size_t fill(struct holed *room, bool fills_all, struct holes_found *found) {
     size_t before = room->scene.mesh.triangle_count;
-    holes_fill(&room->scene, &room->segments, &room->views, fills_all, room->pool, found);
+    holes_fill(&room->scene, &room->segments, &room->views, fills_all, NULL, room->pool, found);
     CHECK(room->scene.mesh.triangle_count == before + found->triangles);
     cJSON_Delete(found->list);
     return before;
@@ -176,6 +176,23 @@ static void test_opening(enum shown shown) {
     release(&room);
 }
 
+/* What was cropped stays away: here all beyond x = 2 m. */
+static void test_cropped(void) {
+    const vec3 within[2] = {{-10.0f, -10.0f, -10.0f}, {2.0f, 10.0f, 10.0f}};
+    struct holed room;
+    struct holes_found found;
+    float farthest_m = 0.0f;
+    make(&room, PAINTED_WALL, 2);
+    size_t before = room.scene.mesh.vertex_count;
+    holes_fill(&room.scene, &room.segments, &room.views, false, within, room.pool, &found);
+    cJSON_Delete(found.list);
+    for (size_t v = before; v < room.scene.mesh.vertex_count; v++)
+        farthest_m = fmaxf(farthest_m, room.scene.mesh.position[v].x);
+    CHECK_NEAR(found.filled_m2, 0.5 * HOLE_M2, 0.2);
+    CHECK_NEAR(farthest_m, 2.0, 0.05);
+    release(&room);
+}
+
 static void test_threads(void) {
     struct holed one, many;
     struct holes_found found;
@@ -191,7 +208,7 @@ static void test_threads(void) {
     release(&one);
 }
 
-/* A whole reconstruction: with the hole filled there is no distant light; with holes=keep there is. */
+/* A whole reconstruction: with the hole filled there is no distant light; without holes=auto there is. */
 static void test_reconstruction(const char *json, bool fills) {
     struct holed room;
     struct settings s = shell_settings(json);
@@ -221,8 +238,9 @@ int main(void) {
     test_opening(PLAIN_SKY);
     test_opening(ROOM_BEYOND);
     test_opening(NOTHING);
+    test_cropped();
     test_threads();
-    test_reconstruction("{" LITTLE "}", true);
-    test_reconstruction("{" LITTLE ",\"holes\":\"keep\"}", false);
+    test_reconstruction("{" LITTLE ",\"holes\":\"auto\"}", true);
+    test_reconstruction("{" LITTLE "}", false);
     return check_result();
 }
