@@ -1,342 +1,13 @@
-/* render_settings.c -- see render_settings.h. */
+/* render_settings.c -- values of settings that were found good (render_settings.h). */
 #include "common/render_settings.h"
 
 #include <assert.h>
-#include <ctype.h>
-#include <math.h>
-#include <stdarg.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/choices.h"
 #include "common/mem.h"
-#include "common/setting_faults.h"
-
-#define TEXT_MAX_BYTES 4096 /* of a value */
-#define FILE_MAX_BYTES 255  /* of a plain name */
-
-/* --- reading values --------------------------------------------------------------------------------------------- */
-
-/* Whether a word of `length` bytes is one of "a|b|c". */
-static bool is_choice(const char *choices, const char *word, size_t length) {
-    for (const char *at = choices; at && *at;) {
-        size_t part = strcspn(at, "|");
-        if (part == length && memcmp(at, word, part) == 0)
-            return true;
-        at += part + (at[part] == '|');
-    }
-    return false;
-}
-
-/* Reads up to `most` numbers of "1, 2 3"; how many there are, or 0 for anything else. */
-static size_t scan_numbers(const char *text, double *value, size_t most) {
-    size_t count = 0;
-    for (const char *at = text; *at;) {
-        char *end;
-        double number = strtod(at, &end);
-        if (end == at || !isfinite(number) || count == most)
-            return 0;
-        value[count++] = number;
-        at = end + strspn(end, " ");
-        at += *at == ',';
-        at += strspn(at, " ");
-    }
-    return count;
-}
-
-/* The numbers of a JSON number, array or string; 0: it is none of these. */
-static size_t read_numbers(const cJSON *value, double *number, size_t most) {
-    if (cJSON_IsNumber(value)) {
-        *number = value->valuedouble;
-        return isfinite(value->valuedouble) ? 1 : 0;
-    }
-    if (cJSON_IsString(value))
-        return scan_numbers(value->valuestring, number, most);
-    size_t count = 0;
-    for (const cJSON *item = cJSON_IsArray(value) ? value->child : NULL; item; item = item->next) {
-        if (!cJSON_IsNumber(item) || !isfinite(item->valuedouble) || count == most)
-            return 0;
-        number[count++] = item->valuedouble;
-    }
-    return count;
-}
-
-static bool read_size(const char *text, double side[2]) {
-    unsigned width, height;
-    int used = 0;
-    if (sscanf(text, "%5ux%5u%n", &width, &height, &used) != 2 || text[used] != '\0')
-        return false;
-    side[0] = width;
-    side[1] = height;
-    return true;
-}
-
-static bool is_date(const char *text) {
-    static const int days[] = {31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31};
-    int year, month, day, used = 0;
-    if (strlen(text) != 10 || sscanf(text, "%4d-%2d-%2d%n", &year, &month, &day, &used) != 3 || used != 10)
-        return false;
-    bool leap = (year % 4 == 0 && year % 100 != 0) || year % 400 == 0;
-    return year >= 1900 && year <= 2100 && month >= 1 && month <= 12 && day >= 1 &&
-           day <= days[month - 1] + (leap && month == 2);
-}
-
-static bool is_clock(const char *text) {
-    unsigned hour, minute;
-    int used = 0;
-    return sscanf(text, "%2u:%2u%n", &hour, &minute, &used) == 2 && text[used] == '\0' && hour < 24 && minute < 60;
-}
-
-/* --- checking one value ----------------------------------------------------------------------------------------- */
-
-struct reason {
-    char text[256];
-};
-
-static bool refuse(struct reason *why, const char *format, ...) __attribute__((format(printf, 2, 3)));
-static bool refuse(struct reason *why, const char *format, ...) {
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(why->text, sizeof why->text, format, arguments);
-    va_end(arguments);
-    return false;
-}
-
-static bool in_range(const struct render_setting *t, const double *value, size_t count, struct reason *why) {
-    for (size_t i = 0; i < count; i++)
-        if (!(value[i] >= t->minimum && value[i] <= t->maximum))
-            return refuse(why, "%.9g is not from %.9g to %.9g%s%s", value[i], t->minimum, t->maximum,
-                          *t->unit ? " " : "", t->unit);
-    return true;
-}
-
-static bool check_number(const struct render_setting *t, const cJSON *value, struct reason *why) {
-    double number = cJSON_IsNumber(value) ? value->valuedouble : NAN;
-    bool is_whole = t->type == RENDER_INT;
-    if (!isfinite(number) || (is_whole && number != floor(number)))
-        return refuse(why, "must be a %snumber", is_whole ? "whole " : "");
-    return in_range(t, &number, 1, why);
-}
-
-static bool check_numbers(const struct render_setting *t, const cJSON *value, struct reason *why) {
-    double number[RENDER_MAX_NUMBERS];
-    if (read_numbers(value, number, RENDER_MAX_NUMBERS) != t->count)
-        return refuse(why, "must be %zu numbers, as \"1, 2%s\"", t->count, t->count == 3 ? ", 3" : "");
-    return in_range(t, number, t->count, why);
-}
-
-static bool check_factor(const struct render_setting *t, const cJSON *value, struct reason *why) {
-    double number[3];
-    if (cJSON_IsString(value) && is_choice("on|off", value->valuestring, strlen(value->valuestring)))
-        return true;
-    size_t count = read_numbers(value, number, 3);
-    if (count != 1 && count != 3)
-        return refuse(why, "must be on, off, a factor, or three of them for red, green and blue");
-    return in_range(t, number, count, why);
-}
-
-static bool check_list(const struct render_setting *t, const char *text, struct reason *why) {
-    for (const char *at = text;;) {
-        size_t length = strcspn(at, ",");
-        if (!is_choice(t->choices, at, length))
-            return refuse(why, "\"%.*s\" is not one of %s", (int)(length < 40 ? length : 40), at, t->choices);
-        if (at[length] == '\0')
-            return true;
-        at += length + 1;
-    }
-}
-
-static bool check_file(const struct render_setting *t, const char *text, enum render_files files, struct reason *why) {
-    if (is_choice(t->choices, text, strlen(text)) || files == RENDER_FILES_ANYWHERE)
-        return true;
-    if (strchr(text, '/') || text[0] == '.' || strlen(text) > FILE_MAX_BYTES)
-        return refuse(why, "must be the name of an attached file, without a folder");
-    return true;
-}
-
-static bool check_text(const struct render_setting *t, const char *text, enum render_files files, struct reason *why) {
-    double side[2];
-    if (*text == '\0' && *t->default_text)
-        return refuse(why, "must not be empty");
-    if (strlen(text) > TEXT_MAX_BYTES)
-        return refuse(why, "is longer than %d bytes", TEXT_MAX_BYTES);
-    for (const char *at = text; *at; at++)
-        if (iscntrl((unsigned char)*at))
-            return refuse(why, "has a control character");
-    switch (t->type) {
-    case RENDER_CHOICE:
-        return is_choice(t->choices, text, strlen(text)) || refuse(why, "must be one of %s", t->choices);
-    case RENDER_LIST: return check_list(t, text, why);
-    case RENDER_SIZE:
-        return read_size(text, side) ? in_range(t, side, 2, why) : refuse(why, "must be of the form 640x480");
-    case RENDER_DATE: return is_date(text) || refuse(why, "must be a day of 1900 to 2100 as 2024-06-21");
-    case RENDER_CLOCK: return is_clock(text) || refuse(why, "must be a time from 00:00 to 23:59");
-    case RENDER_FILE: return check_file(t, text, files, why);
-    case RENDER_TEXT:
-    case RENDER_INT:
-    case RENDER_REAL:
-    case RENDER_BOOL:
-    case RENDER_NUMBERS:
-    case RENDER_FACTOR: break;
-    }
-    return true;
-}
-
-static bool check_value(const struct render_setting *t, const cJSON *value, enum render_files files,
-                        struct reason *why) {
-    switch (t->type) {
-    case RENDER_INT:
-    case RENDER_REAL: return check_number(t, value, why);
-    case RENDER_NUMBERS: return check_numbers(t, value, why);
-    case RENDER_FACTOR: return check_factor(t, value, why);
-    case RENDER_BOOL: return cJSON_IsBool(value) || refuse(why, "must be true or false");
-    case RENDER_CHOICE:
-    case RENDER_TEXT:
-    case RENDER_LIST:
-    case RENDER_SIZE:
-    case RENDER_DATE:
-    case RENDER_CLOCK:
-    case RENDER_FILE: break;
-    }
-    if (!cJSON_IsString(value))
-        return refuse(why, "must be a string");
-    return check_text(t, value->valuestring, files, why);
-}
-
-/* --- checking all ----------------------------------------------------------------------------------------------- */
-
-static void add_unknown(struct setting_faults *f, const char *name) {
-    char hint[128] = "";
-    const char *nearest = render_settings_nearest(name);
-    if (nearest)
-        snprintf(hint, sizeof hint, "did you mean %s?", nearest);
-    setting_faults_add(f, name, "there is no such setting", hint);
-}
-
-/* A setting that another makes meaningless is a fault, not ignored. */
-static void need(struct setting_faults *f, const cJSON *object, const char *name, bool is_met, const char *reason) {
-    if (render_settings_has(object, name) && !is_met)
-        setting_faults_add(f, name, reason, "");
-}
-
-static void check_sky(struct setting_faults *f, const cJSON *object) {
-    static const char *const of_sky[] = {"date", "latitude", "longitude", "north",
-                                         "suns", "time",     "turbidity", "utc_offset"};
-    bool is_sky = render_settings_is(object, "environment", "sky");
-    bool has_map = !is_sky && !render_settings_is(object, "environment", "none");
-    for (size_t i = 0; i < sizeof of_sky / sizeof *of_sky; i++)
-        need(f, object, of_sky[i], is_sky, "belongs to environment=sky");
-    for (size_t i = 0; i < 3 && is_sky; i++)
-        if (!render_settings_has(object, of_sky[i]))
-            setting_faults_add(f, of_sky[i], "environment=sky needs it", render_settings_find(of_sky[i], NULL)->help);
-    need(f, object, "time", !is_sky || render_settings_number(object, "suns") == 1.0,
-         "with suns the times are those from sunrise to sunset");
-    need(f, object, "environment_turn", has_map, "only a map is turned; a sky has north");
-    need(f, object, "environment_scale", has_map || is_sky, "there is no environment");
-    need(f, object, "sky", has_map || is_sky, "there is no environment");
-    need(f, object, "sun", is_sky || render_settings_is(object, "environment", "found"),
-         "only a sky, or what was found, has a sun of its own");
-}
-
-static void check_cameras(struct setting_faults *f, const cJSON *object) {
-    bool has_path = render_settings_has(object, "path");
-    need(f, object, "view", !has_path, "a path names its views itself");
-    need(f, object, "path_count", has_path, "belongs to path");
-    need(f, object, "multilayer",
-         !render_settings_bool(object, "multilayer") || !render_settings_is(object, "format", "png"),
-         "only EXR has layers: format=exr or both");
-}
-
-static void check_precision(struct setting_faults *f, const cJSON *object) {
-    bool has_exr = !render_settings_is(object, "format", "png") || render_settings_bool(object, "per_light");
-    need(f, object, "precision", has_exr, "belongs to EXR: format=exr or both, or per_light");
-    need(f, object, "precision",
-         !render_settings_is(object, "precision", "half") || !render_settings_bool(object, "multilayer"),
-         "layers of one file are float");
-}
-
-/* "lamp.3.radius": whether the settings of lamp 3 belong to its kind; the same of things that are inserted. */
-static void check_lamp(struct setting_faults *f, const cJSON *object, uint32_t number) {
-    static const struct {
-        const char *name, *kinds;
-        bool is_needed;
-    } of_kind[] = {{"position", "area|sphere|spot", true}, {"direction", "area|spot", true}, {"size", "area", false},
-                   {"radius", "sphere|spot", false},       {"angle", "spot", false},         {"blend", "spot", false}};
-    char name[SETTING_NAME_MAX], reason[128];
-    snprintf(name, sizeof name, "lamp.%u.kind", number);
-    if (!render_settings_has(object, name)) {
-        setting_faults_add(f, name, "is missing", "area, sphere or spot");
-        return;
-    }
-    const char *kind = render_settings_text(object, name);
-    for (size_t i = 0; i < sizeof of_kind / sizeof *of_kind; i++) {
-        bool belongs = is_choice(of_kind[i].kinds, kind, strlen(kind));
-        snprintf(name, sizeof name, "lamp.%u.%s", number, of_kind[i].name);
-        snprintf(reason, sizeof reason, "kind=%s %s it", kind, belongs ? "needs" : "does not have");
-        if (render_settings_has(object, name) ? !belongs : belongs && of_kind[i].is_needed)
-            setting_faults_add(f, name, reason, "");
-    }
-}
-
-static void check_families(struct setting_faults *f, const cJSON *object) {
-    char name[SETTING_NAME_MAX];
-    size_t count;
-    uint32_t *number = render_settings_family(object, "lamp.", &count);
-    for (size_t i = 0; i < count; i++)
-        check_lamp(f, object, number[i]);
-    mem_free(number);
-    number = render_settings_family(object, "insert.", &count);
-    for (size_t i = 0; i < count; i++) {
-        snprintf(name, sizeof name, "insert.%u.file", number[i]);
-        if (!render_settings_has(object, name))
-            setting_faults_add(f, name, "is missing", "a .glb, .gltf, .obj or .ply");
-    }
-    mem_free(number);
-}
-
-static void check_name(struct setting_faults *f, const cJSON *value, enum render_files files) {
-    struct reason why = {""};
-    uint32_t number;
-    const struct render_setting *t =
-        strlen(value->string) <= SETTING_NAME_MAX ? render_settings_find(value->string, &number) : NULL;
-    bool is_counted = t && (strncmp(t->name, "lamp.", 5) == 0 || strncmp(t->name, "insert.", 7) == 0);
-    if (!t)
-        add_unknown(f, value->string);
-    else if (is_counted && (number < 1 || number > RENDER_LAMPS_MAX))
-        setting_faults_add(f, value->string, "is numbered from 1 to 1000", "");
-    else if (!check_value(t, value, files, &why))
-        setting_faults_add(f, value->string, why.text, t->help);
-}
-
-enum status render_settings_check(const cJSON *object, enum render_files files, cJSON *problems, struct error *err) {
-    struct setting_faults faults = {.problems = problems};
-    if (!cJSON_IsObject(object)) {
-        setting_faults_add(&faults, "settings", "must be an object of names and values", "");
-        return error_set(err, STATUS_INPUT, "settings must be a JSON object");
-    }
-    for (const cJSON *value = object->child; value; value = value->next)
-        check_name(&faults, value, files);
-    if (faults.count == 0) {
-        check_sky(&faults, object);
-        check_cameras(&faults, object);
-        check_precision(&faults, object);
-        check_families(&faults, object);
-    }
-    return setting_faults_status(&faults, err);
-}
-
-static enum setting_form form_of(const char *name) {
-    const struct render_setting *t = render_settings_find(name, NULL);
-    if (t && (t->type == RENDER_INT || t->type == RENDER_REAL))
-        return SETTING_NUMBER;
-    return t && t->type == RENDER_BOOL ? SETTING_TRUTH : SETTING_WORDS;
-}
-
-enum status render_settings_parse_assignment(const char *text, cJSON *object, struct error *err) {
-    return setting_assign(text, object, form_of, err);
-}
-
-/* --- values ----------------------------------------------------------------------------------------------------- */
+#include "common/setting_values.h"
 
 static const cJSON *find(const cJSON *object, const char *name) {
     return cJSON_GetObjectItemCaseSensitive(object, name);
@@ -382,21 +53,21 @@ bool render_settings_lists(const cJSON *object, const char *name, const char *wo
 
 bool render_settings_numbers(const cJSON *object, const char *name, double value[RENDER_MAX_NUMBERS]) {
     const cJSON *given = find(object, name);
-    return (given ? read_numbers(given, value, RENDER_MAX_NUMBERS)
-                  : scan_numbers(default_of(name), value, RENDER_MAX_NUMBERS)) > 0;
+    return (given ? setting_read_numbers(given, value, RENDER_MAX_NUMBERS)
+                  : setting_scan_numbers(default_of(name), value, RENDER_MAX_NUMBERS)) > 0;
 }
 
 void render_settings_factor(const cJSON *value, double factor[3]) {
     bool is_off = cJSON_IsString(value) && strcmp(value->valuestring, "off") == 0;
     factor[0] = factor[1] = factor[2] = is_off ? 0.0 : 1.0;
-    size_t count = read_numbers(value, factor, 3);
+    size_t count = setting_read_numbers(value, factor, 3);
     for (size_t i = 1; i < 3 && count == 1; i++)
         factor[i] = factor[0];
 }
 
 bool render_settings_size(const cJSON *object, uint32_t *width, uint32_t *height) {
     double side[2];
-    if (!read_size(render_settings_text(object, "size"), side))
+    if (!setting_read_size(render_settings_text(object, "size"), side))
         return false;
     *width = (uint32_t)side[0];
     *height = (uint32_t)side[1];
@@ -432,7 +103,7 @@ cJSON *render_settings_files(const cJSON *object) {
     for (const cJSON *value = object->child; value; value = value->next) {
         const struct render_setting *t = render_settings_find(value->string, NULL);
         if (!t || t->type != RENDER_FILE || !cJSON_IsString(value) ||
-            is_choice(t->choices, value->valuestring, strlen(value->valuestring)))
+            choices_index(t->choices, value->valuestring, strlen(value->valuestring)) >= 0)
             continue;
         bool is_there = false;
         for (const cJSON *other = files->child; other && !is_there; other = other->next)

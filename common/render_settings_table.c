@@ -2,7 +2,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "common/mem.h"
+#include "common/choices.h"
 #include "common/nearest.h"
 #include "common/render_settings.h"
 
@@ -183,12 +183,7 @@ cJSON *render_settings_describe(void) {
         }
         if (t->count > 0)
             json_add_int(entry, "count", (int64_t)t->count);
-        for (const char *at = t->choices; at && *at; at += strcspn(at, "|"), at += *at == '|') {
-            cJSON *choices = cJSON_GetObjectItem(entry, "choices");
-            char *word = mem_strndup(at, strcspn(at, "|"));
-            cJSON_AddItemToArray(choices ? choices : cJSON_AddArrayToObject(entry, "choices"), json_new_string(word));
-            mem_free(word);
-        }
+        choices_to_json(t->choices, entry);
         json_add_string(entry, "default", t->default_text);
         json_add_string(entry, "help", t->help);
         cJSON_AddItemToArray(list, entry);

@@ -2,9 +2,18 @@
 #include "common/setting_faults.h"
 
 #include <math.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+bool setting_refuse(struct setting_reason *why, const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(why->text, sizeof why->text, format, arguments);
+    va_end(arguments);
+    return false;
+}
 
 void setting_faults_add(struct setting_faults *f, const char *name, const char *reason, const char *hint) {
     if (f->count++ == 0)
@@ -17,6 +26,13 @@ void setting_faults_add(struct setting_faults *f, const char *name, const char *
     if (*hint)
         json_add_string(problem, "hint", hint);
     cJSON_AddItemToArray(f->problems, problem);
+}
+
+void setting_faults_add_unknown(struct setting_faults *f, const char *name, const char *nearest) {
+    char hint[128] = "";
+    if (nearest)
+        snprintf(hint, sizeof hint, "did you mean %s?", nearest);
+    setting_faults_add(f, name, "there is no such setting", hint);
 }
 
 enum status setting_faults_status(const struct setting_faults *f, struct error *err) {

@@ -3,6 +3,7 @@
 #ifndef UNBAKE_COMMON_SETTING_FAULTS_H
 #define UNBAKE_COMMON_SETTING_FAULTS_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
 #include "common/error.h"
@@ -10,6 +11,13 @@
 
 #define SETTING_NAME_MAX 64   /* bytes */
 #define SETTING_FAULTS_MAX 50 /* that are listed one by one; further ones are only counted */
+
+/* Why one value is refused. */
+struct setting_reason {
+    char text[256];
+};
+/* Writes the reason; false, for the caller to return. */
+bool setting_refuse(struct setting_reason *why, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
 struct setting_faults {
     cJSON *problems; /* array; borrowed; NULL: no list wanted */
@@ -19,6 +27,8 @@ struct setting_faults {
 
 /* Lists {"name", "reason", "hint"}; no hint where it is "". */
 void setting_faults_add(struct setting_faults *f, const char *name, const char *reason, const char *hint);
+/* Lists a name that is in no table, with the name that may be meant; nearest: NULL where there is none. */
+void setting_faults_add_unknown(struct setting_faults *f, const char *name, const char *nearest);
 /* STATUS_INPUT with the first fault and the number of others; STATUS_OK where there is none. */
 enum status setting_faults_status(const struct setting_faults *f, struct error *err);
 

@@ -1,18 +1,15 @@
-/* settings.c -- see settings.h. */
+/* settings.c -- the table of settings.h, values and their JSON. settings_apply.c checks what is given. */
 #include "common/settings.h"
 
 #include <assert.h>
-#include <limits.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/choices.h"
 #include "common/mem.h"
-#include "common/nearest.h"
 #include "common/setting_faults.h"
-
-#define TEXT_MAX_LENGTH 255
+#include "common/setting_values.h"
 
 static const struct setting table[] = {
     {"bake_uv", SETTING_CHOICE, "", 0, 0, "auto|off", "auto", NULL,
@@ -154,28 +151,6 @@ const struct setting *settings_find(const char *name) {
     return i < 0 ? NULL : &table[i];
 }
 
-/* The valid name nearest to `name` by edit distance, or NULL when none is near. */
-static const char *nearest_name(const char *name) {
-    struct nearest nearest;
-    nearest_init(&nearest, name);
-    for (size_t i = 0; i < TABLE_COUNT; i++)
-        nearest_offer(&nearest, table[i].name);
-    return nearest.best;
-}
-
-/* Index of a word in "a|b|c"; -1 when it is not one of them. */
-static int choice_index(const char *choices, const char *word) {
-    size_t length = strlen(word);
-    int index = 0;
-    for (const char *at = choices; *at; index++) {
-        size_t part = strcspn(at, "|");
-        if (part == length && memcmp(at, word, part) == 0)
-            return index;
-        at += part + (at[part] == '|');
-    }
-    return -1;
-}
-
 /* Settings that are stored in `text`. */
 static bool is_text(const struct setting *t) {
     return t->type == SETTING_TEXT || t->type == SETTING_BOX || t->type == SETTING_PIXEL;
@@ -185,7 +160,7 @@ static bool is_text(const struct setting *t) {
 static double default_number(const struct setting *t) {
     switch (t->type) {
     case SETTING_BOOL: return strcmp(t->default_text, "true") == 0;
-    case SETTING_CHOICE: return choice_index(t->choices, t->default_text);
+    case SETTING_CHOICE: return choices_index(t->choices, t->default_text, strlen(t->default_text));
     case SETTING_INT:
     case SETTING_REAL:
     case SETTING_TEXT:
@@ -214,14 +189,6 @@ double settings_of_quality(const struct settings *s, const char *name) {
     int i = index_of(name);
     assert(i >= 0);
     return usual_number(s, (size_t)i);
-}
-
-/* Sets values that were not given from the quality. */
-static void follow_quality(struct settings *s) {
-    for (size_t i = 0; i < TABLE_COUNT; i++) {
-        if (!is_text(&table[i]) && !s->is_given[i])
-            s->number[i] = usual_number(s, i);
-    }
 }
 
 void settings_init(struct settings *s) {
@@ -256,17 +223,10 @@ double settings_number(const struct settings *s, const char *name) {
 
 bool settings_bool(const struct settings *s, const char *name) { return settings_number(s, name) != 0.0; }
 
-static const char *choice_at(const char *choices, int index, char *word, size_t size) {
-    while (index-- > 0)
-        choices += strcspn(choices, "|") + 1;
-    snprintf(word, size, "%.*s", (int)strcspn(choices, "|"), choices);
-    return word;
-}
-
 bool settings_is(const struct settings *s, const char *name, const char *word) {
     int i = index_of(name);
     assert(i >= 0 && table[i].type == SETTING_CHOICE);
-    return (int)s->number[i] == choice_index(table[i].choices, word);
+    return (int)s->number[i] == choices_index(table[i].choices, word, strlen(word));
 }
 
 const char *settings_text(const struct settings *s, const char *name) {
@@ -275,59 +235,16 @@ const char *settings_text(const struct settings *s, const char *name) {
     return s->text[i];
 }
 
-/* Six numbers with spaces or commas between them. */
-static bool parse_box(const char *text, double lower[3], double upper[3]) {
-    for (int i = 0; i < 6; i++) {
-        char *end;
-        text += strspn(text, " ,");
-        double value = strtod(text, &end);
-        if (end == text || !isfinite(value))
-            return false;
-        *(i < 3 ? &lower[i] : &upper[i - 3]) = value;
-        text = end;
-    }
-    return text[strspn(text, " ")] == '\0' && lower[0] < upper[0] && lower[1] < upper[1] && lower[2] < upper[2];
-}
-
 bool settings_box(const struct settings *s, const char *name, double lower[3], double upper[3]) {
     int i = index_of(name);
     assert(i >= 0 && table[i].type == SETTING_BOX);
-    return *s->text[i] && parse_box(s->text[i], lower, upper);
-}
-
-/* "NAME,x,y,value": the name may have commas in it. */
-static bool parse_pixel(const struct setting *t, const char *text, struct pixel_setting *pixel) {
-    const char *comma[3], *end = text + strlen(text);
-    char *after;
-    for (int i = 2; i >= 0; i--) {
-        for (end--; end > text && *end != ',';)
-            end--;
-        if (end <= text)
-            return false;
-        comma[i] = end;
-    }
-    size_t length = (size_t)(comma[0] - text);
-    double value[3];
-    for (int i = 0; i < 3; i++) {
-        value[i] = strtod(comma[i] + 1, &after);
-        after += strspn(after, " ");
-        if (after == comma[i] + 1 || after != (i < 2 ? comma[i + 1] : text + strlen(text)) || !isfinite(value[i]))
-            return false;
-    }
-    for (int i = 0; i < 2; i++)
-        if (value[i] < 0.0 || value[i] > UINT16_MAX || value[i] != floor(value[i]))
-            return false;
-    if (length >= sizeof pixel->photograph || !(value[2] >= t->minimum && value[2] <= t->maximum))
-        return false;
-    *pixel = (struct pixel_setting){.x = (uint32_t)value[0], .y = (uint32_t)value[1], .value = value[2]};
-    memcpy(pixel->photograph, text, length);
-    return true;
+    return *s->text[i] && setting_parse_box(s->text[i], lower, upper);
 }
 
 bool settings_pixel(const struct settings *s, const char *name, struct pixel_setting *pixel) {
     int i = index_of(name);
     assert(i >= 0 && table[i].type == SETTING_PIXEL);
-    return *s->text[i] && parse_pixel(&table[i], s->text[i], pixel);
+    return *s->text[i] && setting_parse_pixel(&table[i], s->text[i], pixel);
 }
 
 bool settings_emitter(const struct settings *s, uint32_t segment, bool decided) {
@@ -337,180 +254,13 @@ bool settings_emitter(const struct settings *s, uint32_t segment, bool decided) 
     return decided;
 }
 
-static void set_text(struct settings *s, size_t i, const char *text) {
-    mem_free(s->text[i]);
-    s->text[i] = mem_strdup(text);
-}
-
-/* Applies one value; on a problem writes the reason and returns false. */
-static bool apply_one(struct settings *s, size_t i, const cJSON *value, char *reason, size_t size) {
-    const struct setting *t = &table[i];
-    double number = value->valuedouble, lower[3], upper[3];
-    struct pixel_setting pixel;
-    int choice;
-    switch (t->type) {
-    case SETTING_INT:
-    case SETTING_REAL:
-        if (!cJSON_IsNumber(value) || !isfinite(number) || (t->type == SETTING_INT && number != floor(number))) {
-            snprintf(reason, size, "must be %s number", t->type == SETTING_INT ? "a whole" : "a");
-            return false;
-        }
-        if (number < t->minimum || number > t->maximum) {
-            const char *gap = *t->unit ? " " : "";
-            if (t->type == SETTING_INT)
-                snprintf(reason, size, "must be between %.0f and %.0f%s%s, found %.15g", t->minimum, t->maximum, gap,
-                         t->unit, number);
-            else
-                snprintf(reason, size, "must be between %.15g and %.15g%s%s, found %.15g", t->minimum, t->maximum, gap,
-                         t->unit, number);
-            return false;
-        }
-        s->number[i] = number;
-        return true;
-    case SETTING_BOOL:
-        if (!cJSON_IsBool(value)) {
-            snprintf(reason, size, "must be true or false");
-            return false;
-        }
-        s->number[i] = cJSON_IsTrue(value);
-        return true;
-    case SETTING_CHOICE:
-        choice = cJSON_IsString(value) ? choice_index(t->choices, value->valuestring) : -1;
-        if (choice < 0) {
-            snprintf(reason, size, "must be one of %s", t->choices);
-            return false;
-        }
-        s->number[i] = choice;
-        return true;
-    case SETTING_TEXT:
-        if (!cJSON_IsString(value) || (!*value->valuestring && *t->default_text) ||
-            strlen(value->valuestring) > TEXT_MAX_LENGTH) {
-            snprintf(reason, size, "must be a text of %d to %d bytes", *t->default_text ? 1 : 0, TEXT_MAX_LENGTH);
-            return false;
-        }
-        set_text(s, i, value->valuestring);
-        return true;
-    case SETTING_BOX:
-        if (!cJSON_IsString(value) || (*value->valuestring && !parse_box(value->valuestring, lower, upper))) {
-            snprintf(reason, size, "must be six numbers, the lower corner and the upper, such as \"-1 -1 0 4 3 2.5\"");
-            return false;
-        }
-        set_text(s, i, value->valuestring);
-        return true;
-    case SETTING_PIXEL:
-        if (!cJSON_IsString(value) || (*value->valuestring && !parse_pixel(t, value->valuestring, &pixel))) {
-            snprintf(reason, size,
-                     "must be a photograph's name, the column and row of a pixel, and a value from %g to %g, such as "
-                     "\"IMG_0012.jpg,812,604,0.18\"",
-                     t->minimum, t->maximum);
-            return false;
-        }
-        set_text(s, i, value->valuestring);
-        return true;
-    }
-    return false;
-}
-
-#define SEGMENT_PREFIX "emitters."
-#define SEGMENTS_MAX 1000
-
-/* Applies "emitters.27": "on"; false with a reason when it is faulty. */
-static bool apply_segment(struct settings *s, const cJSON *value, char *reason, size_t size) {
-    const char *digits = value->string + strlen(SEGMENT_PREFIX), *word = cJSON_GetStringValue(value);
-    bool is_number = *digits && strspn(digits, "0123456789") == strlen(digits) && strlen(digits) <= 9;
-    if (!is_number || !word || (strcmp(word, "on") != 0 && strcmp(word, "off") != 0)) {
-        snprintf(reason, size, is_number ? "must be on or off" : "must end in the number of a segment, as emitters.27");
-        return false;
-    }
-    uint32_t segment = (uint32_t)strtoul(digits, NULL, 10);
-    size_t at = 0;
-    while (at < s->segment_count && s->segment[at].segment != segment)
-        at++;
-    if (at == SEGMENTS_MAX) {
-        snprintf(reason, size, "is one of more than %d segments", SEGMENTS_MAX);
-        return false;
-    }
-    if (at == s->segment_count)
-        s->segment = mem_realloc_array(s->segment, ++s->segment_count, sizeof *s->segment);
-    s->segment[at] = (struct segment_setting){segment, strcmp(word, "on") == 0};
-    return true;
-}
-
-static void add_unknown(struct setting_faults *f, const char *name) {
-    char hint[128] = "";
-    const char *nearest = nearest_name(name);
-    if (nearest)
-        snprintf(hint, sizeof hint, "did you mean %s?", nearest);
-    setting_faults_add(f, name, "there is no such setting", hint);
-}
-
-/* Resets settings that the method does not use; f: NULL when the method itself is invalid. */
-static void check_method(struct settings *s, const cJSON *object, struct setting_faults *f) {
-    char reason[256], hint[128], chosen[SETTING_NAME_MAX];
-    int method = index_of("method");
-    choice_at(table[method].choices, (int)s->number[method], chosen, sizeof chosen);
-    for (const cJSON *value = object->child; value; value = value->next) {
-        int i = index_of(value->string);
-        const struct setting *t = i < 0 ? NULL : &table[i];
-        if (!t || !t->method || strcmp(t->method, chosen) == 0 || s->number[i] == usual_number(s, (size_t)i))
-            continue;
-        s->number[i] = usual_number(s, (size_t)i);
-        if (!f)
-            continue;
-        snprintf(reason, sizeof reason, "only method=%s uses it, and the method is %s", t->method, chosen);
-        snprintf(hint, sizeof hint, "leave it out, or set method=%s", t->method);
-        setting_faults_add(f, t->name, reason, hint);
-    }
-}
-
-enum status settings_apply(struct settings *s, const cJSON *object, cJSON *problems, struct error *err) {
-    struct setting_faults faults = {.problems = problems};
-    bool method_is_good = true;
-    if (!cJSON_IsObject(object)) {
-        setting_faults_add(&faults, "settings", "must be an object of names and values", "");
-        return error_set(err, STATUS_INPUT, "settings must be a JSON object");
-    }
-    for (const cJSON *value = object->child; value; value = value->next) {
-        char reason[256] = "";
-        int i = index_of(value->string);
-        if (strncmp(value->string, SEGMENT_PREFIX, strlen(SEGMENT_PREFIX)) == 0) {
-            if (!apply_segment(s, value, reason, sizeof reason))
-                setting_faults_add(&faults, value->string, reason, "");
-        } else if (i < 0) {
-            add_unknown(&faults, value->string);
-        } else if (!apply_one(s, (size_t)i, value, reason, sizeof reason)) {
-            setting_faults_add(&faults, value->string, reason, table[i].help);
-            method_is_good = method_is_good && strcmp(value->string, "method") != 0;
-        } else {
-            s->is_given[i] = true;
-        }
-    }
-    follow_quality(s);
-    if (s->segment_count > 0 && settings_is(s, "emitters", "any"))
-        setting_faults_add(&faults, "emitters", "with emitters=any nothing is decided of single segments",
-                           "leave one out");
-    check_method(s, object, method_is_good ? &faults : NULL);
-    return setting_faults_status(&faults, err);
-}
-
-static enum setting_form form_of(const char *name) {
-    const struct setting *t = settings_find(name);
-    if (t && (t->type == SETTING_INT || t->type == SETTING_REAL))
-        return SETTING_NUMBER;
-    return t && t->type == SETTING_BOOL ? SETTING_TRUTH : SETTING_WORDS;
-}
-
-enum status settings_parse_assignment(const char *text, cJSON *object, struct error *err) {
-    return setting_assign(text, object, form_of, err);
-}
-
 static void add_value(cJSON *object, const char *key, size_t i, const struct settings *s) {
     const struct setting *t = &table[i];
     char word[SETTING_NAME_MAX];
     if (t->type == SETTING_BOOL)
         json_add_bool(object, key, s->number[i] != 0.0);
     else if (t->type == SETTING_CHOICE)
-        json_add_string(object, key, choice_at(t->choices, (int)s->number[i], word, sizeof word));
+        json_add_string(object, key, choices_word(t->choices, (int)s->number[i], word, sizeof word));
     else if (is_text(t))
         json_add_string(object, key, s->text[i]);
     else
@@ -523,7 +273,7 @@ cJSON *settings_to_json(const struct settings *s) {
         add_value(object, table[i].name, i, s);
     for (size_t i = 0; i < s->segment_count; i++) {
         char name[SETTING_NAME_MAX];
-        snprintf(name, sizeof name, SEGMENT_PREFIX "%u", s->segment[i].segment);
+        snprintf(name, sizeof name, SETTING_SEGMENT_PREFIX "%u", s->segment[i].segment);
         json_add_string(object, name, s->segment[i].is_emitter ? "on" : "off");
     }
     return object;
@@ -537,7 +287,7 @@ static void add_help(cJSON *entry, const struct setting *t) {
     cJSON *object = amount ? cJSON_AddObjectToObject(entry, "by_quality") : NULL;
     for (int q = 0; object && q < QUALITIES; q++) {
         size_t used = strlen(help);
-        choice_at(settings_find("quality")->choices, q, word, sizeof word);
+        choices_word(settings_find("quality")->choices, q, word, sizeof word);
         json_add_number(object, word, amount[q]);
         snprintf(help + used, sizeof help - used, "%s%s %.0f%s", q ? ", " : " (", word, amount[q],
                  q + 1 < QUALITIES ? "" : ")");
@@ -560,12 +310,7 @@ cJSON *settings_describe(void) {
             json_add_number(entry, "minimum", t->minimum);
             json_add_number(entry, "maximum", t->maximum);
         }
-        if (t->choices) {
-            cJSON *choices = cJSON_AddArrayToObject(entry, "choices");
-            char word[SETTING_NAME_MAX];
-            for (const char *at = t->choices; *at; at += strcspn(at, "|"), at += *at == '|')
-                cJSON_AddItemToArray(choices, cJSON_CreateString(choice_at(at, 0, word, sizeof word)));
-        }
+        choices_to_json(t->choices, entry);
         add_value(entry, "default", i, &defaults);
         add_help(entry, t);
         if (t->method)

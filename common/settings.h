@@ -32,6 +32,7 @@ const struct setting *settings_table(size_t *count);
 const struct setting *settings_find(const char *name);
 
 /* What the user says of one segment: "emitters.27": "on". */
+#define SETTING_SEGMENT_PREFIX "emitters."
 struct segment_setting {
     uint32_t segment;
     bool is_emitter;

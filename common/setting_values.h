@@ -1,0 +1,20 @@
+/* setting_values.h -- how values of settings with several parts are written. */
+#ifndef UNBAKE_COMMON_SETTING_VALUES_H
+#define UNBAKE_COMMON_SETTING_VALUES_H
+
+#include "common/json.h"
+#include "common/settings.h"
+
+/* Reads up to `most` finite numbers of "1, 2 3"; how many there are, or 0 for anything else. */
+size_t setting_scan_numbers(const char *text, double *value, size_t most);
+/* The numbers of a JSON number, array or string; 0: it is none of these, or has more than `most`. */
+size_t setting_read_numbers(const cJSON *value, double *number, size_t most);
+/* "640x480": width and height. */
+bool setting_read_size(const char *text, double side[2]);
+
+/* Six numbers with spaces or commas between them: the lower corner, then the upper, which is greater on each axis. */
+bool setting_parse_box(const char *text, double lower[3], double upper[3]);
+/* "NAME,x,y,value": the name may have commas in it; the value is in the range of `t`. */
+bool setting_parse_pixel(const struct setting *t, const char *text, struct pixel_setting *pixel);
+
+#endif
