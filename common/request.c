@@ -14,7 +14,6 @@
 #include "common/mem.h"
 #include "common/protocol.h"
 
-#define BODY_MAX ((size_t)64 << 20)
 #define CONNECT_SEC 10L
 #define SILENCE_SEC 300.0
 #define TICK_MS 200
@@ -115,55 +114,9 @@ bool request_pause(struct http_request *r, int tries, double asked_sec) {
 
 static enum status cancelled(struct error *err) { return error_set(err, STATUS_CANCELLED, "interrupted"); }
 
-/* --- the reply ----------------------------------------------------------------------------- */
-
-void reply_init(struct reply *reply) {
-    *reply = (struct reply){.retry_after_sec = -1.0, .range_first = -1, .upload_offset = -1};
-    buf_init(&reply->body, BODY_MAX);
-}
-
-void reply_release(struct reply *reply) {
-    buf_release(&reply->body);
-    cJSON_Delete(reply->json);
-    reply->json = NULL;
-}
-
-/* The value where `line` is the header `name`; NULL otherwise. */
-static const char *header_value(const char *line, const char *name) {
-    size_t length = strlen(name);
-    if (strncasecmp(line, name, length) != 0 || line[length] != ':')
-        return NULL;
-    return line + length + 1 + strspn(line + length + 1, " \t");
-}
-
 static size_t on_header(char *bytes, size_t size, size_t count, void *user) {
-    struct reply *reply = ((struct request_try *)user)->reply;
-    size_t length = size * count;
-    char line[512];
-    snprintf(line, sizeof line, "%.*s", (int)(length < sizeof line ? length : sizeof line - 1), bytes);
-    line[strcspn(line, "\r\n")] = '\0';
-    if (strncmp(line, "HTTP/", 5) == 0) { /* a new head, possibly after 100 Continue: drop the old one */
-        const char *code = strchr(line, ' ');
-        reply->code = code ? strtol(code, NULL, 10) : 0;
-        reply->content_type[0] = '\0';
-        return length;
-    }
-    const char *value = header_value(line, "Content-Type");
-    if (value)
-        snprintf(reply->content_type, sizeof reply->content_type, "%s", value);
-    value = header_value(line, "Retry-After");
-    if (value && *value >= '0' && *value <= '9')
-        reply->retry_after_sec = strtod(value, NULL);
-    value = header_value(line, "Content-Range");
-    if (value && strncasecmp(value, "bytes ", 6) == 0 && value[6] >= '0' && value[6] <= '9')
-        reply->range_first = strtoll(value + 6, NULL, 10);
-    value = header_value(line, "Location");
-    if (value && strlen(value) < sizeof reply->location)
-        snprintf(reply->location, sizeof reply->location, "%s", value);
-    value = header_value(line, "Upload-Offset");
-    if (value && *value >= '0' && *value <= '9')
-        reply->upload_offset = strtoll(value, NULL, 10);
-    return length;
+    reply_take_header(((struct request_try *)user)->reply, bytes, size * count);
+    return size * count;
 }
 
 static size_t on_body(char *bytes, size_t size, size_t count, void *user) {
@@ -320,7 +273,7 @@ static enum status transfer(struct request_try *a, const char *url, const char *
     if (a->read_status != STATUS_OK)
         return a->read_status;
     if (a->too_long)
-        return error_set(a->err, STATUS_LIMIT, "%s sent more than %zu bytes", url, BODY_MAX);
+        return error_set(a->err, STATUS_LIMIT, "%s sent more than %zu bytes", url, REPLY_BODY_MAX);
     /* A server that refuses an upload early may close before everything is sent: its reply counts. */
     if (code == CURLE_OK || a->stopped || (code == CURLE_SEND_ERROR && a->reply->code >= 400))
         return STATUS_OK;
@@ -340,45 +293,6 @@ static enum status try_once(struct request_try *a, const char *url, const char *
     return status;
 }
 
-/* --- status codes -------------------------------------------------------------------------- */
-
-static enum status status_of(long code) {
-    switch (code) {
-    case 404: return STATUS_NOT_FOUND;
-    case 409:
-    case 412: return STATUS_CONFLICT;
-    case 413:
-    case 429: return STATUS_LIMIT;
-    case 502:
-    case 503:
-    case 504: return STATUS_UNAVAILABLE;
-    case 507: return STATUS_NO_SPACE;
-    default: return code >= 500 ? STATUS_INTERNAL : STATUS_INPUT;
-    }
-}
-
-static enum status judge(struct request_try *a) {
-    struct reply *reply = a->reply;
-    if (strstr(reply->content_type, "json") && reply->body.length > 0) {
-        enum status status = json_parse(buf_text(&reply->body), reply->body.length, "the reply", &reply->json, NULL);
-        if (status != STATUS_OK) {
-            error_set(a->err, STATUS_UNAVAILABLE, "%s does not answer in JSON", a->request->server);
-            return error_hint(a->err, "is that server unbaked?");
-        }
-    }
-    if (reply->code < 400)
-        return STATUS_OK;
-    const char *detail = NULL, *hint = NULL;
-    json_string(reply->json, "detail", "problem", NULL, &detail, NULL);
-    json_string(reply->json, "hint", "problem", NULL, &hint, NULL);
-    enum status status = status_of(reply->code);
-    if (detail)
-        error_set(a->err, status, "%s", detail);
-    else
-        error_set(a->err, status, "%s answered %ld", a->request->server, reply->code);
-    return hint ? error_hint(a->err, "%s", hint) : status;
-}
-
 enum status request_run(struct http_request *r, const struct request_call *call, struct reply *reply,
                         struct error *err) {
     char *url = mem_printf("%s%s", r->socket ? "http://localhost" : r->server, call->path);
@@ -393,7 +307,7 @@ enum status request_run(struct http_request *r, const struct request_call *call,
         struct request_try a = {.request = r, .call = call, .reply = reply, .err = err};
         status = try_once(&a, url, body, &unsent);
         if (status == STATUS_OK)
-            status = judge(&a);
+            status = reply_judge(reply, r->server, err);
         bool again = status == STATUS_UNAVAILABLE && !call->once && (same_twice || unsent || reply->code == 503);
         if (!again || clock_sec() + pause_length(tries, reply->retry_after_sec) > give_up_at)
             break;

@@ -18,6 +18,7 @@
 #include "common/buf.h"
 #include "common/error.h"
 #include "common/json.h"
+#include "common/reply.h"
 
 struct http_request; /* a server and the connection to it; opaque */
 
@@ -44,21 +45,6 @@ bool request_interrupted(struct http_request *r);
 /* Pauses before another try (0, 1, ...): 0.1 s, doubled each time, at most 5 s; or `asked_sec`, by the server's
  * request (negative: none). False when interrupted. */
 bool request_pause(struct http_request *r, int tries, double asked_sec);
-
-/* A reply. */
-struct reply {
-    long code;       /* HTTP status; 0: no reply at all */
-    struct buf body; /* except what went to a sink */
-    cJSON *json;     /* the body if it is JSON, including problems; else NULL */
-    char content_type[128];
-    double retry_after_sec; /* negative: absent */
-    int64_t range_first;    /* of Content-Range; -1: absent */
-    char location[256];     /* "": absent */
-    int64_t upload_offset;  /* -1: absent */
-    bool is_untrusted;      /* code 0: the server's certificate, or the file of those to trust, cannot be used */
-};
-void reply_init(struct reply *reply);
-void reply_release(struct reply *reply);
 
 struct request_call {
     const char *method;    /* NULL: GET */

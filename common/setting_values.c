@@ -60,7 +60,7 @@ bool setting_parse_box(const char *text, double lower[3], double upper[3]) {
     return text[strspn(text, " ")] == '\0' && lower[0] < upper[0] && lower[1] < upper[1] && lower[2] < upper[2];
 }
 
-bool setting_parse_pixel(const struct setting *t, const char *text, struct pixel_setting *pixel) {
+bool setting_parse_pixel(const char *text, double least, double most, struct pixel_setting *pixel) {
     const char *comma[3], *end = text + strlen(text);
     char *after;
     for (int i = 2; i >= 0; i--) {
@@ -81,7 +81,7 @@ bool setting_parse_pixel(const struct setting *t, const char *text, struct pixel
     for (int i = 0; i < 2; i++)
         if (value[i] < 0.0 || value[i] > UINT16_MAX || value[i] != floor(value[i]))
             return false;
-    if (length >= sizeof pixel->photograph || !(value[2] >= t->minimum && value[2] <= t->maximum))
+    if (length >= sizeof pixel->photograph || !(value[2] >= least && value[2] <= most))
         return false;
     *pixel = (struct pixel_setting){.x = (uint32_t)value[0], .y = (uint32_t)value[1], .value = value[2]};
     memcpy(pixel->photograph, text, length);

@@ -2,8 +2,11 @@
 #ifndef UNBAKE_COMMON_SETTING_VALUES_H
 #define UNBAKE_COMMON_SETTING_VALUES_H
 
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
 #include "common/json.h"
-#include "common/settings.h"
 
 /* Reads up to `most` finite numbers of "1, 2 3"; how many there are, or 0 for anything else. */
 size_t setting_scan_numbers(const char *text, double *value, size_t most);
@@ -14,7 +17,13 @@ bool setting_read_size(const char *text, double side[2]);
 
 /* Six numbers with spaces or commas between them: the lower corner, then the upper, which is greater on each axis. */
 bool setting_parse_box(const char *text, double lower[3], double upper[3]);
-/* "NAME,x,y,value": the name may have commas in it; the value is in the range of `t`. */
-bool setting_parse_pixel(const struct setting *t, const char *text, struct pixel_setting *pixel);
+/* Something known of a pixel of a photograph. */
+struct pixel_setting {
+    char photograph[256]; /* its name */
+    uint32_t x, y;        /* column and row, from 0 at the upper left */
+    double value;
+};
+/* "NAME,x,y,value": the name may have commas in it. False also where the value is not from `least` to `most`. */
+bool setting_parse_pixel(const char *text, double least, double most, struct pixel_setting *pixel);
 
 #endif

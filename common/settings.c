@@ -9,7 +9,6 @@
 #include "common/choices.h"
 #include "common/mem.h"
 #include "common/setting_faults.h"
-#include "common/setting_values.h"
 
 static const struct setting table[] = {
     {"bake_uv", SETTING_CHOICE, "", 0, 0, "auto|off", "auto", NULL,
@@ -244,7 +243,7 @@ bool settings_box(const struct settings *s, const char *name, double lower[3], d
 bool settings_pixel(const struct settings *s, const char *name, struct pixel_setting *pixel) {
     int i = index_of(name);
     assert(i >= 0 && table[i].type == SETTING_PIXEL);
-    return *s->text[i] && setting_parse_pixel(&table[i], s->text[i], pixel);
+    return *s->text[i] && setting_parse_pixel(s->text[i], table[i].minimum, table[i].maximum, pixel);
 }
 
 bool settings_emitter(const struct settings *s, uint32_t segment, bool decided) {

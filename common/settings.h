@@ -11,6 +11,7 @@
 
 #include "common/error.h"
 #include "common/json.h"
+#include "common/setting_values.h"
 
 enum setting_type { SETTING_INT, SETTING_REAL, SETTING_BOOL, SETTING_CHOICE, SETTING_TEXT, SETTING_BOX, SETTING_PIXEL };
 
@@ -61,13 +62,7 @@ const char *settings_text(const struct settings *s, const char *name); /* borrow
 /* The value of a SETTING_BOX; false where it is "". */
 bool settings_box(const struct settings *s, const char *name, double lower[3], double upper[3]);
 
-/* The value of a SETTING_PIXEL: something known of a pixel of a photograph. */
-struct pixel_setting {
-    char photograph[256]; /* its name */
-    uint32_t x, y;        /* column and row, from 0 at the upper left */
-    double value;
-};
-/* False where it is "". */
+/* The value of a SETTING_PIXEL; false where it is "". */
 bool settings_pixel(const struct settings *s, const char *name, struct pixel_setting *pixel);
 
 /* Whether a segment emits: what the user says of it, else `decided`. */

@@ -9,7 +9,6 @@
 #include "common/mem.h"
 #include "common/nearest.h"
 #include "common/setting_faults.h"
-#include "common/setting_values.h"
 #include "common/settings.h"
 
 #define TEXT_MAX_LENGTH 255 /* bytes */
@@ -61,7 +60,7 @@ static bool check_words(const struct setting *t, const char *text, struct settin
         return (text && (!*text || setting_parse_box(text, lower, upper))) ||
                setting_refuse(why, "must be six numbers, the lower corner and the upper, such as \"-1 -1 0 4 3 2.5\"");
     case SETTING_PIXEL:
-        return (text && (!*text || setting_parse_pixel(t, text, &pixel))) ||
+        return (text && (!*text || setting_parse_pixel(text, t->minimum, t->maximum, &pixel))) ||
                setting_refuse(
                    why,
                    "must be a photograph's name, the column and row of a pixel, and a value from %g to %g, such "
