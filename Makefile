@@ -84,15 +84,14 @@ $(B)/obj/%.o: %.c
 	@mkdir -p $(@D)
 	$(CC) $(ALL_CFLAGS) -MMD -MP -c -o $@ $<
 
-# Files that travel inside the binary, as C arrays; declared in server/http/embedded.h.
-embed = symbol=$$(printf %s '$(notdir $(1))' | tr -c 'a-zA-Z0-9' _); \
-	{ printf '\#include "server/http/embedded.h"\nextern const unsigned char embedded_%s[];\nextern const size_t embedded_%s_size;\n' "$$symbol" "$$symbol"; \
-	  printf 'const unsigned char embedded_%s[] = {\n' "$$symbol"; od -An -v -tx1 $< | sed 's/[0-9a-f][0-9a-f]/0x&,/g'; \
-	  printf '};\nconst size_t embedded_%s_size = sizeof embedded_%s;\n' "$$symbol" "$$symbol"; } > $@
-$(B)/embed/%.c: %
+# Files that travel inside the binary, as the assembler takes them in; declared in server/http/embedded.h.
+embed = s=embedded_$$(printf %s '$(notdir $(1))' | tr -c 'a-zA-Z0-9' _); \
+	printf '%s\n' .section\ .rodata ".global $$s, $${s}_size" "$$s: .incbin \"$<\"" 0: ".balign 8" "$${s}_size: .quad 0b - $$s" \
+	    '.section .note.GNU-stack,"",%progbits' > $@
+$(B)/embed/%.s: %
 	@mkdir -p $(@D)
 	@$(call embed,$*)
-$(B)/embed/three.module.js.c: $(THREE_JS)
+$(B)/embed/three.module.js.s: $(THREE_JS)
 	@mkdir -p $(@D)
 	@$(call embed,three.module.js)
 $(THREE_JS):
@@ -113,7 +112,10 @@ $(B)/embed/source_digest.c: $(SOURCES)
 	@mkdir -p $(@D)
 	@{ printf '#include "common/protocol.h"\n#include "common/source_digest.h"\n'; \
 	   printf 'const char source_version[] = UNBAKE_VERSION " (sources %.16s)";\n' "$$(cat $(SOURCES) | sha256sum)"; } > $@
-$(B)/obj/embed/%.o: $(B)/embed/%.c
+$(B)/obj/embed/%.o: $(B)/embed/%.s
+	@mkdir -p $(@D)
+	$(CC) -c -o $@ $<
+$(B)/obj/embed/page.o $(B)/obj/embed/source_digest.o: $(B)/obj/embed/%.o: $(B)/embed/%.c
 	@mkdir -p $(@D)
 	$(CC) $(ALL_CFLAGS) -MMD -MP -c -o $@ $<
 
@@ -164,7 +166,7 @@ demo: deps ## make a room, reconstruct it, show where the pictures are
 	@tests/demo.sh $(B)
 
 test: deps ## build and run all tests, the quick ones also under the sanitizers; T=name: only those (T=adam)
-	@+$(BUILD) tests $(if $(T),,benches asan-build tsan-build SANITIZED_TESTS=quick)
+	@+$(BUILD) tests $(if $(T),,benches)
 	@tests/run.sh "$(T)" $(B) $(if $(T),,build/asan build/tsan)
 
 CHECK_BIN = $(filter $(B)/tests/unit/% $(B)/tests/gradient/% $(B)/tests/render/test_furnace \

@@ -1,9 +1,10 @@
 #!/bin/bash
 # run.sh NAME BUILD...: runs the tests that were built under each BUILD, all of them or those with
-# NAME in their names, TEST_LANES (processors + 1) at a time. One line a test; a failing test's output follows its line.
+# NAME in their names, TEST_LANES (processors + 2) at a time. One line a test; a failing test's output follows its line.
 # Last: "N passed, N failed, N skipped". Tests of build/asan and build/tsan have asan/ or tsan/ before
-# their names; of several builds these run only what is worth its time there. With TEST_SET=check only what a change
-# needs while it is written: unit, gradient and closed forms, and one small job.
+# their names. Of several builds these two run only what is worth its time there, and are built here, beside the tests of
+# the first. With TEST_SET=check only what a change needs while it is written: unit, gradient and closed forms, and one
+# small job.
 #
 # run.sh --slow asan|tsan: the names of those that do not run under this sanitizer.
 set -u
@@ -39,6 +40,11 @@ if [ "$only" = --slow ]; then
     exit
 fi
 
+# What takes longest, by far: it starts before the others, so that no lane works on at the end while the rest are idle.
+long="api/test_executor_examples render/test_saturated_light api/test_demo_room api/test_axe api/test_render
+chaos/test_memory_faults api/test_node_site chaos/test_slurm api/test_readme render/test_rooms render/test_listing1
+chaos/test_disk_faults api/test_page render/test_sky_room api/test_resume api/test_webhooks"
+
 # What `make check` runs, as patterns of names, and what of it takes longer than the rest together.
 check="unit/* gradient/* render/test_furnace render/test_principled api/test_one_job"
 slow_check="unit/test_worker_faults unit/test_client_request unit/test_atlas"
@@ -55,8 +61,8 @@ is_wanted() { # NAME
     return 1
 }
 
-# One test: prints its line, with the seconds that it took and those of processor time, in one piece and adds its outcome
-# to $outcomes.
+# One test: prints its line, with the seconds that it took and those of processor time, in one piece, adds its outcome to
+# $outcomes and returns its status.
 run_one() {
     local name=$1
     shift
@@ -72,30 +78,33 @@ run_one() {
     esac
     printf '%s' "$text"
     echo "${text%% *}" >>"$outcomes"
+    return $code
 }
 
-# One more at a time than there are processors: many a test waits for a daemon more than it computes.
-lanes=${TEST_LANES:-$(($(nproc) + 1))}
+# Two more at a time than there are processors: many a test waits for a daemon more than it computes.
+lanes=${TEST_LANES:-$(($(nproc) + 2))}
 start_one() {
-    [ "$(jobs -pr | wc -l)" -lt "$lanes" ] || wait -n
+    while [ "$(jobs -pr | wc -l)" -ge "$lanes" ]; do wait -n; done
     run_one "$@" &
+}
+
+# Makes the sanitizer builds one after the other, in one lane and on half of the processors: the first's tests run beside
+# it. $state/NAME is there when one has ended, and $state/NAME.built when it went well.
+build_sanitized() { # BUILD...
+    local build name
+    for build in "$@"; do
+        name=${build##*/}
+        TEST_TIMEOUT=3600 run_one "$build" make -s -j$((($(nproc) + 1) / 2)) "$name-build" SANITIZED_TESTS=quick T="$only" &&
+            touch "$state/$name.built"
+        touch "$state/$name"
+    done
 }
 
 count() { grep -c "^$1\$" "$outcomes"; }
 
-outcomes=$(mktemp)
-trap 'rm -f "$outcomes"' EXIT
-[ -n "$only" ] || { logs=$1/logs; mkdir -p "$logs"; start_one includes tests/includes.sh; start_one format tests/format.sh; }
-several=$(($# > 1))
-for build in "$@"; do
-    export UNBAKE_BUILD=$build
-    logs=$build/logs
-    mkdir -p "$logs"
-    prefix= slow=
-    case $build in
-    */asan) prefix=asan/ slow=$slow_asan ;;
-    */tsan) prefix=tsan/ slow=$slow_tsan ;;
-    esac
+# What of the sources is a test that was asked for, as "NAME SOURCE" a line, the longest first.
+list_tests() {
+    local source name
     for source in tests/unit/test_*.c tests/gradient/test_*.c tests/render/test_*.c \
         tests/api/test_*.c tests/api/test_*.sh tests/chaos/test_*.c tests/chaos/test_*.sh \
         tests/soak/test_*.c tests/soak/test_*.sh tests/fuzz/test_*.c tests/fuzz/test_*.sh; do
@@ -104,12 +113,40 @@ for build in "$@"; do
         name=${name%.*}
         [[ -z $only || $name == *"$only"* ]] || continue
         is_wanted "$name" || continue
+        [[ " ${long//$'\n'/ } " == *" $name "* ]] && echo "0 $name $source" || echo "1 $name $source"
+    done | sort -s -n -k1,1 | cut -d' ' -f2-
+}
+
+state=$(mktemp -d)
+outcomes=$state/outcomes
+touch "$outcomes"
+trap 'rm -rf "$state"' EXIT
+several=$(($# > 1))
+logs=$1/logs
+mkdir -p "$logs"
+[ -n "$only" ] || { start_one includes tests/includes.sh; start_one format tests/format.sh; }
+[ $several -eq 0 ] || build_sanitized "${@:2}" &
+for build in "$@"; do
+    export UNBAKE_BUILD=$build
+    logs=$build/logs
+    mkdir -p "$logs"
+    prefix= slow= sanitizer=
+    case $build in
+    */asan) sanitizer=asan slow=$slow_asan ;;
+    */tsan) sanitizer=tsan slow=$slow_tsan ;;
+    esac
+    if [ -n "$sanitizer" ]; then
+        prefix=$sanitizer/
+        while [ $several -eq 1 ] && [ ! -e "$state/$sanitizer" ]; do sleep 0.2; done
+        [ $several -eq 0 ] || [ -e "$state/$sanitizer.built" ] || continue
+    fi
+    while read -r name source; do
         [[ $several -eq 0 || " "${slow//$'\n'/ }" " != *" $name "* ]] || continue
         case $source in
         *.c) start_one "$prefix$name" "$build/tests/$name" ;;
         *.sh) start_one "$prefix$name" bash "$source" "$build" ;;
         esac
-    done
+    done < <(list_tests)
 done
 
 wait
