@@ -24,15 +24,6 @@
 /* Largest distance of a curve from y = x that is rounding. */
 #define SAME_CURVE 1e-3f
 
-enum status tiff_refuse(const struct tiff_reader *r, const char *why, struct error *err) {
-    if (r->compression != 0 && !TIFFIsCODECConfigured(r->compression)) {
-        error_set(err, STATUS_INPUT, "%s: this TIFF's compression (%d) is not known to this system's libtiff",
-                  r->source->name, r->compression);
-        return error_hint(err, "save it uncompressed or with ZIP compression");
-    }
-    return error_set(err, STATUS_INPUT, "%s: damaged TIFF: %s", r->source->name, r->complaint[0] ? r->complaint : why);
-}
-
 /* --- the file ------------------------------------------------------------------------------ */
 
 static tmsize_t read_bytes(thandle_t user, void *to, tmsize_t size) {

@@ -7,6 +7,15 @@
 #include "common/mem.h"
 #include "common/tiff.h"
 
+enum status tiff_refuse(const struct tiff_reader *r, const char *why, struct error *err) {
+    if (r->compression != 0 && !TIFFIsCODECConfigured(r->compression)) {
+        error_set(err, STATUS_INPUT, "%s: this TIFF's compression (%d) is not known to this system's libtiff",
+                  r->source->name, r->compression);
+        return error_hint(err, "save it uncompressed or with ZIP compression");
+    }
+    return error_set(err, STATUS_INPUT, "%s: damaged TIFF: %s", r->source->name, r->complaint[0] ? r->complaint : why);
+}
+
 /* Places of a strip or tile. */
 struct layout {
     bool is_tiled;

@@ -21,6 +21,8 @@ struct reserve {
     int64_t pages_used;    /* pages in use, including the current transaction */
 };
 
+struct buf; /* common/buf.h */
+
 struct store {
     pthread_mutex_t mutex; /* held for every use of sql; recursive */
     struct sql sql;
@@ -122,13 +124,15 @@ enum status reserve_check(struct store *store, struct error *err);
 /* Inside a transaction: appends an event. */
 enum status store_event_append(struct store *store, int64_t job_id, int attempt, const char *type, const char *data,
                                struct error *err);
-/* job_files.c, inside a transaction: STATUS_CONFLICT unless job `id` is a reconstruction with results, which another job
- * may read. */
+/* job_inputs.c, all inside a transaction: STATUS_CONFLICT unless job `id` is a reconstruction with results, which another
+ * job may read. */
 enum status store_source_ready(struct store *store, int64_t id, struct error *err);
-/* Inside a transaction: STATUS_CONFLICT while a job that has not ended reads the outputs of job `id`, which
- * therefore cannot be `action`. */
+/* STATUS_CONFLICT while a job that has not ended reads the outputs of job `id`, which therefore cannot be `action`. */
 enum status store_source_check(struct store *store, int64_t id, const char *action, struct error *err);
-/* Inside a transaction: STATUS_CONFLICT while files of the job are still to be sent. */
+/* Adds the names of the job's files, or of those that are still to be sent, with commas between them. */
+enum status store_job_files_names(struct store *store, int64_t job_id, bool only_missing, struct buf *names,
+                                  struct error *err);
+/* STATUS_CONFLICT while files of the job are still to be sent. */
 enum status store_job_files_check(struct store *store, int64_t id, struct error *err);
 /* Inside a transaction: gives a job a webhook; queues a message to it, if there is one, about a state. */
 enum status store_webhook_set(struct store *store, int64_t job_id, const char *url, const char *secret,
@@ -154,7 +158,9 @@ struct remote_row; /* remote.h */
 enum status remote_row_read(struct store *store, int64_t job_id, int number, struct remote_row *row, struct error *err);
 /* The job waits no more: it shows no reason. */
 enum status remote_tell_begun(struct store *store, int64_t job_id, struct error *err);
-/* remote_node.c, for remote.c. */
+/* remote_writers.c, for both; under the mutex: requests that write outputs of an attempt at this moment. */
 size_t remote_writer_count(const struct store *store, int64_t job_id, int number);
+void remote_writer_add(struct store *store, int64_t job_id, int number);
+void remote_writer_drop(struct store *store, int64_t job_id, int number);
 
 #endif

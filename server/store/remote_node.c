@@ -3,7 +3,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "common/mem.h"
 #include "server/job/job.h"
 #include "server/store/internal.h"
 #include "server/store/remote.h"
@@ -295,39 +294,18 @@ enum status store_remote_may_read(struct store *store, const struct remote_key *
     return status;
 }
 
-static struct remote_writer *find_writer(const struct store *store, int64_t job_id, int number) {
-    for (size_t i = 0; i < store->remote.writer_count; i++)
-        if (store->remote.writer[i].job_id == job_id && store->remote.writer[i].number == number)
-            return &store->remote.writer[i];
-    return NULL;
-}
-
-size_t remote_writer_count(const struct store *store, int64_t job_id, int number) {
-    const struct remote_writer *writer = find_writer(store, job_id, number);
-    return writer ? writer->count : 0;
-}
-
 enum status store_remote_enter(struct store *store, const struct remote_key *key, struct error *err) {
     store_lock(store);
     enum status status = check_claim(store, key, err);
-    struct remote_writer *writer = find_writer(store, key->job_id, key->number);
-    if (status == STATUS_OK && !writer) {
-        struct remote_table *t = &store->remote;
-        t->writer = mem_realloc_array(t->writer, t->writer_count + 1, sizeof *t->writer);
-        writer = &t->writer[t->writer_count++];
-        *writer = (struct remote_writer){.job_id = key->job_id, .number = key->number};
-    }
     if (status == STATUS_OK)
-        writer->count++;
+        remote_writer_add(store, key->job_id, key->number);
     store_unlock(store);
     return status;
 }
 
 void store_remote_leave(struct store *store, const struct remote_key *key) {
     store_lock(store);
-    struct remote_writer *writer = find_writer(store, key->job_id, key->number);
-    if (writer && --writer->count == 0)
-        *writer = store->remote.writer[--store->remote.writer_count];
+    remote_writer_drop(store, key->job_id, key->number);
     store_unlock(store);
     atomic_fetch_add(&store->remote.changes, 1); /* the scheduler may wait for the last one */
 }
