@@ -14,9 +14,16 @@ static double monotonic(void *user) {
     return clock_sec();
 }
 
+static bool has(const struct sites *s, const char *name) {
+    for (size_t i = 0; i < s->count; i++)
+        if (strcmp(name, s->place[i].is_process ? PROCESS : s->place[i].site.name) == 0)
+            return true;
+    return false;
+}
+
 static void read_one(struct sites *s, const char *name, const char *dir, struct buf *problems) {
     struct error err;
-    if (sites_have(s, name)) {
+    if (has(s, name)) {
         buf_printf(problems, "executors: %s is there twice\n", name);
         return;
     }
@@ -78,11 +85,4 @@ void sites_release(struct sites *s) {
     mem_free(s->place);
     mem_free(s->executor);
     *s = (struct sites){0};
-}
-
-bool sites_have(const struct sites *s, const char *name) {
-    for (size_t i = 0; i < s->count; i++)
-        if (strcmp(name, s->place[i].is_process ? PROCESS : s->place[i].site.name) == 0)
-            return true;
-    return false;
 }

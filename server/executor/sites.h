@@ -24,6 +24,5 @@ enum status sites_start(struct sites *sites, const struct executor *process, str
                         void (*wake)(void *user), void *user, struct error *err);
 /* After the scheduler that used them. */
 void sites_release(struct sites *sites);
-bool sites_have(const struct sites *sites, const char *name); /* "process" too, where it is among them */
 
 #endif

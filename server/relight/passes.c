@@ -72,7 +72,8 @@ void passes_layered(const bool *is_wanted, const struct view_look *look, const s
     }
 }
 
-float pass_filmic(float x) {
+/* A filmic curve from scene light to display light, both linear: Narkowicz, ACES Filmic Tone Mapping Curve (2015). */
+static float filmic(float x) {
     x = x > 0.0f ? x : 0.0f;
     return clampf(x * (2.51f * x + 0.03f) / (x * (2.43f * x + 0.59f) + 0.14f), 0.0f, 1.0f);
 }
@@ -81,7 +82,7 @@ void pass_show(const struct render_pass *pass, const struct view_look *look, str
     for (size_t i = 0; i < (size_t)image->width * image->height * image->channel_count; i++) {
         float *v = &image->pixel[i];
         if (pass->kind == PASS_LIGHT)
-            *v = look->is_filmic ? pass_filmic(*v * look->exposure) : *v * look->exposure;
+            *v = look->is_filmic ? filmic(*v * look->exposure) : *v * look->exposure;
         else if (pass->kind == PASS_SHARE)
             *v = image_srgb_to_linear(*v);
         else if (pass->kind == PASS_NORMAL)

@@ -50,7 +50,4 @@ void pass_show(const struct render_pass *pass, const struct view_look *look, str
 /* Changes light into the unit that EXR has. */
 void pass_measure(const struct render_pass *pass, const struct view_look *look, struct image *image);
 
-/* A filmic curve from scene light to display light, both linear: Narkowicz, ACES Filmic Tone Mapping Curve (2015). */
-float pass_filmic(float light);
-
 #endif

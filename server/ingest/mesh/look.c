@@ -62,7 +62,8 @@ bool look_has_maps(const struct mesh_look *look) {
     return false;
 }
 
-size_t look_find_image(const struct mesh_look *look, const char *name, bool is_color) {
+/* The number of the image of that name and kind; look->image_count: there is none yet. */
+static size_t find_image(const struct mesh_look *look, const char *name, bool is_color) {
     size_t i = 0;
     while (i < look->image_count && (look->image[i].is_color != is_color || strcmp(look->image[i].name, name) != 0))
         i++;
@@ -78,7 +79,8 @@ static void make_linear(struct image *image) {
         }
 }
 
-size_t look_add_image(struct mesh_look *look, const char *name, bool is_color, struct image *image) {
+/* Takes an image over: made linear where it is_color. Its number. */
+static size_t add_image(struct mesh_look *look, const char *name, bool is_color, struct image *image) {
     look->image = mem_realloc_array(look->image, look->image_count + 1, sizeof *look->image);
     look->image[look->image_count] = (struct look_image){mem_strdup(name), is_color, *image};
     *image = (struct image){0};
@@ -99,7 +101,7 @@ enum status look_read_bytes(struct mesh_look *look, const char *name, const void
                             size_t *number, struct error *err) {
     struct image_info info = {.encoding = IMAGE_LINEAR};
     struct image image = {0};
-    *number = look_find_image(look, name, is_color);
+    *number = find_image(look, name, is_color);
     if (*number < look->image_count)
         return STATUS_OK;
     enum status status = is_color ? image_read_memory(name, data, size, &image, &info, err)
@@ -107,7 +109,7 @@ enum status look_read_bytes(struct mesh_look *look, const char *name, const void
     if (status == STATUS_OK)
         status = settle_image(name, is_color, &info, &image, err);
     if (status == STATUS_OK)
-        *number = look_add_image(look, name, is_color, &image);
+        *number = add_image(look, name, is_color, &image);
     image_release(&image);
     return status;
 }
@@ -125,7 +127,7 @@ enum status look_read_image(struct mesh_look *look, const char *folder, const ch
     struct image_info info = {.encoding = IMAGE_LINEAR};
     struct image image = {0};
     char *clean = NULL, *path = NULL;
-    *number = look_find_image(look, name, is_color);
+    *number = find_image(look, name, is_color);
     if (*number < look->image_count)
         return STATUS_OK;
     enum status status = path_clean_foreign(name, &clean, err);
@@ -140,7 +142,7 @@ enum status look_read_image(struct mesh_look *look, const char *folder, const ch
     if (status == STATUS_OK)
         status = settle_image(clean, is_color, &info, &image, err);
     if (status == STATUS_OK)
-        *number = look_add_image(look, name, is_color, &image);
+        *number = add_image(look, name, is_color, &image);
     image_release(&image);
     mem_free(path);
     mem_free(clean);

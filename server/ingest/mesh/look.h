@@ -64,11 +64,7 @@ void look_leave_out(struct mesh_look *look, const char *what);
 /* Tells it in the report, as one note. */
 void look_note(const struct mesh_look *look, struct faces_report *report);
 
-/* The number of the image of that name and kind; look->image_count: there is none yet. */
-size_t look_find_image(const struct mesh_look *look, const char *name, bool is_color);
-/* Takes an image over: made linear where it is_color. Its number. */
-size_t look_add_image(struct mesh_look *look, const char *name, bool is_color, struct image *image);
-/* Reads it from a file below a folder (NULL: none may be read), as it was named in the file `of`. STATUS_INPUT: it cannot be. */
+/* Reads an image, once for a name and kind (made linear where it is_color), from a file below a folder (NULL: none may be read), as it was named in the file `of`. STATUS_INPUT: it cannot be. */
 enum status look_read_image(struct mesh_look *look, const char *folder, const char *of, const char *name, bool is_color,
                             size_t *number, struct error *err);
 

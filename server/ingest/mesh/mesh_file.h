@@ -12,8 +12,6 @@
 #include "server/ingest/findings.h"
 #include "server/scene/mesh.h"
 
-#define MESH_FILE_FORMATS "PLY, OBJ or glTF" /* for messages */
-
 /* Whether the name has an extension of a supported format. */
 bool mesh_file_is_known(const char *name);
 
