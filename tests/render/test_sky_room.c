@@ -92,7 +92,7 @@ static void test_relight(const struct reconstruction *r, struct parallel *pool) 
     CHECK(relit_picture(dir, settings, pool, &image, &err) == STATUS_OK);
     CHECK(image.pixel[0] > 0.0f && image.pixel[1] == 0.0f && image.pixel[2] == 0.0f);
     image_release(&image);
-    CHECK(relit_picture(dir, "{\"view\":\"99\",\"format\":\"exr\"}", pool, &image, &err) == STATUS_NOT_FOUND);
+    CHECK(relit_picture(dir, "{\"view\":\"99\",\"format\":\"exr\"}", pool, &image, &err) == STATUS_INPUT);
     mem_free(settings);
     mem_free(red);
     CHECK(file_remove_tree(dir, NULL) == STATUS_OK);
