@@ -42,12 +42,14 @@ wait_for() {
     done
 }
 
+daemon_listens_or_ended() { [ -s "$work/port" ] || ! kill -0 "$daemon_pid"; }
+
 start_daemon() {
     rm -f "$work/port"
     "$build/unbaked" --data "$data" --listen 127.0.0.1:0 --port-file "$work/port" --set min_free_mib=1 --set low_disk_mib=1 \
         "$@" >"$work/stdout" 2>>"$work/log" &
     daemon_pid=$!
-    if ! wait_for 60 test -s "$work/port"; then
+    if ! wait_for 60 daemon_listens_or_ended || [ ! -s "$work/port" ]; then
         cat "$work/log"
         exit 1
     fi

@@ -112,7 +112,7 @@ equal "$(jq -s '.[0].room' <<<"$err")" "\"$work/empty\""
 # --- a database of before: labels are found -----------------------------------------------------------
 
 daemon_end TERM || fail "the daemon ended with $?"
-sqlite3 "$work/data/state.db" "DROP INDEX jobs_by_executor; DROP TABLE job_labels; DROP TRIGGER job_labels_of_new;
+sqlite3 "$work/data/state.db" "DROP TABLE parts; DROP INDEX jobs_by_executor; DROP TABLE job_labels; DROP TRIGGER job_labels_of_new;
     DROP TRIGGER job_labels_of_changed; ALTER TABLE tokens DROP COLUMN expires_ms;
     PRAGMA user_version = 20" || fail "the database cannot be changed"
 daemon_start

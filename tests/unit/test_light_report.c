@@ -6,8 +6,9 @@
 int main(void) {
     int64_t id[3] = {7, 8, 9};
     bool is_emitter[3] = {true, false, true};
+    static struct scene scene; /* whose mesh names nothing */
     struct reconstruction r = {
-        .report = cJSON_CreateObject(), .is_emitter = is_emitter, .segments = {.count = 3, .id = id}};
+        .scene = &scene, .report = cJSON_CreateObject(), .is_emitter = is_emitter, .segments = {.count = 3, .id = id}};
     static const struct estimated_source source[] = {{ESTIMATED_SATURATED_SKY, 0, {9, 9, 9}, 0.2f},
                                                      {ESTIMATED_SATURATED_GROUND, 0, {3, 3, 3}, 0.3f},
                                                      {ESTIMATED_SATURATED, 1, {1, 1, 1}, 0.5f},
