@@ -4,8 +4,8 @@
 # together. Prints a table, writes BUILD/fidelity.json and, under BUILD/fidelity/ROOM-KIND, the outputs
 # (out/), and of each held-out view base_color_NNN.png (true | recovered) and view_NNN.png
 # (photograph | re-render). The figures are those of `unbaked evaluate`; MSRE is taken against the
-# HDR photographs in both cases, with so many samples a pixel (1024) that what is left is the photographs' noise and
-# ours, not that of the re-renders.
+# HDR photographs in both cases, free of the re-renders' noise (the product of two renders' errors): what is left is the
+# photographs' noise and ours.
 #
 # FIDELITY_QUALITY  setting quality of a reconstruction (standard)
 # FIDELITY_ROOMS  names under the test data's rooms/, or paths ("staircase2 bathroom")
@@ -56,7 +56,7 @@ measure() { # ROOM KIND
     echo "== $label" >&2
     reconstruct "$room" "$dir/out" texture_size=2048 "quality=$quality" \
         "transforms=$transforms" report_samples=1 &&
-        evaluate "$room" "$dir/out" --spp 1024 --pictures "$dir" &&
+        evaluate "$room" "$dir/out" --spp 64 --pictures "$dir" &&
         jq -r '[.stages[] | "\(.name) \(.seconds | round) s"] | join(", ")' "$dir/out/report.json" >&2
     # Where that failed the figures are null, and no goal is met.
     value() { figure "$dir/out" "$1"; }

@@ -20,7 +20,7 @@ if [ "${PAPER:-}" = short ]; then
     seconds=${PAPER_SEC:-5} quality=${PAPER_QUALITY:-draft} samples=4 size=512 edge=0.2 dense_edge=0.1
     views=(--width 80 --height 60 --frames 24 --test-frames 6 --spp 16 --test-spp 32)
 else
-    seconds=${PAPER_SEC:-600} quality=${PAPER_QUALITY:-standard} samples=64 size=2048 edge=0.1 dense_edge=0.03
+    seconds=${PAPER_SEC:-600} quality=${PAPER_QUALITY:-standard} samples=16 size=2048 edge=0.1 dense_edge=0.03
     views=(--width 320 --height 240 --frames 80 --test-frames 30 --spp 64 --test-spp 256)
 fi
 mkdir -p "$dir"
