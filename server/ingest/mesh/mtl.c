@@ -1,13 +1,13 @@
 /* mtl.c -- see mtl.h. */
 #include "server/ingest/mesh/mtl.h"
 
-#include <ctype.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
 #include "common/mem.h"
+#include "server/ingest/mesh/mtl_lines.h"
 
 struct mtl_reader {
     const char *name, *folder;
@@ -231,21 +231,12 @@ enum status mtl_read(const char *name, const char *text, size_t length, const ch
                      bool *found, struct error *err) {
     struct mtl_reader r = {.name = name, .folder = folder, .look = look, .found = found, .err = err};
     const char *end = text + length;
+    char *line;
     enum status status = STATUS_OK;
-    while (text < end && status == STATUS_OK) {
-        const char *stop = text;
-        while (stop < end && *stop != '\n' && *stop != '\r')
-            stop++;
-        const char *from = text, *to = stop;
-        while (from < to && isspace((unsigned char)*from))
-            from++;
-        while (to > from && isspace((unsigned char)to[-1]))
-            to--;
-        char *line = mem_strndup(from, (size_t)(to - from));
+    while (status == STATUS_OK && (line = mtl_next_line(&text, end))) {
         if (line[0] != '#')
             status = read_line(&r, line);
         mem_free(line);
-        text = stop + 1;
     }
     end_material(&r);
     return status;

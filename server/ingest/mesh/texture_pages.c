@@ -1,7 +1,6 @@
 /* texture_pages.c -- see texture_pages.h. */
 #include "server/ingest/mesh/texture_pages.h"
 
-#include <ctype.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,6 +8,7 @@
 
 #include "common/mem.h"
 #include "server/ingest/mesh/intern.h"
+#include "server/ingest/mesh/mtl_lines.h"
 
 /* --- names ---------------------------------------------------------------------------------- */
 
@@ -121,16 +121,8 @@ static struct mtl_material *find_material(struct mtl_material *list, size_t coun
 static void read_mtl(const char *text, size_t length, struct mtl_material *list, size_t count) {
     struct mtl_material *current = NULL;
     const char *end = text + length;
-    while (text < end) {
-        const char *stop = text;
-        while (stop < end && *stop != '\n' && *stop != '\r')
-            stop++;
-        const char *from = text, *to = stop;
-        while (from < to && isspace((unsigned char)*from))
-            from++;
-        while (to > from && isspace((unsigned char)to[-1]))
-            to--;
-        char *line = mem_strndup(from, (size_t)(to - from));
+    char *line;
+    while ((line = mtl_next_line(&text, end))) {
         if (is_word(line, "newmtl")) {
             current = find_material(list, count, line + 7 + strspn(line + 7, " \t"));
             if (current)
@@ -139,7 +131,6 @@ static void read_mtl(const char *text, size_t length, struct mtl_material *list,
             add_statement(current, line);
         }
         mem_free(line);
-        text = stop + 1;
     }
 }
 
