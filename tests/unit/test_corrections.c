@@ -5,14 +5,6 @@
 
 #define SETTINGS TINY_SETTINGS ",\"quality\":\"draft\""
 
-static cJSON *report(void) {
-    cJSON *json = NULL;
-    char *path = mem_printf("%s/out/report.json", dir);
-    OK(json_read(path, 1 << 20, &json, &err));
-    mem_free(path);
-    return json;
-}
-
 static double number(const cJSON *json, const char *object, const char *key) {
     return cJSON_GetNumberValue(cJSON_GetObjectItem(cJSON_GetObjectItem(json, object), key));
 }
@@ -39,9 +31,9 @@ static void check_photographs(void) {
 
 static void check_mesh(void) {
     OK(reconstruct("{" SETTINGS "}", scene, ""));
-    cJSON *whole = report();
+    cJSON *whole = read_report();
     OK(reconstruct("{" SETTINGS ",\"crop\":\"0 0 -1, .5 .5 1\"}", scene, ""));
-    cJSON *part = report();
+    cJSON *part = read_report();
     CHECK(number(whole, "prepare", "triangles") == 2.0 && number(part, "prepare", "triangles") == 1.0);
     refused("{" SETTINGS ",\"crop\":\"5 5 5 6 6 6\"}", "no triangle");
     refused("{" SETTINGS ",\"crop\":\"1 0 0 0 1 1\"}", "six numbers");
@@ -65,9 +57,9 @@ static void check_mesh(void) {
 
 static void check_emitters(void) {
     OK(reconstruct("{" SETTINGS ",\"emitters.0\":\"on\"}", scene, ""));
-    cJSON *lit = report();
+    cJSON *lit = read_report();
     OK(reconstruct("{" SETTINGS ",\"emitters.0\":\"off\"}", scene, ""));
-    cJSON *dark = report();
+    cJSON *dark = read_report();
     CHECK_THAT(emitters(lit) == 1 && emitters(dark) == 0, "%d, %d", emitters(lit), emitters(dark));
     cJSON_Delete(lit);
     cJSON_Delete(dark);

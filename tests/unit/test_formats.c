@@ -1,80 +1,17 @@
 /* test_formats.c -- scene.glb and scene.obj read back: the structure that the glTF 2.0 specification
  * asks for, and the room's own numbers in it. */
-#include "server/export/formats.h"
-
-#include <signal.h>
-#include <sys/resource.h>
-
 #include "common/buf.h"
-#include "common/file.h"
-#include "common/image.h"
-#include "common/json.h"
-#include "common/mem.h"
-#include "common/utf8.h"
-#include "server/demo/room.h"
-#include "server/export/emission_texture.h"
 #include "server/export/glb.h"
 #include "server/export/mesh_obj.h"
-#include "server/export/pictures.h"
-#include "server/export/sink.h"
 #include "server/ingest/mesh/mesh_file.h"
 #include "server/worker/read_back.h"
-#include "tests/check.h"
-
-struct glb {
-    struct buf file;
-    cJSON *json;
-    const char *bytes;
-    size_t length; /* of bytes */
-};
-
-static uint32_t word_at(const char *at) {
-    uint32_t value;
-    memcpy(&value, at, sizeof value);
-    return value;
-}
+#include "tests/unit/formats_rig.h"
+#include "tests/unit/glb_view.h"
 
 static float float_at(const char *at) {
     float value;
     memcpy(&value, at, sizeof value);
     return value;
-}
-
-static double number(const cJSON *object, const char *key) {
-    return cJSON_GetNumberValue(cJSON_GetObjectItemCaseSensitive(object, key));
-}
-
-static const cJSON *item(const struct glb *g, const char *array, double index) {
-    return cJSON_GetArrayItem(cJSON_GetObjectItemCaseSensitive(g->json, array), (int)index);
-}
-
-static const cJSON *member(const cJSON *object, const char *a, const char *b) {
-    return cJSON_GetObjectItemCaseSensitive(cJSON_GetObjectItemCaseSensitive(object, a), b);
-}
-
-/* Header and chunks: lengths, order, padding. */
-static void read_glb(const char *path, struct glb *g) {
-    struct error err;
-    buf_init(&g->file, 1 << 26);
-    CHECK(file_read(path, &g->file, &err) == STATUS_OK);
-    const char *data = g->file.data;
-    CHECK(g->file.length > 28 && memcmp(data, "glTF", 4) == 0 && word_at(data + 4) == 2);
-    CHECK(word_at(data + 8) == g->file.length && g->file.length % 4 == 0);
-    uint32_t length = word_at(data + 12);
-    CHECK(memcmp(data + 16, "JSON", 4) == 0 && length % 4 == 0);
-    CHECK_THAT(json_parse(data + 20, length, "scene.glb", &g->json, &err) == STATUS_OK, "%s", err.message);
-    const char *chunk = data + 20 + length;
-    g->length = word_at(chunk);
-    g->bytes = chunk + 8;
-    CHECK(memcmp(chunk + 4, "BIN\0", 4) == 0);
-    CHECK(g->bytes + g->length == data + g->file.length);
-    CHECK(number(item(g, "buffers", 0), "byteLength") == (double)g->length);
-    CHECK_STRING(cJSON_GetStringValue(member(g->json, "asset", "version")), "2.0");
-}
-
-static void release_glb(struct glb *g) {
-    cJSON_Delete(g->json);
-    buf_release(&g->file);
 }
 
 /* The accessor's elements, which must lie within its view and be aligned. */
@@ -157,18 +94,6 @@ static void check_material(const cJSON *material, const struct materials *m, uin
         CHECK(f >= 0.0 && f <= 1.0);
         CHECK_NEAR(f * strength, wanted[c], 1e-6 * strength);
     }
-}
-
-static void check_picture(const struct glb *g, double number_of, const char *png) {
-    struct buf file;
-    struct error err;
-    buf_init(&file, 1 << 26);
-    CHECK(file_read(png, &file, &err) == STATUS_OK);
-    const cJSON *view = item(g, "bufferViews", number(item(g, "images", number_of), "bufferView"));
-    size_t length = (size_t)number(view, "byteLength"), offset = (size_t)number(view, "byteOffset");
-    CHECK(length == file.length && offset + length <= g->length && offset % 4 == 0);
-    CHECK(memcmp(g->bytes + offset, file.data, length) == 0);
-    buf_release(&file);
 }
 
 /* The room's node turns `up` to +y and has everything below it. */
@@ -351,67 +276,6 @@ static void test_far(const char *dir, struct export_input *in, struct mesh *room
     memset(room->offset, 0, sizeof room->offset);
 }
 
-/* Names of the input go into every file, with the segment's number. */
-static void test_named(const char *dir, struct export_input *in, struct mesh *room, const struct parts *parts) {
-    static const struct {
-        const char *file, *text;
-    } table[] = {
-        {"scene.obj", "\no segment_0_wall_north-side_1\nusemtl segment_0_wall_north-side_1\n"},
-        {"scene.obj", "\no segment_1\n"},
-        {"scene.mtl", "newmtl segment_0_wall_north-side_1\n"},
-        {"scene.xml", "<shape type=\"serialized\" id=\"segment_0_wall_north-side_1\">"},
-        {"scene.obj", "\no segment_2_\xe5\xa2\x99\n"},
-        {"scene.usda", "displayName = \"wall/north-side 1\"\n        )\n        {\n            uniform token sub"},
-        {"scene.usda", "displayName = \"wall/north-side 1\"\n        )\n        {\n            token outputs:surface"},
-        {"scene.usda", "def Mesh \"segment_2\" ("},
-        {"scene.glb", "\"name\":\"\xe5\xa2\x99\""},
-        {"scene.glb", "\"name\":\"wall/north-side 1\""},
-        {"scene.glb", "\"name\":\"segment 1\""},
-        {"scene.glb", "\"extras\":{\"segment\":0,\"object_id\":0}"},
-    };
-    char *name[] = {"wall/north-side 1", "", "\xe5\xa2\x99"};
-    struct segments named = *in->segments, *before = (struct segments *)in->segments;
-    char label[PARTS_LABEL_BYTES];
-    room->name = name;
-    room->name_count = 3;
-    struct segments automatic = named;
-    automatic.is_given = false;
-    named.is_given = true;
-    in->segments = &named;
-    CHECK(named.id[0] == 0 && named.id[1] == 1);
-    parts_label(&named, room, 2, label);
-    CHECK_STRING(label, "segment_2_\xe5\xa2\x99");
-    name[1] = "a\xff" /* no UTF-8 */ "b\xe2\x80\x8f\xe2\x80\xa8"
-              "c";
-    parts_label(&named, room, 1, label);
-    CHECK_STRING(label, "segment_1_a_b_c");
-    char longest[61 + 3 * 32] = {0};
-    memset(longest, 'x', 60);
-    for (int i = 0; i < 12; i++)
-        memcpy(longest + 60 + 3 * i, "\xe5\xa2\x99", 3);
-    name[1] = longest;
-    parts_label(&named, room, 1, label);
-    CHECK_THAT(utf8_valid(label, strlen(label), NULL) && strlen(label) > PARTS_LABEL_BYTES - 5, "%s", label);
-    name[1] = "";
-    CHECK(segments_name(&named, room, 1) == NULL && segments_name(&automatic, room, 0) == NULL);
-    for (size_t i = 0; i < sizeof table / sizeof *table; i++) {
-        struct error err = {.message = ""};
-        struct buf file;
-        char *path = file_join(dir, table[i].file);
-        for (size_t f = 0; f < FORMATS_COUNT; f++)
-            CHECK(strcmp(formats[f].name, table[i].file) != 0 || formats[f].write(dir, in, parts, &err) == STATUS_OK);
-        buf_init(&file, 1 << 26);
-        CHECK(file_read(path, &file, &err) == STATUS_OK);
-        CHECK_THAT(memmem(file.data, file.length, table[i].text, strlen(table[i].text)), "%s: %s", table[i].file,
-                   table[i].text);
-        buf_release(&file);
-        mem_free(path);
-    }
-    in->segments = before;
-    room->name = NULL;
-    room->name_count = 0;
-}
-
 static void test_same_bytes(const char *dir, const struct export_input *in, const struct parts *parts) {
     struct error err;
     struct buf once, twice;
@@ -429,175 +293,27 @@ static void test_same_bytes(const char *dir, const struct export_input *in, cons
     }
 }
 
-static void check_text(const char *dir, const char *name, const char *wanted, size_t times) {
-    struct buf file;
-    struct error err;
-    char *path = file_join(dir, name);
-    size_t count = 0;
-    buf_init(&file, 1 << 26);
-    CHECK(file_read(path, &file, &err) == STATUS_OK);
-    for (const char *at = buf_text(&file); (at = strstr(at, wanted)) != NULL; at++)
-        count++;
-    CHECK_THAT(count == times, "%s: %zu times %s", name, count, wanted);
-    buf_release(&file);
-    mem_free(path);
-}
-
-/* A lamp that shows a picture has a texture of its own, scaled to its brightest texel; the other has none. */
-static void test_picture(const char *dir, struct room *room, const struct export_input *input,
-                         const struct parts *parts) {
-    struct export_input in = *input;
-    struct materials *m = &room->materials;
-    struct error err;
-    struct glb g;
-    char *png = file_join(dir, FORMATS_EMISSION), *path = file_join(dir, "scene.glb");
-    in.inverse = &room->inverse;
-    materials_start_emission_pattern(m);
-    for (size_t i = 0; i < room->inverse.valid_count; i++) {
-        uint32_t texel = room->inverse.valid[i];
-        if (room->segments.of_triangle[room->inverse.triangle[texel]] == ROOM_WALL_EMITTER)
-            materials_set_emission_pattern(m, texel, rgb_gray(texel % 2 ? 1.5f : 0.5f), rgb_gray(1.0f));
-    }
-    CHECK(formats[0].write(dir, &in, parts, &err) != STATUS_OK && strstr(err.message, FORMATS_EMISSION));
-    struct image picture;
-    uint32_t *source = picture_margin(&room->inverse);
-    float *scales = emission_texture_scales(&in), white = 1.5f * rgb_max(m->emission[ROOM_WALL_EMITTER]);
-    CHECK_NEAR(scales[ROOM_WALL_EMITTER], white, 2e-3f * white);
-    CHECK(scales[ROOM_CEILING_EMITTER] == 0.0f && scales[ROOM_FLOOR] == 0.0f);
-    emission_texture(&in, source, scales, &picture);
-    CHECK(image_write_png(png, &picture, 1.0f, &err) == STATUS_OK);
-    for (size_t f = 0; f < FORMATS_COUNT; f++)
-        CHECK(formats[f].write(dir, &in, parts, &err) == STATUS_OK);
-    read_glb(path, &g);
-    for (size_t p = 0; p < parts->count; p++) {
-        const cJSON *material = item(&g, "materials", (double)p);
-        bool varies = parts->part[p].segment == ROOM_WALL_EMITTER;
-        CHECK((cJSON_GetObjectItem(material, "emissiveTexture") != NULL) == varies);
-        double strength = number(member(material, "extensions", "KHR_materials_emissive_strength"), "emissiveStrength");
-        CHECK(!varies || fabs(strength - (double)white) < 2e-3 * (double)white);
-    }
-    check_picture(&g, 1, png);
-    check_text(dir, "scene.mtl", "map_Ke emission.png", 1);
-    check_text(dir, "scene.xml", "name=\"radiance\" id=\"emission\"", 1);
-    check_text(dir, "scene.xml", "emission.exr", 1);
-    check_text(dir, "scene.xml", "<rgb name=\"radiance\"", 1);
-    materials_drop_emission_pattern(m);
-    release_glb(&g);
-    image_release(&picture);
-    mem_free(scales);
-    mem_free(source);
-    mem_free(path);
-    mem_free(png);
-}
-
-static bool is_there(const char *dir, const char *name) {
-    char *path = file_join(dir, name);
-    bool there = access(path, F_OK) == 0;
-    mem_free(path);
-    return there;
-}
-
-/* What cannot be written whole leaves nothing, neither under its name nor under another. */
-static void test_failures(const char *dir, const struct export_input *in, const struct parts *parts) {
-    struct error err;
-    struct sink out;
-    struct rlimit limit, small = {4096, 4096};
-    char *path = file_join(dir, "short"), *part = file_join(dir, "short.part");
-    CHECK(sink_open(&out, path, 10, &err) == STATUS_OK);
-    sink_u64(&out, 1);
-    sink_u32(&out, 1);
-    CHECK(sink_close(&out, STATUS_OK, &err) == STATUS_LIMIT && strstr(err.message, "10 bytes"));
-    CHECK(sink_open(&out, path, 0, &err) == STATUS_OK);
-    sink_copy(&out, "/dev/null", 1);
-    CHECK(sink_close(&out, STATUS_OK, &err) == STATUS_IO);
-    CHECK(sink_open(&out, path, 0, &err) == STATUS_OK);
-    error_set(&err, STATUS_CANCELLED, "before");
-    CHECK(sink_close(&out, STATUS_CANCELLED, &err) == STATUS_CANCELLED && strcmp(err.message, "before") == 0);
-    CHECK(access(path, F_OK) != 0 && access(part, F_OK) != 0);
-    mem_free(part);
-    mem_free(path);
-
-    CHECK(getrlimit(RLIMIT_FSIZE, &limit) == 0);
-    small.rlim_max = limit.rlim_max;
-    signal(SIGXFSZ, SIG_IGN);
-    CHECK(setrlimit(RLIMIT_FSIZE, &small) == 0);
-    for (size_t f = 0; f < FORMATS_COUNT; f++) {
-        char *name = mem_printf("%s.part", formats[f].name);
-        path = file_join(dir, formats[f].name);
-        unlink(path);
-        bool fits = strcmp(formats[f].name, "scene.mtl") == 0;
-        CHECK_THAT((formats[f].write(dir, in, parts, &err) == STATUS_OK) == fits, "%s", formats[f].name);
-        CHECK(is_there(dir, formats[f].name) == fits && !is_there(dir, name));
-        mem_free(path);
-        mem_free(name);
-    }
-    CHECK(setrlimit(RLIMIT_FSIZE, &limit) == 0);
-}
-
-/* A mesh of more segments than a file of objects may have. */
-static void test_limit(void) {
-    enum { COUNT = PARTS_MAX + 1 };
-    struct error err = {0};
-    struct parts parts;
-    struct mesh mesh = {.triangle_count = COUNT};
-    struct segments segments = {.count = COUNT};
-    segments.of_triangle = mem_array(COUNT, sizeof *segments.of_triangle);
-    for (uint32_t t = 0; t < COUNT; t++)
-        segments.of_triangle[t] = t;
-    CHECK(parts_make(&parts, &mesh, &segments, NULL, &err) == STATUS_LIMIT);
-    CHECK(strstr(err.message, "16385") && strstr(err.message, "16384"));
-    mem_free(segments.of_triangle);
-}
-
 int main(void) {
-    char dir[] = "/tmp/unbake-formats-XXXXXX";
-    struct parallel *pool = parallel_new(1);
-    struct room room;
-    struct parts parts;
-    struct image picture;
+    struct formats_rig r;
     struct error err;
-    CHECK(mkdtemp(dir) != NULL);
-    CHECK(room_init(&room, &(struct room_look){256, 15.0f, 15.0f, ROOM_LAMPS_FRAMED}, pool, &err) == STATUS_OK);
-    room.materials.specular[ROOM_FLOOR] = 0.0f;
-    image_init_rgb(&picture, 5, 3); /* odd, for the padding */
-    char *png = file_join(dir, FORMATS_BASE_COLOR), *glb = file_join(dir, "scene.glb");
-    CHECK(image_write_png(png, &picture, 1.0f, &err) == STATUS_OK);
-    struct camera camera = {.width = 16, .height = 12, .fx = 20.0f, .fy = 21.0f, .cx = 8.0f, .cy = 6.0f};
-    camera.world_from_camera = (struct rigid){{{0, 0, 1}, {1, 0, 0}, {0, 1, 0}}, {1.0f, 2.0f, 3.0f}};
-    struct export_comparison comparison = {"images/003.exr", NULL, NULL, &camera};
-    struct export_input in = {.title = "room",
-                              .mesh = &room.mesh,
-                              .segments = &room.segments,
-                              .atlas = &room.atlas,
-                              .materials = &room.materials,
-                              .comparison_count = 1,
-                              .comparison = &comparison};
-    CHECK(parts_make(&parts, &room.mesh, &room.segments, &room.atlas, &err) == STATUS_OK);
-    CHECK(parts.count == ROOM_OBJECT_COUNT);
-    test_glb(dir, &in, &parts);
-    test_obj(dir, &in, &parts);
-    test_lights(dir, &in, &parts);
-    in.up = (vec3){0.0f, 1.0f, 0.0f};
-    CHECK(glb_write(glb, &in, &parts, png, "/nowhere", &err) == STATUS_OK);
-    test_round(dir, "scene.obj", &in, &parts);
-    test_round(dir, "scene.glb", &in, &parts);
-    test_far(dir, &in, &room.mesh, &parts);
-    in.up = (vec3){0.0f, 1.0f, 0.0f};
-    test_named(dir, &in, &room.mesh, &parts);
-    test_same_bytes(dir, &in, &parts);
-    test_picture(dir, &room, &in, &parts);
-    test_failures(dir, &in, &parts);
-    vec3 *normal = room.mesh.normal;
-    room.mesh.normal = NULL;
-    test_glb(dir, &in, &parts);
-    room.mesh.normal = normal;
-    test_limit();
-    parts_release(&parts);
+    formats_rig_open(&r);
+    char *png = file_join(r.dir, FORMATS_BASE_COLOR), *glb = file_join(r.dir, "scene.glb");
+    test_glb(r.dir, &r.in, &r.parts);
+    test_obj(r.dir, &r.in, &r.parts);
+    test_lights(r.dir, &r.in, &r.parts);
+    r.in.up = (vec3){0.0f, 1.0f, 0.0f};
+    CHECK(glb_write(glb, &r.in, &r.parts, png, "/nowhere", &err) == STATUS_OK);
+    test_round(r.dir, "scene.obj", &r.in, &r.parts);
+    test_round(r.dir, "scene.glb", &r.in, &r.parts);
+    test_far(r.dir, &r.in, &r.room.mesh, &r.parts);
+    r.in.up = (vec3){0.0f, 1.0f, 0.0f};
+    test_same_bytes(r.dir, &r.in, &r.parts);
+    vec3 *normal = r.room.mesh.normal;
+    r.room.mesh.normal = NULL;
+    test_glb(r.dir, &r.in, &r.parts);
+    r.room.mesh.normal = normal;
     mem_free(glb);
     mem_free(png);
-    image_release(&picture);
-    room_release(&room);
-    CHECK(file_remove_tree(dir, NULL) == STATUS_OK);
-    parallel_free(pool);
+    formats_rig_close(&r);
     return check_result();
 }

@@ -35,14 +35,6 @@ static void test_photographs(void) {
     CHECK(find(p, 5).cd_per_m2 == 0.0); /* too few */
 }
 
-static cJSON *report(void) {
-    cJSON *json = NULL;
-    char *path = mem_printf("%s/out/report.json", dir);
-    OK(json_read(path, 1 << 20, &json, &err));
-    mem_free(path);
-    return json;
-}
-
 static void check_usd(const char *unit) {
     struct buf layer;
     char *path = mem_printf("%s/out/scene.usda", dir), *wanted = mem_printf("radianceUnit = \"%s", unit);
@@ -62,7 +54,7 @@ static double job(const char *camera, const char *more, const char *source) {
          *settings = mem_printf("{" TINY_SETTINGS ",\"quality\":\"draft\",\"hold_out_every\":0%s}", more);
     put("scene/transforms.json", transforms);
     OK(reconstruct(settings, scene, ""));
-    cJSON *json = report();
+    cJSON *json = read_report();
     const cJSON *unit = cJSON_GetObjectItem(json, "luminance_per_unit");
     const cJSON *found = cJSON_GetObjectItem(unit, "cd_per_m2");
     double value = found ? found->valuedouble : 0.0;

@@ -5,6 +5,7 @@
 
 #include "common/file.h"
 #include "common/image.h"
+#include "common/json.h"
 #include "common/mem.h"
 #include "server/worker/tasks.h"
 #include "tests/check.h"
@@ -72,6 +73,15 @@ static inline enum status reconstruct(const char *settings, const char *from, co
     enum status status = task_reconstruct(&order, &silent, &err);
     cJSON_Delete(json);
     return status;
+}
+
+/* report.json of the job that ran last; the caller's. */
+static inline cJSON *read_report(void) {
+    cJSON *json = NULL;
+    char *path = mem_printf("%s/out/report.json", dir);
+    OK(json_read(path, 1 << 20, &json, &err));
+    mem_free(path);
+    return json;
 }
 
 #endif
