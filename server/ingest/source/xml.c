@@ -77,6 +77,15 @@ static void XMLCALL add_text(void *user, const XML_Char *piece, int length) {
     node->text[node->text_length] = '\0';
 }
 
+/* Expat 2.9 deprecates the call whose result is as wide as a long. */
+static unsigned long long line_of(XML_Parser parser) {
+#if XML_MAJOR_VERSION > 2 || XML_MINOR_VERSION >= 9
+    return XML_GetCurrentLineNumber64(parser);
+#else
+    return XML_GetCurrentLineNumber(parser);
+#endif
+}
+
 enum status xml_parse(const char *text, size_t size, const char *name, struct xml_node **root, struct error *err) {
     struct reader r = {.parser = XML_ParserCreate(NULL)};
     enum status status = STATUS_OK;
@@ -90,7 +99,7 @@ enum status xml_parse(const char *text, size_t size, const char *name, struct xm
         status = error_set(err, STATUS_LIMIT, "%s is larger than %d bytes", name, XML_MAX_BYTES);
     else if (XML_Parse(r.parser, text, (int)size, XML_TRUE) != XML_STATUS_OK)
         status =
-            error_set(err, STATUS_INPUT, "%s, line %lu: %s", name, XML_GetCurrentLineNumber(r.parser),
+            error_set(err, STATUS_INPUT, "%s, line %llu: %s", name, line_of(r.parser),
                       r.is_too_deep ? "elements are nested too deep" : XML_ErrorString(XML_GetErrorCode(r.parser)));
     XML_ParserFree(r.parser);
     if (status == STATUS_OK)
