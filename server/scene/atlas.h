@@ -23,7 +23,6 @@
  * the density: of rooms of objects it costs 5 to 8 %, of a scan in 13,000 charts (redkitchen) 28 %. */
 #define ATLAS_AUTOMATIC_PADDING 0
 #define ATLAS_WIDE_PADDING 7
-#define ATLAS_MAX_PADDING 40
 
 struct atlas {
     uint32_t width, height; /* texels */
@@ -46,8 +45,7 @@ static inline int atlas_clean_level(uint32_t padding) {
 }
 
 /* Makes a size x size atlas at the greatest density that fits. If texels_per_metre is not 0, uses that density and
- * the smallest power-of-two size up to ATLAS_MAX_SIZE that holds it (STATUS_INPUT when none does). `padding`: free texels between charts, up to
- * ATLAS_MAX_PADDING. Deterministic. */
+ * the smallest power-of-two size up to ATLAS_MAX_SIZE that holds it (STATUS_INPUT when none does). `padding`: free texels between charts. Deterministic. */
 enum status atlas_make(struct atlas *atlas, const struct mesh *mesh, const struct segments *segments, uint32_t size,
                        float texels_per_metre, uint32_t padding, struct error *err);
 /* As atlas_make with a size. The density of a chart is the maximum of density[triangle_count], each in (0, 1], over
