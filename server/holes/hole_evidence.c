@@ -20,15 +20,17 @@
 
 /* --- by direction --------------------------------------------------------------------------------- */
 
-/* Scatter of a region's looks within cells of directions about as wide as its own cells look. */
-static struct hole_scatter scatter_away(const struct hole_looks *looks, const size_t *look, size_t count, float angle) {
+/* Scatter of a region's observations within cells of directions about as wide as its own cells appear. */
+static struct hole_scatter scatter_away(const struct hole_observations *observations, const size_t *number,
+                                        size_t count, float angle) {
     uint32_t columns = (uint32_t)ceilf(2.0f * (float)PI / angle), rows = (uint32_t)ceilf((float)PI / angle);
     struct hole_mean *mean = mem_calloc((size_t)columns * rows, sizeof *mean);
     uint32_t *at = mem_array(count + 1, sizeof *at);
     struct hole_scatter sum = {0};
     for (size_t i = 0, end; i < count; i = end) {
-        for (end = i; end < count && looks->look[look[end]].train == looks->look[look[i]].train; end++) {
-            const struct hole_look *l = &looks->look[look[end]];
+        for (end = i; end < count && observations->item[number[end]].train == observations->item[number[i]].train;
+             end++) {
+            const struct hole_observation *l = &observations->item[number[end]];
             float u = (atan2f(l->direction.x, l->direction.z) + (float)PI) / angle;
             float v = acosf(clampf(l->direction.y, -1.0f, 1.0f)) / angle;
             uint32_t column = (uint32_t)u < columns ? (uint32_t)u : columns - 1;
@@ -49,11 +51,12 @@ static struct hole_scatter scatter_away(const struct hole_looks *looks, const si
     return sum;
 }
 
-/* Angle under which a look sees its cell: the root of the solid angle. */
-static float angle_of(const struct hole_grid *grid, const struct hole_looks *looks, const struct hole_look *look) {
-    const struct room_plane *plane = &hole_grid_plane(grid, look->cell)->plane;
-    float height = room_plane_height(plane, hole_look_origin(looks, look));
-    float cosine = -vec3_dot(plane->normal, look->direction);
+/* Angle under which an observation sees its cell: the root of the solid angle. */
+static float angle_of(const struct hole_grid *grid, const struct hole_observations *observations,
+                      const struct hole_observation *observation) {
+    const struct room_plane *plane = &hole_grid_plane(grid, observation->cell)->plane;
+    float height = room_plane_height(plane, hole_observation_origin(observations, observation));
+    float cosine = -vec3_dot(plane->normal, observation->direction);
     return grid->side_m * sqrtf(cosine) * cosine / height;
 }
 
@@ -112,9 +115,9 @@ static bool decide(const struct hole_region *r, size_t steps) {
     return agrees && steps >= LEAST_STEPS && r->step <= fmax(MOST_STEP * r->usual_step, FREE_STEP);
 }
 
-/* look[count]: those of the region. */
+/* own[count]: numbers of the region's observations. */
 static void judge(struct hole_region *region, uint32_t number, const struct hole_grid *grid,
-                  const struct hole_looks *looks, const size_t *look, size_t count) {
+                  const struct hole_observations *observations, const size_t *own, size_t count) {
     const struct hole_plane *plane = hole_grid_plane(grid, region->first_cell);
     struct hole_steps steps = {mem_array(4 * (size_t)region->cells, sizeof(float)),
                                mem_array(4 * (size_t)region->cells, sizeof(float)), 0, 0};
@@ -129,11 +132,11 @@ static void judge(struct hole_region *region, uint32_t number, const struct hole
     }
     region->here.variance /= fmax(region->here.freedom, 1.0);
     for (size_t i = 0; i < count; i++) {
-        angle[i] = angle_of(grid, looks, &looks->look[look[i]]);
-        saturated += looks->look[look[i]].is_saturated;
+        angle[i] = angle_of(grid, observations, &observations->item[own[i]]);
+        saturated += observations->item[own[i]].is_saturated;
     }
     region->saturated = (double)saturated / fmax((double)count, 1.0);
-    region->away = scatter_away(looks, look, count, clampf(quantile(angle, count, 0.5), LEAST_ANGLE, MOST_ANGLE));
+    region->away = scatter_away(observations, own, count, clampf(quantile(angle, count, 0.5), LEAST_ANGLE, MOST_ANGLE));
     region->beside = plane->variance;
     size_t across = steps.across_count;
     region->step = (double)quantile(steps.across, steps.across_count, 0.5);
@@ -144,24 +147,26 @@ static void judge(struct hole_region *region, uint32_t number, const struct hole
     mem_free(steps.across);
 }
 
-void hole_evidence_find(struct hole_regions *regions, const struct hole_grid *grid, const struct hole_looks *looks) {
-    size_t *start = mem_calloc(regions->count + 2, sizeof *start), *look = mem_array(looks->count + 1, sizeof *look);
+void hole_evidence_find(struct hole_regions *regions, const struct hole_grid *grid,
+                        const struct hole_observations *observations) {
+    size_t *start = mem_calloc(regions->count + 2, sizeof *start),
+           *number = mem_array(observations->count + 1, sizeof *number);
     for (int pass = 0; pass < 2; pass++) {
-        for (size_t i = 0; i < looks->count; i++) {
-            uint32_t cell = looks->look[i].cell;
+        for (size_t i = 0; i < observations->count; i++) {
+            uint32_t cell = observations->item[i].cell;
             uint32_t region = cell == HOLE_NO_CELL ? HOLE_NO_CELL : grid->cell[cell].region;
             if (region == HOLE_NO_CELL)
                 continue;
             if (pass == 0)
                 start[region + 2]++;
             else
-                look[start[region + 1]++] = i;
+                number[start[region + 1]++] = i;
         }
         for (size_t k = 0; k < regions->count && pass == 0; k++)
             start[k + 2] += start[k + 1];
     }
     for (size_t k = 0; k < regions->count; k++)
-        judge(&regions->region[k], (uint32_t)k, grid, looks, look + start[k], start[k + 1] - start[k]);
-    mem_free(look);
+        judge(&regions->region[k], (uint32_t)k, grid, observations, number + start[k], start[k + 1] - start[k]);
+    mem_free(number);
     mem_free(start);
 }

@@ -7,7 +7,7 @@
 #ifndef UNBAKE_HOLES_HOLE_EVIDENCE_H
 #define UNBAKE_HOLES_HOLE_EVIDENCE_H
 
-#include "server/holes/hole_looks.h"
+#include "server/holes/hole_observations.h"
 
 /* Variance of log radiance among photographs, over that of the plane's own surface, beyond which no surface is there: three
  * times the deviation. */
@@ -22,7 +22,7 @@ struct hole_region {
     uint32_t first_cell;            /* of the cells whose `region` is this one's number */
     uint32_t cells, rim;            /* cells; of those, beside covered ones or beside what is no surface */
     uint32_t contact;               /* of the rim: beside covered ones */
-    size_t looks;                   /* pixels that show it */
+    size_t observations;            /* pixels that show it */
     double saturated;               /* share of them */
     struct hole_scatter here, away; /* by cell; by direction */
     double beside;                  /* variance of the plane's covered cells */
@@ -36,6 +36,7 @@ struct hole_regions {
 };
 
 /* Fills in the evidence of all regions, and whether they are holes. */
-void hole_evidence_find(struct hole_regions *regions, const struct hole_grid *grid, const struct hole_looks *looks);
+void hole_evidence_find(struct hole_regions *regions, const struct hole_grid *grid,
+                        const struct hole_observations *observations);
 
 #endif

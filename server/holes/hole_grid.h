@@ -40,7 +40,7 @@ struct hole_plane {
     float s_m, t_m; /* of the first cell's corner */
     uint32_t columns, rows;
     uint32_t first;  /* number of its first cell */
-    double variance; /* of log radiance among the photographs of what covers a cell; set by hole_looks_take */
+    double variance; /* of log radiance among the photographs of what covers a cell; set by hole_observations_take */
 };
 
 struct hole_grid {

@@ -6,7 +6,7 @@
 #include "common/mem.h"
 #include "server/holes/hole_evidence.h"
 
-#define ROUNDS 200 /* at most: each refuses cells, and looks go on to the next plane */
+#define ROUNDS 200 /* at most: each refuses cells, and observations go on to the next plane */
 /* Rays that pass a cell, per ray that meets nothing in it, from which on no surface is there: edges of the mesh are ragged,
  * so that some pass. */
 #define MOST_PASSED 0.25
@@ -84,7 +84,7 @@ static void flood(struct hole_grid *grid, uint32_t first, uint32_t number, uint3
         uint32_t at = stack[--depth];
         bool is_rim = false, touches = hole_cell_is_covered(&grid->cell[at]);
         region->cells++;
-        region->looks += grid->cell[at].opened;
+        region->observations += grid->cell[at].opened;
         for (int k = 0; k < 9; k++) {
             uint32_t n = hole_grid_neighbour(plane, at, k % 3 - 1, k / 3 - 1);
             if (n == HOLE_NO_CELL || !is_open(&grid->cell[n])) {
@@ -120,12 +120,12 @@ static void find_regions(struct hole_regions *regions, struct hole_grid *grid) {
 }
 
 /* Refuses regions that touch no surface, and, where `decides`, those that are openings. True where any was. */
-static bool refuse_regions(struct hole_regions *regions, struct hole_grid *grid, const struct hole_looks *looks,
-                           bool decides) {
+static bool refuse_regions(struct hole_regions *regions, struct hole_grid *grid,
+                           const struct hole_observations *observations, bool decides) {
     bool any = false;
     find_regions(regions, grid);
     if (decides)
-        hole_evidence_find(regions, grid, looks);
+        hole_evidence_find(regions, grid, observations);
     for (uint32_t i = 0; i < grid->cell_count; i++) {
         struct hole_cell *cell = &grid->cell[i];
         if (cell->region == HOLE_NO_CELL)
@@ -138,14 +138,15 @@ static bool refuse_regions(struct hole_regions *regions, struct hole_grid *grid,
 }
 
 /* Refuses, until all that are left touch the mesh and no ray passes them; where `decides`, until all are holes. */
-static void refuse(struct hole_regions *regions, struct hole_grid *grid, struct hole_looks *looks, bool decides) {
+static void refuse(struct hole_regions *regions, struct hole_grid *grid, struct hole_observations *observations,
+                   bool decides) {
     bool any = true;
     for (int round = 0; round < ROUNDS && any; round++) {
-        hole_looks_assign(looks, grid);
+        hole_observations_assign(observations, grid);
         any = refuse_passed(grid) || (decides && refuse_scattered(grid));
         for (int step = 0; step < (decides ? 2 : 1) && !any; step++) {
             hole_regions_release(regions);
-            any = refuse_regions(regions, grid, looks, step == 1);
+            any = refuse_regions(regions, grid, observations, step == 1);
         }
     }
 }
@@ -167,18 +168,18 @@ static void find_kept(struct hole_regions *kept, const struct hole_regions *cand
 }
 
 void hole_regions_find(struct hole_regions *holes, struct hole_regions *kept, struct hole_grid *grid,
-                       struct hole_looks *looks, bool fills_all) {
+                       struct hole_observations *observations, bool fills_all) {
     struct hole_regions candidates = {0};
     uint32_t *of = mem_array(grid->cell_count + 1, sizeof *of);
     *holes = *kept = (struct hole_regions){0};
-    refuse(&candidates, grid, looks, false);
-    hole_evidence_find(&candidates, grid, looks);
+    refuse(&candidates, grid, observations, false);
+    hole_evidence_find(&candidates, grid, observations);
     for (uint32_t i = 0; i < grid->cell_count; i++)
         of[i] = grid->cell[i].region;
     if (fills_all) {
         *holes = candidates;
     } else {
-        refuse(holes, grid, looks, true);
+        refuse(holes, grid, observations, true);
         find_kept(kept, &candidates, grid, of);
         hole_regions_release(&candidates);
     }

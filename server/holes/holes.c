@@ -29,7 +29,7 @@ static void list_region(struct holes_found *found, const struct hole_grid *grid,
     json_add_bool(entry, "filled", is_filled);
     json_add(entry, "place", cJSON_CreateDoubleArray((double[]){(double)at.x, (double)at.y, (double)at.z}, 3));
     json_add_number(entry, "m2", region->cells * (double)grid->side_m * (double)grid->side_m);
-    json_add_int(entry, "pixels", (int64_t)region->looks);
+    json_add_int(entry, "pixels", (int64_t)region->observations);
     json_add_number(entry, "variance_here", region->here.variance);
     json_add_number(entry, "variance_far_away", region->away.variance);
     json_add_number(entry, "variance_beside", region->beside);
@@ -57,18 +57,18 @@ static void report(struct holes_found *found, const struct hole_grid *grid, cons
 void holes_fill(struct scene *scene, struct segments *segments, const struct views *views, bool fills_all,
                 const vec3 within[2], struct parallel *pool, struct holes_found *found) {
     struct hole_grid grid;
-    struct hole_looks looks;
+    struct hole_observations observations;
     struct hole_regions holes, kept;
     *found = (struct holes_found){0};
     if (!any_open(views))
         return;
     hole_grid_init(&grid, &scene->mesh, views->accel, within, pool);
-    hole_looks_take(&looks, &grid, views, pool);
-    hole_regions_find(&holes, &kept, &grid, &looks, fills_all);
+    hole_observations_take(&observations, &grid, views, pool);
+    hole_regions_find(&holes, &kept, &grid, &observations, fills_all);
     report(found, &grid, &holes, &kept);
     found->triangles = hole_surface_add(&scene->mesh, segments, &grid, &holes);
     hole_regions_release(&kept);
     hole_regions_release(&holes);
-    hole_looks_release(&looks);
+    hole_observations_release(&observations);
     hole_grid_release(&grid);
 }

@@ -2,7 +2,7 @@
  *
  * Scanners lose what is beyond their range, dark, glossy or hidden. What photographs show through such a hole would be
  * taken for distant light, and light the room. Where the room's own planes go on through it (room_planes.h), each cell of
- * them (hole_grid.h) is looked at by all photographs (hole_looks.h); connected cells become surface where the photographs
+ * them (hole_grid.h) is looked at by all photographs (hole_observations.h); connected cells become surface where the photographs
  * agree that there is one, and stay open where they show a window, a door or another room (hole_regions.h,
  * hole_evidence.h).
  *

@@ -1,5 +1,5 @@
-/* hole_looks.c -- see hole_looks.h. */
-#include "server/holes/hole_looks.h"
+/* hole_observations.c -- see hole_observations.h. */
+#include "server/holes/hole_observations.h"
 
 #include "common/mem.h"
 #include "common/quantile.h"
@@ -84,12 +84,13 @@ static void tell_plane(struct hole_grid *grid, size_t number, vec3 origin, const
     }
 }
 
-static void add_look(struct hole_looks *looks, size_t *capacity, const struct hole_look *look) {
-    if (looks->count == *capacity) {
+static void add_observation(struct hole_observations *observations, size_t *capacity,
+                            const struct hole_observation *observation) {
+    if (observations->count == *capacity) {
         *capacity = 2 * *capacity + 4096;
-        looks->look = mem_realloc_array(looks->look, *capacity, sizeof *looks->look);
+        observations->item = mem_realloc_array(observations->item, *capacity, sizeof *observations->item);
     }
-    looks->look[looks->count++] = *look;
+    observations->item[observations->count++] = *observation;
 }
 
 static void close_surfaces(struct hole_grid *grid) {
@@ -97,9 +98,9 @@ static void close_surfaces(struct hole_grid *grid) {
         hole_mean_close(&grid->cell[i].surface);
 }
 
-static void take_photograph(struct hole_looks *looks, size_t *capacity, struct hole_grid *grid, uint32_t train,
-                            struct parallel *pool) {
-    const struct views *views = looks->views;
+static void take_photograph(struct hole_observations *observations, size_t *capacity, struct hole_grid *grid,
+                            uint32_t train, struct parallel *pool) {
+    const struct views *views = observations->views;
     const struct photograph *photo = &views->scene->photograph[views->train[train]];
     double pixels = (double)photo->camera.width * photo->camera.height;
     uint32_t step = (uint32_t)fmax(1.0, ceil(sqrt(pixels / fmin(PIXELS, ALL_PIXELS / (double)views->train_count))));
@@ -114,8 +115,9 @@ static void take_photograph(struct hole_looks *looks, size_t *capacity, struct h
         if (!pixel->is_known)
             continue;
         if (!isfinite(pixel->distance_m) && pixel->radiance > dark)
-            add_look(looks, capacity,
-                     &(struct hole_look){pixel->direction, value, train, HOLE_NO_CELL, pixel->is_saturated, false});
+            add_observation(
+                observations, capacity,
+                &(struct hole_observation){pixel->direction, value, train, HOLE_NO_CELL, pixel->is_saturated, false});
         else if (passes(i % columns, i / columns))
             for (size_t k = 0; k < grid->plane_count; k++)
                 tell_plane(grid, k, origin, pixel, value);
@@ -138,28 +140,28 @@ static double variance_of(const struct hole_grid *grid, const struct hole_plane 
     return fmax(middle, HOLE_LEAST_VARIANCE);
 }
 
-void hole_looks_take(struct hole_looks *looks, struct hole_grid *grid, const struct views *views,
-                     struct parallel *pool) {
+void hole_observations_take(struct hole_observations *observations, struct hole_grid *grid, const struct views *views,
+                            struct parallel *pool) {
     size_t capacity = 0;
-    *looks = (struct hole_looks){.views = views};
+    *observations = (struct hole_observations){.views = views};
     for (uint32_t t = 0; t < views->train_count; t++)
-        take_photograph(looks, &capacity, grid, t, pool);
+        take_photograph(observations, &capacity, grid, t, pool);
     for (size_t k = 0; k < grid->plane_count; k++)
         grid->plane[k].variance = variance_of(grid, &grid->plane[k]);
 }
 
-void hole_looks_release(struct hole_looks *looks) {
-    mem_free(looks->look);
-    *looks = (struct hole_looks){0};
+void hole_observations_release(struct hole_observations *observations) {
+    mem_free(observations->item);
+    *observations = (struct hole_observations){0};
 }
 
-static uint32_t nearest_cell(const struct hole_looks *looks, const struct hole_look *look,
+static uint32_t nearest_cell(const struct hole_observations *observations, const struct hole_observation *observation,
                              const struct hole_grid *grid) {
-    vec3 origin = hole_look_origin(looks, look);
+    vec3 origin = hole_observation_origin(observations, observation);
     float nearest_m = INFINITY, distance_m;
     uint32_t nearest = HOLE_NO_CELL;
     for (size_t k = 0; k < grid->plane_count; k++) {
-        uint32_t cell = hole_grid_meet(grid, k, origin, look->direction, &distance_m);
+        uint32_t cell = hole_grid_meet(grid, k, origin, observation->direction, &distance_m);
         if (cell != HOLE_NO_CELL && !grid->cell[cell].is_refused && distance_m < nearest_m) {
             nearest_m = distance_m;
             nearest = cell;
@@ -168,33 +170,35 @@ static uint32_t nearest_cell(const struct hole_looks *looks, const struct hole_l
     return nearest;
 }
 
-/* Cells are refused for good: a look stays with its cell until that is, and one that has none left gets none again. */
-static void assign(struct hole_look *look, const struct hole_looks *looks, const struct hole_grid *grid) {
-    bool has_cell = look->cell != HOLE_NO_CELL && !grid->cell[look->cell].is_refused;
-    if (has_cell || look->is_out)
+/* Cells are refused for good: an observation stays with its cell until that is, and one that has none left gets none again. */
+static void assign(struct hole_observation *observation, const struct hole_observations *observations,
+                   const struct hole_grid *grid) {
+    bool has_cell = observation->cell != HOLE_NO_CELL && !grid->cell[observation->cell].is_refused;
+    if (has_cell || observation->is_out)
         return;
-    look->cell = nearest_cell(looks, look, grid);
-    look->is_out = look->cell == HOLE_NO_CELL;
+    observation->cell = nearest_cell(observations, observation, grid);
+    observation->is_out = observation->cell == HOLE_NO_CELL;
 }
 
-void hole_looks_assign(struct hole_looks *looks, struct hole_grid *grid) {
+void hole_observations_assign(struct hole_observations *observations, struct hole_grid *grid) {
     for (uint32_t i = 0; i < grid->cell_count; i++) {
         if (grid->cell[i].opened > 0)
             grid->cell[i].open = (struct hole_mean){0};
         grid->cell[i].opened = 0;
     }
-    for (size_t i = 0, end; i < looks->count; i = end) {
-        for (end = i; end < looks->count && looks->look[end].train == looks->look[i].train; end++) {
-            struct hole_look *look = &looks->look[end];
-            assign(look, looks, grid);
-            if (look->cell == HOLE_NO_CELL)
+    for (size_t i = 0, end; i < observations->count; i = end) {
+        for (end = i; end < observations->count && observations->item[end].train == observations->item[i].train;
+             end++) {
+            struct hole_observation *observation = &observations->item[end];
+            assign(observation, observations, grid);
+            if (observation->cell == HOLE_NO_CELL)
                 continue;
-            hole_mean_add(&grid->cell[look->cell].open, look->value);
-            grid->cell[look->cell].opened++;
+            hole_mean_add(&grid->cell[observation->cell].open, observation->value);
+            grid->cell[observation->cell].opened++;
         }
         for (size_t k = i; k < end; k++) {
-            if (looks->look[k].cell != HOLE_NO_CELL)
-                hole_mean_close(&grid->cell[looks->look[k].cell].open);
+            if (observations->item[k].cell != HOLE_NO_CELL)
+                hole_mean_close(&grid->cell[observations->item[k].cell].open);
         }
     }
 }
