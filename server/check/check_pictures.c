@@ -98,13 +98,13 @@ static enum status write_exposures(const struct scene_check *room, const char *d
     struct exposure_range range = exposure_chart_draw(&drawing, &room->scene, room->fit.brightness);
     enum status status = write_canvas(&drawing, dir, "exposure.png", err);
     drawing_release(&drawing);
-    char *told = range.told_stops > 0.0
-                     ? mem_printf("; in red the exposures that are told, over %.1f stops", range.told_stops)
-                     : mem_strdup("");
+    char *given = range.given_stops > 0.0
+                      ? mem_printf("; in red the exposures that are told, over %.1f stops", range.given_stops)
+                      : mem_strdup("");
     add(previews, "exposure.png",
         mem_printf("by frame, a line a stop: in blue the photographs' brightness, over %.1f stops%s",
-                   range.brightness_stops, told));
-    mem_free(told);
+                   range.brightness_stops, given));
+    mem_free(given);
     return status;
 }
 

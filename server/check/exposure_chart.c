@@ -11,7 +11,7 @@
 #define MARGIN 20.0f
 #define STOPS_LEAST 2.0 /* shown above and below the middle */
 
-static const rgb paper = {0.93f, 0.93f, 0.92f}, grid_color = {0.75f, 0.75f, 0.75f}, told_color = {0.85f, 0.12f, 0.03f},
+static const rgb paper = {0.93f, 0.93f, 0.92f}, grid_color = {0.75f, 0.75f, 0.75f}, given_color = {0.85f, 0.12f, 0.03f},
                  dot_color = {0.01f, 0.10f, 0.75f};
 
 /* Stops above the median; NAN where there is no value. Returns the distance from the smallest to the largest. */
@@ -39,14 +39,14 @@ static vec2 place(size_t frame, size_t count, double stops, double reach) {
 
 struct exposure_range exposure_chart_draw(struct drawing *drawing, const struct scene *scene, const float *brightness) {
     size_t count = scene->photograph_count;
-    double *dot = mem_array(count + 1, sizeof *dot), *told = mem_array(count + 1, sizeof *told), reach = STOPS_LEAST;
+    double *dot = mem_array(count + 1, sizeof *dot), *given = mem_array(count + 1, sizeof *given), reach = STOPS_LEAST;
     for (size_t i = 0; i < count; i++) {
         dot[i] = (double)brightness[i];
-        told[i] = scene->photograph[i].exposure_known ? (double)scene->photograph[i].exposure : 0.0;
+        given[i] = scene->photograph[i].exposure_known ? (double)scene->photograph[i].exposure : 0.0;
     }
-    struct exposure_range range = {to_stops(dot, count), to_stops(told, count)};
+    struct exposure_range range = {to_stops(dot, count), to_stops(given, count)};
     for (size_t i = 0; i < count; i++)
-        reach = fmax(reach, fmax(isfinite(dot[i]) ? fabs(dot[i]) : 0.0, isfinite(told[i]) ? fabs(told[i]) : 0.0));
+        reach = fmax(reach, fmax(isfinite(dot[i]) ? fabs(dot[i]) : 0.0, isfinite(given[i]) ? fabs(given[i]) : 0.0));
     drawing_init(drawing, WIDTH, HEIGHT, paper);
     for (int stop = -(int)reach; stop <= (int)reach; stop++) {
         float y = place(0, count, stop, reach).y;
@@ -54,13 +54,13 @@ struct exposure_range exposure_chart_draw(struct drawing *drawing, const struct 
                      1.0f);
     }
     for (size_t i = 1; i < count; i++)
-        if (isfinite(told[i]) && isfinite(told[i - 1]))
-            drawing_line(drawing, place(i - 1, count, told[i - 1], reach), place(i, count, told[i], reach), 1.5f,
-                         told_color, 0.9f);
+        if (isfinite(given[i]) && isfinite(given[i - 1]))
+            drawing_line(drawing, place(i - 1, count, given[i - 1], reach), place(i, count, given[i], reach), 1.5f,
+                         given_color, 0.9f);
     for (size_t i = 0; i < count; i++)
         if (isfinite(dot[i]))
             drawing_disc(drawing, place(i, count, dot[i], reach), 3.0f, dot_color, 0.9f);
-    mem_free(told);
+    mem_free(given);
     mem_free(dot);
     return range;
 }

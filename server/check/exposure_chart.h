@@ -7,11 +7,11 @@
 
 struct exposure_range {
     double brightness_stops; /* between the darkest and the brightest photograph's median */
-    double told_stops;       /* between the smallest and the largest exposure that is told; 0 if none is */
+    double given_stops;      /* between the smallest and the largest exposure that is given; 0 if none is */
 };
 
 /* Frames from left to right; one stop is a grey line. Dots: log2 of `brightness` [photograph_count], the median of the
- * stored pixels. Line: log2 of the exposure that is told. Each about its own median. *drawing is the caller's
+ * stored pixels. Line: log2 of the exposure that is given. Each about its own median. *drawing is the caller's
  * (drawing_release). */
 struct exposure_range exposure_chart_draw(struct drawing *drawing, const struct scene *scene, const float *brightness);
 

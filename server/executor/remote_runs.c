@@ -105,11 +105,11 @@ static void turn(struct remote *m) {
 /* --- the run ------------------------------------------------------------------------------- */
 
 struct line_listener {
-    run_hear *each;
+    run_line_fn *each;
     void *user;
 };
 
-static void hear(void *user, const char *lines) {
+static void pass_lines(void *user, const char *lines) {
     const struct line_listener *l = user;
     while (*lines) {
         size_t length = strcspn(lines, "\n");
@@ -118,12 +118,12 @@ static void hear(void *user, const char *lines) {
     }
 }
 
-static void read_lines(struct remote_run *r, size_t limit, run_hear *each, void *user) {
+static void read_lines(struct remote_run *r, size_t limit, run_line_fn *each, void *user) {
     struct line_listener listener = {each, user};
     struct error err;
     for (size_t i = 0; i < limit && r->has_unread; i++) {
         enum status status =
-            store_remote_read(r->remote->parts.store, r->row.job_id, r->row.number, hear, &listener, &err);
+            store_remote_read(r->remote->parts.store, r->row.job_id, r->row.number, pass_lines, &listener, &err);
         if (status == STATUS_NOT_FOUND)
             r->has_unread = false;
         else if (status != STATUS_OK)
@@ -133,14 +133,14 @@ static void read_lines(struct remote_run *r, size_t limit, run_hear *each, void 
     }
 }
 
-static void remote_read(struct run *run, run_hear *each, void *user) {
+static void remote_read(struct run *run, run_line_fn *each, void *user) {
     struct remote_run *r = of(run);
     turn(r->remote);
     read_lines(r, REPORTS_AT_ONCE, each, user);
 }
 
-static void remote_wish(struct run *run, enum run_request request) {
-    static const enum remote_wish wishes[] = {
+static void remote_request(struct run *run, enum run_request request) {
+    static const enum remote_request requests[] = {
         [RUN_STOP] = REMOTE_STOP, [RUN_KILL] = REMOTE_CANCEL, [RUN_PREVIEW] = REMOTE_PREVIEW};
     struct remote_run *r = of(run);
     struct error err;
@@ -151,7 +151,7 @@ static void remote_wish(struct run *run, enum run_request request) {
     if (is_over) {
         remote_decide(r, RUN_LOST, 0, "it was taken back");
         remote_cancel(r);
-    } else if (store_remote_wish(r->remote->parts.store, r->row.job_id, r->row.number, wishes[request], &err) !=
+    } else if (store_remote_request(r->remote->parts.store, r->row.job_id, r->row.number, requests[request], &err) !=
                STATUS_OK) {
         log_warning("job %lld: its node cannot be asked: %s", (long long)r->row.job_id, err.message);
     }
@@ -212,7 +212,7 @@ static void take_log(const struct remote_run *r) {
     mem_free(dir);
 }
 
-static bool remote_ended(struct run *run, struct run_end *end, run_hear *each, void *user) {
+static bool remote_ended(struct run *run, struct run_end *end, run_line_fn *each, void *user) {
     struct remote_run *r = of(run);
     const struct site *site = r->remote->parts.site;
     if ((!r->has_verdict && r->row.phase != REMOTE_ENDED) || r->is_closed || !close_row(r))
@@ -238,7 +238,7 @@ static bool remote_ended(struct run *run, struct run_end *end, run_hear *each, v
 
 static double remote_cpu_sec(const struct run *run) { return of_const(run)->row.cpu_sec; }
 
-static char *remote_last_words(const struct run *run, size_t limit) {
+static char *remote_log_tail(const struct run *run, size_t limit) {
     return mem_printf("%.*s", (int)limit, of_const(run)->row.end.words);
 }
 
@@ -261,10 +261,10 @@ static void remote_run_free(struct run *run) {
 }
 
 static const struct run_kind kind = {.read = remote_read,
-                                     .ask = remote_wish,
+                                     .ask = remote_request,
                                      .ended = remote_ended,
                                      .cpu_sec = remote_cpu_sec,
-                                     .last_words = remote_last_words,
+                                     .log_tail = remote_log_tail,
                                      .poll = remote_poll,
                                      .free = remote_run_free};
 

@@ -49,10 +49,10 @@ struct executor_use *executors_find(struct executors *p, const char *name) {
 
 static bool is_free(const struct executor_use *place) { return !place->is_closed && place->running < place->limit; }
 
-struct executor_use *executors_for(struct executors *p, const char *wish) {
+struct executor_use *executors_for(struct executors *p, const char *chosen) {
     for (size_t i = 0; i < p->count; i++)
         if (is_free(&p->use[i]) &&
-            ((!*wish && !p->use[i].is_for_others) || strcmp(p->use[i].executor->name, wish) == 0))
+            ((!*chosen && !p->use[i].is_for_others) || strcmp(p->use[i].executor->name, chosen) == 0))
             return &p->use[i];
     return NULL;
 }

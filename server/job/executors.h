@@ -27,8 +27,8 @@ char *executors_names(const struct executors *p);
 /* Counts the attempts that are alive or still to be settled, and opens all places. */
 void executors_count(struct executors *p, const struct attempt *slots, size_t count);
 struct executor_use *executors_find(struct executors *p, const char *name); /* NULL: there is none of that name */
-/* Where a job begins whose user has chosen `wish` ("": nothing); NULL: nowhere at this moment. */
-struct executor_use *executors_for(struct executors *p, const char *wish);
+/* Where a job begins whose user has chosen `chosen` ("": nothing); NULL: nowhere at this moment. */
+struct executor_use *executors_for(struct executors *p, const char *chosen);
 /* One more has begun there; NULL: none. */
 void executors_add(struct executors *p, const struct executor *executor);
 /* The names of those where one may begin, as store_job_next takes them; the caller's. NULL: there is none. */

@@ -81,7 +81,7 @@ static enum status next_job(struct lanes *l, bool is_small, int64_t *id, const s
                             struct error *err) {
     struct job_lane lane = {.small_cost = l->config->small_render_cost, .is_small = is_small};
     for (bool may = false; !may;) {
-        char *names = is_small ? NULL : executors_free(&l->places), *wish = NULL;
+        char *names = is_small ? NULL : executors_free(&l->places), *chosen = NULL;
         if (!names && !is_small)
             return error_set(err, STATUS_NOT_FOUND, "no place is free");
         charge_all(l);
@@ -90,9 +90,9 @@ static enum status next_job(struct lanes *l, bool is_small, int64_t *id, const s
         enum status status = store_job_next(l->store, l->config->user_max_running, &lane, id, err);
         mem_free(names);
         if (status == STATUS_OK)
-            status = store_job_executor(l->store, *id, &wish, err);
-        struct executor_use *use = status == STATUS_OK && !is_small ? executors_for(&l->places, wish) : NULL;
-        mem_free(wish);
+            status = store_job_executor(l->store, *id, &chosen, err);
+        struct executor_use *use = status == STATUS_OK && !is_small ? executors_for(&l->places, chosen) : NULL;
+        mem_free(chosen);
         *where = use ? use->executor : l->config->executor;
         if (status == STATUS_OK && !use && !is_small)
             return error_set(err, STATUS_NOT_FOUND, "its place is taken");

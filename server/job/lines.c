@@ -18,7 +18,7 @@ void lines_release(struct lines *l) {
     buf_release(&l->line);
 }
 
-static void take(struct lines *l, const char *data, size_t length, run_hear *each, void *user) {
+static void take(struct lines *l, const char *data, size_t length, run_line_fn *each, void *user) {
     while (length > 0) {
         const char *newline = memchr(data, '\n', length);
         size_t part = newline ? (size_t)(newline - data) : length;
@@ -37,7 +37,7 @@ static void take(struct lines *l, const char *data, size_t length, run_hear *eac
     }
 }
 
-void lines_read(struct lines *l, size_t limit, run_hear *each, void *user) {
+void lines_read(struct lines *l, size_t limit, run_line_fn *each, void *user) {
     char chunk[16384];
     for (size_t total = 0; l->fd >= 0 && total < limit;) {
         ssize_t got = read(l->fd, chunk, sizeof chunk);

@@ -18,7 +18,7 @@ struct lines {
 /* `fd` (-1: none yet) must not block. */
 void lines_init(struct lines *l, int fd);
 /* Reads up to `limit` bytes, as far as there are some, and passes every complete line to `each`. */
-void lines_read(struct lines *l, size_t limit, run_hear *each, void *user);
+void lines_read(struct lines *l, size_t limit, run_line_fn *each, void *user);
 void lines_release(struct lines *l);
 
 #endif

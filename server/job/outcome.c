@@ -19,7 +19,7 @@
 #include "server/job/memory.h"
 #include "server/worker/progress.h"
 
-#define LAST_WORDS_MAX 400 /* bytes */
+#define LOG_TAIL_MAX 400 /* bytes */
 
 enum outcome {
     OUTCOME_OK,
@@ -111,7 +111,7 @@ static void judge(const struct attempt *a, struct verdict *v) {
         return;
     if (a->has_end && a->end_status != STATUS_OK) /* the worker reported its own end */
         return;
-    char *words = run_last_words(a->run, LAST_WORDS_MAX);
+    char *words = run_log_tail(a->run, LOG_TAIL_MAX);
     size_t used = strlen(v->reason);
     if (words[0])
         snprintf(v->reason + used, sizeof v->reason - used, "; the end of its log: %s", words);
@@ -162,7 +162,7 @@ static enum status settle_split(const struct attempt *a, struct store *store, st
 static enum status settle_job(const struct attempt *a, struct store *store, const struct verdict *v,
                               struct error *err) {
     switch (v->outcome) {
-    case OUTCOME_OK: return store_job_succeed_but(store, a->job_id, a->number, v->reason, err);
+    case OUTCOME_OK: return store_job_succeed(store, a->job_id, a->number, v->reason, err);
     case OUTCOME_SPLIT: return settle_split(a, store, err);
     case OUTCOME_INPUT: return store_job_fail(store, a->job_id, a->number, v->reason, v->hint, err);
     case OUTCOME_REFUSED:

@@ -235,12 +235,14 @@ const struct executor *process_executor_init(struct process_executor *p, const c
 
 /* --- its lines, and its end ------------------------------------------------------------------ */
 
-static void hear(struct process *p, size_t limit, run_hear *each, void *user) {
+static void read_lines(struct process *p, size_t limit, run_line_fn *each, void *user) {
     lines_read(&p->lines, limit, each, user);
     p->run.long_lines = p->lines.dropped;
 }
 
-static void process_read(struct run *run, run_hear *each, void *user) { hear(of(run), LINES_AT_ONCE, each, user); }
+static void process_read(struct run *run, run_line_fn *each, void *user) {
+    read_lines(of(run), LINES_AT_ONCE, each, user);
+}
 
 static void process_ask(struct run *run, enum run_request request) {
     static const int signals[] = {[RUN_STOP] = SIGTERM, [RUN_KILL] = SIGKILL, [RUN_PREVIEW] = SIGUSR1};
@@ -258,7 +260,7 @@ static void say_end(const struct process *p, int wait_status, struct run_end *en
     *end = (struct run_end){.way = by_kernel ? RUN_MEMORY : RUN_SIGNAL, .code = WTERMSIG(wait_status)};
 }
 
-static bool process_ended(struct run *run, struct run_end *end, run_hear *each, void *user) {
+static bool process_ended(struct run *run, struct run_end *end, run_line_fn *each, void *user) {
     struct process *p = of(run);
     siginfo_t info = {0};
     if (p->pid <= 0)
@@ -269,7 +271,7 @@ static bool process_ended(struct run *run, struct run_end *end, run_hear *each, 
         return false;
     if (!is_lost)
         kill(-p->pid, SIGKILL); /* it is not reaped yet, so its number still names its session */
-    hear(p, LINES_AT_END, each, user);
+    read_lines(p, LINES_AT_END, each, user);
     struct rusage used = {0};
     int wait_status = 0;
     if (is_lost) {
@@ -295,7 +297,7 @@ static double process_cpu_sec(const struct run *run) {
     return (double)used.tv_sec + 1e-9 * (double)used.tv_nsec;
 }
 
-static char *process_last_words(const struct run *run, size_t limit) {
+static char *process_log_tail(const struct run *run, size_t limit) {
     const struct process *p = of_const(run);
     return worker_log_words(p->log, p->log_start, limit);
 }
@@ -321,6 +323,6 @@ static const struct run_kind kind = {.read = process_read,
                                      .ask = process_ask,
                                      .ended = process_ended,
                                      .cpu_sec = process_cpu_sec,
-                                     .last_words = process_last_words,
+                                     .log_tail = process_log_tail,
                                      .poll = process_poll,
                                      .free = process_free};

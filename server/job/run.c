@@ -5,7 +5,7 @@
 
 #include "common/mem.h"
 
-void run_read(struct run *run, run_hear *each, void *user) {
+void run_read(struct run *run, run_line_fn *each, void *user) {
     if (run)
         run->kind->read(run, each, user);
 }
@@ -15,14 +15,14 @@ void run_ask(struct run *run, enum run_request request) {
         run->kind->ask(run, request);
 }
 
-bool run_ended(struct run *run, struct run_end *end, run_hear *each, void *user) {
+bool run_ended(struct run *run, struct run_end *end, run_line_fn *each, void *user) {
     return run && run->kind->ended(run, end, each, user);
 }
 
 double run_cpu_sec(const struct run *run) { return run ? run->kind->cpu_sec(run) : 0.0; }
 
-char *run_last_words(const struct run *run, size_t limit) {
-    return run ? run->kind->last_words(run, limit) : mem_strdup("");
+char *run_log_tail(const struct run *run, size_t limit) {
+    return run ? run->kind->log_tail(run, limit) : mem_strdup("");
 }
 
 size_t run_poll(const struct run *run, struct pollfd fds[RUN_FDS], double *look_sec) {

@@ -54,18 +54,18 @@ struct run_work {
     double memory_bytes;  /* that it is foretold to need; 0: not known */
 };
 
-typedef void run_hear(void *user, const char *line, size_t length); /* without the newline */
+typedef void run_line_fn(void *user, const char *line, size_t length); /* without the newline */
 
 #define RUN_FDS 2
 
 struct run; /* the executor's */
 
 struct run_kind {
-    void (*read)(struct run *run, run_hear *each, void *user);
+    void (*read)(struct run *run, run_line_fn *each, void *user);
     void (*ask)(struct run *run, enum run_request request);
-    bool (*ended)(struct run *run, struct run_end *end, run_hear *each, void *user);
+    bool (*ended)(struct run *run, struct run_end *end, run_line_fn *each, void *user);
     double (*cpu_sec)(const struct run *run);
-    char *(*last_words)(const struct run *run, size_t limit);
+    char *(*log_tail)(const struct run *run, size_t limit);
     size_t (*poll)(const struct run *run, struct pollfd fds[RUN_FDS], double *look_sec);
     void (*free)(struct run *run);
 };
@@ -92,15 +92,15 @@ struct executor {     /* likewise */
 /* All of these take NULL for a run that never was: it says nothing and does not end. */
 
 /* Passes every complete line that has arrived to `each`. */
-void run_read(struct run *run, run_hear *each, void *user);
+void run_read(struct run *run, run_line_fn *each, void *user);
 void run_ask(struct run *run, enum run_request request);
 /* True, once, when the run has ended. By then the rest of its lines has gone through `each`. */
-bool run_ended(struct run *run, struct run_end *end, run_hear *each, void *user);
+bool run_ended(struct run *run, struct run_end *end, run_line_fn *each, void *user);
 /* CPU time so far, or in all. */
 double run_cpu_sec(const struct run *run);
 /* The last lines that it printed, at most `limit` bytes, joined into one line of ASCII; the caller's (mem_free), "" if
  * none. */
-char *run_last_words(const struct run *run, size_t limit);
+char *run_log_tail(const struct run *run, size_t limit);
 /* The descriptors that become readable when there is something to read or to end; returns their number. *look_sec: look
  * after so much time all the same; infinite: never. */
 size_t run_poll(const struct run *run, struct pollfd fds[RUN_FDS], double *look_sec);

@@ -62,7 +62,7 @@ void link_init(struct attempt_link *l, const struct link_config *config) {
                                .beat = config->beat,
                                .user = config->user,
                                .lease_sec = LEASE_SEC,
-                               .heard = clock_sec(),
+                               .answered_at = clock_sec(),
                                .seq = 1};
     draw_claimant(l->claimant);
 }
@@ -80,7 +80,7 @@ void link_release(struct attempt_link *l) {
 /* --- the state ------------------------------------------------------------------------------ */
 
 enum link_state link_state(struct attempt_link *l) {
-    if (l->state == LINK_OPEN && clock_sec() - l->heard > l->lease_sec) {
+    if (l->state == LINK_OPEN && clock_sec() - l->answered_at > l->lease_sec) {
         l->state = LINK_EXPIRED;
         snprintf(l->why, sizeof l->why, "the daemon has not answered for %.0f s", l->lease_sec);
     }
@@ -138,7 +138,7 @@ static void take_lease(struct attempt_link *l, const cJSON *reply, double sent) 
     double lease;
     if (json_number(reply, "lease_sec", "the reply", LEASE_SEC, &lease, NULL) == STATUS_OK && lease >= 1.0)
         l->lease_sec = lease;
-    l->heard = sent;
+    l->answered_at = sent;
 }
 
 enum status link_claim(struct attempt_link *l, const char *host, int threads, cJSON **order, struct error *err) {
@@ -202,15 +202,15 @@ static cJSON *make_report(struct attempt_link *l, double cpu_sec) {
     return body;
 }
 
-static void take_wish(struct attempt_link *l, const cJSON *reply) {
+static void take_request(struct attempt_link *l, const cJSON *reply) {
     static const char *const words[] = {
-        [LINK_GO_ON] = "go_on", [LINK_PREVIEW] = "preview", [LINK_STOP] = "stop", [LINK_CANCEL] = "cancel"};
+        [LINK_CONTINUE] = "go_on", [LINK_PREVIEW] = "preview", [LINK_STOP] = "stop", [LINK_CANCEL] = "cancel"};
     const char *word;
     if (json_string(reply, "do", "the reply", "", &word, NULL) != STATUS_OK)
         return;
     for (size_t i = 0; i < sizeof words / sizeof *words; i++)
         if (strcmp(words[i], word) == 0)
-            l->wish = (enum link_wish)i;
+            l->wanted = (enum link_request)i;
 }
 
 /* Report `seq` has been answered. */
@@ -254,7 +254,7 @@ void link_report(struct attempt_link *l, double cpu_sec, bool now) {
     l->is_pending = true;
     if (post(l, "report", body, "do", &reply, &sent, &err) == STATUS_OK) {
         take_lease(l, reply.json, sent);
-        take_wish(l, reply.json);
+        take_request(l, reply.json);
         put_off(l, reply.json);
         if (!l->is_put_off)
             answered(l);
@@ -274,7 +274,7 @@ enum status link_end(struct attempt_link *l, const struct link_end *end, double 
     json_add_string(body, "way", end->way);
     json_add_int(body, "code", end->code);
     json_add_string(body, "reason", end->reason);
-    json_add_string(body, "last_words", end->last_words);
+    json_add_string(body, "last_words", end->log_tail);
     json_add_number(body, "cpu_sec", cpu_sec);
     reply_init(&reply);
     enum status status = post(l, "end", body, "last_seq", &reply, &sent, err);

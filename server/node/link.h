@@ -23,7 +23,7 @@
 #include "common/request.h"
 
 enum link_state { LINK_OPEN, LINK_EXPIRED, LINK_REFUSED };
-enum link_wish { LINK_GO_ON, LINK_PREVIEW, LINK_STOP, LINK_CANCEL };
+enum link_request { LINK_CONTINUE, LINK_PREVIEW, LINK_STOP, LINK_CANCEL };
 
 struct link_config {
     const char *url, *token;
@@ -42,11 +42,11 @@ struct attempt_link {
     void *user;
     enum link_state state;
     bool is_claimed;
-    char why[1024];          /* once it is not OPEN */
-    double lease_sec, heard; /* when the last report that was answered was sent; clock_sec */
-    enum link_wish wish;     /* the newest reply's */
-    int64_t seq;             /* of the next report */
-    char **line;             /* [line_count] to be reported, oldest first; owned */
+    char why[1024];                /* once it is not OPEN */
+    double lease_sec, answered_at; /* when the last report that was answered was sent; clock_sec */
+    enum link_request wanted;      /* the newest reply's */
+    int64_t seq;                   /* of the next report */
+    char **line;                   /* [line_count] to be reported, oldest first; owned */
     size_t line_count, line_room;
     size_t pending;     /* of them in report `seq`, which may have arrived already; 0: it was not sent yet */
     bool is_pending;    /* report `seq` was sent and not answered */
@@ -80,7 +80,7 @@ double link_next_report(const struct attempt_link *l);
 struct link_end {
     const char *way; /* "exit", "signal", "memory", "lost", "preempted" */
     int code;
-    const char *reason, *last_words;
+    const char *reason, *log_tail;
 };
 /* Everything has been said: the end, tried until it is answered or the lease is over. */
 enum status link_end(struct attempt_link *l, const struct link_end *end, double cpu_sec, struct error *err);

@@ -54,7 +54,7 @@ static char *path_of(const struct attempt_link *l, const char *what, const char 
 static bool waits_for_room(struct attempt_link *l) {
     if (l->full_until == 0.0)
         l->full_until = clock_sec() + FULL_SEC;
-    return l->wish < LINK_STOP && clock_sec() < l->full_until;
+    return l->wanted < LINK_STOP && clock_sec() < l->full_until;
 }
 
 /* Runs the call until it succeeds, is refused, or the link is no longer open. `begin` (may be NULL) prepares each try;
@@ -206,7 +206,7 @@ enum status link_send(struct attempt_link *l, const char *what, const char *name
         l->full_until = 0.0;
     } else if (l->is_full_there) {
         error_prefix(err, "at the daemon");
-        if (l->wish >= LINK_STOP)
+        if (l->wanted >= LINK_STOP)
             status = err->status = STATUS_CANCELLED;
     }
     reply_release(&reply);

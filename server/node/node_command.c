@@ -197,7 +197,7 @@ static bool was_taken_back(const struct relay *r, bool has_run) {
 
 /* How it ended; `why` where the node gave it up, with `status`. */
 static struct link_end judge(struct relay *r, enum status status, const struct error *why) {
-    struct link_end end = {.way = "exit", .code = r->end.code, .reason = "", .last_words = ""};
+    struct link_end end = {.way = "exit", .code = r->end.code, .reason = "", .log_tail = ""};
     bool has_run = r->run && status == STATUS_OK;
     if (status == STATUS_NO_SPACE) {
         say_no_space(r, why);
@@ -208,7 +208,7 @@ static struct link_end judge(struct relay *r, enum status status, const struct e
         end.reason = "its machine was taken back";
     } else if (status == STATUS_CANCELLED) {
         /* As the daemon wished, before it began or while a file could not be sent. */
-        bool is_cancelled = r->link.wish == LINK_CANCEL;
+        bool is_cancelled = r->link.wanted == LINK_CANCEL;
         end.way = is_cancelled ? "signal" : "exit";
         end.code = is_cancelled ? SIGKILL : PROGRESS_EXIT_STOPPED;
     } else if (status != STATUS_OK) {
@@ -245,8 +245,8 @@ static int finish(struct node *n, enum status status, const struct error *why) {
         return EXIT_FAILURE;
     struct link_end end = judge(r, status, why);
     r->gives_up = status != STATUS_OK;
-    char *words = run_last_words(r->run, WORDS_MAX_BYTES);
-    end.last_words = words;
+    char *words = run_log_tail(r->run, WORDS_MAX_BYTES);
+    end.log_tail = words;
     relay_send_log(r);
     bool is_told = relay_flush(r) && link_end(&r->link, &end, run_cpu_sec(r->run), &err) == STATUS_OK;
     if (is_told)

@@ -27,7 +27,7 @@
 #define STOP_SEC_TERM 20.0
 #define STOP_SEC_USR1 30.0
 #define LOOK_SEC 0.5     /* between looks at signals and clocks */
-#define HEARD_MAX 100000 /* lines that wait for a file to be sent: more are left in the worker's pipe */
+#define LINES_MAX 100000 /* lines that wait for a file to be sent: more are left in the worker's pipe */
 
 static void signals_of_ours(sigset_t *set) {
     sigemptyset(set);
@@ -36,9 +36,11 @@ static void signals_of_ours(sigset_t *set) {
     sigaddset(set, SIGUSR1);
 }
 
+static void beat(void *relay);
+
 void relay_init(struct relay *r, const struct link_config *config) {
     struct link_config own = *config;
-    own.beat = relay_beat;
+    own.beat = beat;
     own.user = r;
     *r = (struct relay){.job_id = config->job_id, .number = config->number};
     link_init(&r->link, &own);
@@ -49,29 +51,29 @@ static void wait_for_end(struct relay *r);
 void relay_release(struct relay *r) {
     wait_for_end(r);
     run_free(r->run);
-    for (size_t i = 0; i < r->heard_count; i++)
-        mem_free(r->heard[i]);
-    mem_free(r->heard);
+    for (size_t i = 0; i < r->line_count; i++)
+        mem_free(r->line[i]);
+    mem_free(r->line);
     link_release(&r->link);
 }
 
 /* --- what comes -------------------------------------------------------------------------------- */
 
-static void hear(void *user, const char *line, size_t length) {
+static void add_line(void *user, const char *line, size_t length) {
     struct relay *r = user;
-    if (r->heard_count == r->heard_room) {
-        r->heard_room = r->heard_room ? 2 * r->heard_room : 64;
-        r->heard = mem_realloc_array(r->heard, r->heard_room, sizeof *r->heard);
+    if (r->line_count == r->line_room) {
+        r->line_room = r->line_room ? 2 * r->line_room : 64;
+        r->line = mem_realloc_array(r->line, r->line_room, sizeof *r->line);
     }
-    r->heard[r->heard_count++] = mem_strndup(line, length);
+    r->line[r->line_count++] = mem_strndup(line, length);
 }
 
-static void listen_to_run(struct relay *r) {
+static void read_run(struct relay *r) {
     if (!r->run || r->has_ended)
         return;
-    if (r->heard_count < HEARD_MAX)
-        run_read(r->run, hear, r);
-    r->has_ended = run_ended(r->run, &r->end, hear, r);
+    if (r->line_count < LINES_MAX)
+        run_read(r->run, add_line, r);
+    r->has_ended = run_ended(r->run, &r->end, add_line, r);
 }
 
 static void stop(struct relay *r) {
@@ -80,7 +82,7 @@ static void stop(struct relay *r) {
     r->has_stopped = true;
 }
 
-static void put_down(struct relay *r) {
+static void kill_run(struct relay *r) {
     if (!r->has_killed)
         run_ask(r->run, RUN_KILL);
     r->has_killed = true;
@@ -99,31 +101,32 @@ static void obey_signals(struct relay *r) {
         stop(r);
     }
     if (r->kill_at > 0.0 && clock_sec() >= r->kill_at)
-        put_down(r);
+        kill_run(r);
 }
 
 static void obey_daemon(struct relay *r) {
-    enum link_wish wish = r->link.wish;
-    if (link_state(&r->link) != LINK_OPEN || wish == LINK_CANCEL)
-        put_down(r);
-    else if (wish == LINK_STOP)
+    enum link_request wanted = r->link.wanted;
+    if (link_state(&r->link) != LINK_OPEN || wanted == LINK_CANCEL)
+        kill_run(r);
+    else if (wanted == LINK_STOP)
         stop(r);
-    else if (wish == LINK_PREVIEW)
+    else if (wanted == LINK_PREVIEW)
         run_ask(r->run, RUN_PREVIEW);
-    if (wish == LINK_PREVIEW) /* each reply that says so asks for one */
-        r->link.wish = LINK_GO_ON;
+    if (wanted == LINK_PREVIEW) /* each reply that says so asks for one */
+        r->link.wanted = LINK_CONTINUE;
 }
 
-void relay_beat(void *relay) {
+/* Reads, reports, obeys; returns soon. */
+static void beat(void *relay) {
     struct relay *r = relay;
-    listen_to_run(r);
+    read_run(r);
     obey_signals(r);
     link_report(&r->link, run_cpu_sec(r->run), false);
     obey_daemon(r);
 }
 
 enum status relay_may_begin(struct relay *r, struct error *err) {
-    relay_beat(r);
+    beat(r);
     if (link_state(&r->link) != LINK_OPEN)
         return error_set(err, STATUS_CANCELLED, "%s", r->link.why);
     return r->has_stopped || r->has_killed ? error_set(err, STATUS_CANCELLED, "stopped before it began") : STATUS_OK;
@@ -133,7 +136,7 @@ enum status relay_may_begin(struct relay *r, struct error *err) {
 
 static bool keep_on(void *user, struct error *err) {
     struct relay *r = user;
-    relay_beat(r);
+    beat(r);
     if (link_state(&r->link) != LINK_OPEN)
         error_set(err, STATUS_CANCELLED, "%s", r->link.why);
     return link_state(&r->link) == LINK_OPEN;
@@ -222,9 +225,9 @@ static char *say_where(const struct relay *r, cJSON *line) {
     return json_text(line);
 }
 
-/* Passes on the oldest line that was heard, or keeps it where its file cannot be sent. */
+/* Passes on the oldest line, or keeps it where its file cannot be sent. */
 static enum status pass_on(struct relay *r, struct error *err) {
-    const char *text = r->heard[0];
+    const char *text = r->line[0];
     char *changed = NULL;
     cJSON *line = NULL;
     const char *type = "";
@@ -250,8 +253,8 @@ static enum status pass_on(struct relay *r, struct error *err) {
     if (is_passed)
         link_say(&r->link, text, strlen(text));
     mem_free(changed);
-    mem_free(r->heard[0]);
-    memmove(r->heard, r->heard + 1, --r->heard_count * sizeof *r->heard);
+    mem_free(r->line[0]);
+    memmove(r->line, r->line + 1, --r->line_count * sizeof *r->line);
     return STATUS_OK;
 }
 
@@ -313,9 +316,9 @@ static void wait_a_little(struct relay *r) {
 static void wait_for_end(struct relay *r) {
     if (!r->run)
         return;
-    put_down(r);
+    kill_run(r);
     while (!r->has_ended) {
-        r->has_ended = run_ended(r->run, &r->end, hear, r);
+        r->has_ended = run_ended(r->run, &r->end, add_line, r);
         if (!r->has_ended)
             poll(NULL, 0, 10);
     }
@@ -323,9 +326,9 @@ static void wait_for_end(struct relay *r) {
 
 enum status relay_follow(struct relay *r, struct error *err) {
     enum status status = STATUS_OK;
-    while (status == STATUS_OK && !(r->has_ended && r->heard_count == 0)) {
-        relay_beat(r);
-        while (status == STATUS_OK && r->heard_count > 0 && link_state(&r->link) == LINK_OPEN)
+    while (status == STATUS_OK && !(r->has_ended && r->line_count == 0)) {
+        beat(r);
+        while (status == STATUS_OK && r->line_count > 0 && link_state(&r->link) == LINK_OPEN)
             status = pass_on(r, err);
         if (link_state(&r->link) != LINK_OPEN)
             status = error_set(err, STATUS_CANCELLED, "%s", r->link.why);
@@ -340,8 +343,8 @@ enum status relay_follow(struct relay *r, struct error *err) {
 
 /* Whether nobody waits for what has not been said: the attempt ends early, and the next one says it again. */
 static bool is_given_up(const struct relay *r) {
-    return r->gives_up || r->has_stopped || r->is_taken_back || r->link.wish == LINK_STOP ||
-           r->link.wish == LINK_CANCEL;
+    return r->gives_up || r->has_stopped || r->is_taken_back || r->link.wanted == LINK_STOP ||
+           r->link.wanted == LINK_CANCEL;
 }
 
 bool relay_flush(struct relay *r) {

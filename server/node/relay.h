@@ -1,7 +1,7 @@
 /* relay.h -- between the worker on this node and the daemon: its lines, its files, the daemon's wishes, the machine's
  * signals.
  *
- *   worker ──lines──> heard ──(its file has been sent)──> link ──reports──> daemon
+ *   worker ──lines──> queue ──(its file has been sent)──> link ──reports──> daemon
  *
  * 1. The order of lines is kept. A line that announces a file is passed on after the file lies at the daemon's, whole; one
  *    whose file has been replaced meanwhile is dropped, since another follows.
@@ -27,8 +27,8 @@ struct relay {
     int number;
     bool has_ended; /* the run */
     struct run_end end;
-    char **heard; /* [heard_count] lines that have not been passed on; owned */
-    size_t heard_count, heard_room;
+    char **line; /* [line_count] lines that have not been passed on; owned */
+    size_t line_count, line_room;
     bool has_stopped, has_killed; /* asked it to */
     bool gives_up;                /* it ends without a result: what is not said yet need not be */
     bool is_taken_back;           /* by the machine's scheduler */
@@ -41,8 +41,6 @@ struct relay {
 void relay_init(struct relay *r, const struct link_config *config);
 void relay_release(struct relay *r); /* kills a run that has not ended */
 
-/* Reads, reports, obeys; returns soon. It is the link's beat. */
-void relay_beat(void *relay);
 /* Whether the attempt should still begin: STATUS_CANCELLED, with why, where it was stopped, cancelled or given up. */
 enum status relay_may_begin(struct relay *r, struct error *err);
 /* Follows the run to its end, and passes everything on. STATUS_OK: the end may be told. Otherwise the run was killed:

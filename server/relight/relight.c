@@ -145,7 +145,7 @@ static enum status put_sources(struct relight_state *r, const struct camera *cam
         struct path_settings path = path_of(r, r->picture + ((uint64_t)(i + 1) << 32));
         struct picture_quality quality;
         struct image image;
-        relit_shine(&r->room, i, r->pool);
+        relit_light(&r->room, i, r->pool);
         r->part = i + 1;
         status =
             picture_render(&r->room.world, camera, &path, &r->goal, false, look, r, r->pool, &image, &quality, err);
@@ -155,7 +155,7 @@ static enum status put_sources(struct relight_state *r, const struct camera *cam
                              (struct output_formats){.is_exr = true}, &image, files, err);
         image_release(&image);
     }
-    relit_shine(&r->room, RELIT_ALL, r->pool);
+    relit_light(&r->room, RELIT_ALL, r->pool);
     r->part = 0;
     return status;
 }

@@ -282,7 +282,7 @@ enum status relit_set_sun(struct relit *r, const struct relight_job *job, const 
     return status;
 }
 
-void relit_shine(struct relit *r, size_t source, struct parallel *pool) {
+void relit_light(struct relit *r, size_t source, struct parallel *pool) {
     bool is_all = source == RELIT_ALL;
     uint32_t alone = is_all ? 0 : r->source[source].segment;
     for (uint32_t s = 0; s < r->segments.count; s++)

@@ -45,6 +45,6 @@ enum status relit_set_sun(struct relit *relit, const struct relight_job *job, co
 
 /* Leaves one source shining; RELIT_ALL: all of them. */
 #define RELIT_ALL SIZE_MAX
-void relit_shine(struct relit *relit, size_t source, struct parallel *pool);
+void relit_light(struct relit *relit, size_t source, struct parallel *pool);
 
 #endif

@@ -223,11 +223,7 @@ static enum status finish(struct store *store, int64_t id, int attempt, enum job
     return status;
 }
 
-enum status store_job_succeed(struct store *store, int64_t id, int attempt, struct error *err) {
-    return store_job_succeed_but(store, id, attempt, "", err);
-}
-
-enum status store_job_succeed_but(struct store *store, int64_t id, int attempt, const char *reason, struct error *err) {
+enum status store_job_succeed(struct store *store, int64_t id, int attempt, const char *reason, struct error *err) {
     return finish(store, id, attempt, JOB_SUCCEEDED, ENDING_SUCCEEDED, reason, "", err);
 }
 

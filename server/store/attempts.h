@@ -49,9 +49,8 @@ enum status store_attempt_adopted(struct store *store, int64_t job_id, int numbe
  * is being checked does not start. A running job that is split starts its next part, where there is one (parts.h). A recorded request to cancel overrides every end; one to pause overrides a return to
  * the queue. `executor` is the name of what will run it. */
 enum status store_job_start(struct store *store, int64_t id, const char *executor, int *attempt, struct error *err);
-enum status store_job_succeed(struct store *store, int64_t id, int attempt, struct error *err);
-/* The same, with a remark for the user: what a time limit left out. */
-enum status store_job_succeed_but(struct store *store, int64_t id, int attempt, const char *reason, struct error *err);
+/* `reason`: a remark for the user, as what a time limit left out; "": none. */
+enum status store_job_succeed(struct store *store, int64_t id, int attempt, const char *reason, struct error *err);
 /* The input is at fault: a retry would not help. */
 enum status store_job_fail(struct store *store, int64_t id, int attempt, const char *reason, const char *hint,
                            struct error *err);

@@ -13,9 +13,9 @@
     "job_id, number, phase, executor, name, external_id, external_reason, host, lease_sec, begun_ms, claimed_ms,"      \
     " heard_ms, heard_count, refused_count, last_seq, wanted, cpu_sec, end_way, end_code, end_reason, end_words"
 
-const char *remote_wish_name(enum remote_wish wish) {
+const char *remote_request_name(enum remote_request request) {
     static const char *const names[] = {"go_on", "preview", "stop", "cancel"};
-    return names[wish];
+    return names[request];
 }
 
 #define COPY(to, column) snprintf(to, sizeof(to), "%s", sql_text(stmt, column))
@@ -31,7 +31,7 @@ static void fill(struct remote_row *row, sqlite3_stmt *stmt) {
                                .heard_count = sqlite3_column_int64(stmt, 12),
                                .refused_count = sqlite3_column_int64(stmt, 13),
                                .last_seq = sqlite3_column_int64(stmt, 14),
-                               .wanted = (enum remote_wish)sqlite3_column_int(stmt, 15),
+                               .wanted = (enum remote_request)sqlite3_column_int(stmt, 15),
                                .cpu_sec = sqlite3_column_double(stmt, 16)};
     COPY(row->executor, 3);
     COPY(row->name, 4);
@@ -202,18 +202,18 @@ static enum status change_freeing(struct store *store,
     return status;
 }
 
-struct wished {
+struct requested {
     int64_t job_id;
     int number;
-    enum remote_wish wish;
+    enum remote_request request;
 };
 
-static enum status enter_wish(struct store *store, void *what, struct error *err) {
-    const struct wished *w = what;
+static enum status enter_request(struct store *store, void *what, struct error *err) {
+    const struct requested *w = what;
     return sql_run(&store->sql, err,
                    "UPDATE remote SET wanted = ?1, told_seq = 0"
                    " WHERE job_id = ?2 AND part = 0 AND number = ?3 AND wanted < ?1 AND phase < 3",
-                   "nin", (int)w->wish, w->job_id, w->number);
+                   "nin", (int)w->request, w->job_id, w->number);
 }
 
 enum status store_remote_trouble(struct store *store, int64_t job_id, int number, const char *reason,
@@ -231,10 +231,10 @@ enum status store_remote_trouble(struct store *store, int64_t job_id, int number
     return store_end(store, status, is_told ? job_id : STORE_NOTHING_CHANGED, err);
 }
 
-enum status store_remote_wish(struct store *store, int64_t job_id, int number, enum remote_wish wish,
-                              struct error *err) {
-    struct wished wished = {job_id, number, wish};
-    return change_freeing(store, enter_wish, &wished, err);
+enum status store_remote_request(struct store *store, int64_t job_id, int number, enum remote_request request,
+                                 struct error *err) {
+    struct requested requested = {job_id, number, request};
+    return change_freeing(store, enter_request, &requested, err);
 }
 
 /* Under the mutex: the oldest report. */
@@ -254,7 +254,7 @@ static enum status next_report(struct store *store, int64_t job_id, int number, 
     return status == STATUS_OK && !found ? error_set(err, STATUS_NOT_FOUND, "every report has been read") : status;
 }
 
-static enum status read_once(struct store *store, int64_t job_id, int number, remote_hear *hear, void *user,
+static enum status read_once(struct store *store, int64_t job_id, int number, remote_lines_fn *each, void *user,
                              struct error *err) {
     int64_t seq = 0;
     char *lines = NULL;
@@ -263,7 +263,7 @@ static enum status read_once(struct store *store, int64_t job_id, int number, re
         return status;
     status = next_report(store, job_id, number, &seq, &lines, err);
     if (status == STATUS_OK) {
-        hear(user, lines);
+        each(user, lines);
         status = sql_run(&store->sql, err,
                          "DELETE FROM attempt_lines WHERE job_id = ? AND part = 0 AND number = ? AND seq = ?", "ini",
                          job_id, number, seq);
@@ -272,11 +272,11 @@ static enum status read_once(struct store *store, int64_t job_id, int number, re
     return store_group_end(store, status, err);
 }
 
-enum status store_remote_read(struct store *store, int64_t job_id, int number, remote_hear *hear, void *user,
+enum status store_remote_read(struct store *store, int64_t job_id, int number, remote_lines_fn *each, void *user,
                               struct error *err) {
     enum status status;
     do
-        status = read_once(store, job_id, number, hear, user, err);
+        status = read_once(store, job_id, number, each, user, err);
     while (status == STATUS_NO_SPACE && store_reserve_spend(store));
     return status;
 }

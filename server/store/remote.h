@@ -34,19 +34,24 @@ struct store; /* store.h */
 #define REMOTE_CLAIMANT_SIZE 65    /* hex digits that a node draws at random when it starts, and the NUL */
 #define REMOTE_LINES_MAX (1 << 20) /* bytes of one report */
 #define REMOTE_REPORTS_MAX 256     /* of an attempt that are not read yet */
-#define REMOTE_WORDS_SIZE 1024     /* of a log's last lines, with the NUL */
+#define REMOTE_LOG_TAIL_SIZE 1024  /* of a log's last lines, with the NUL */
 
 /* Stored as numbers in state.db: the order is part of its schema. */
 enum remote_phase { REMOTE_SUBMITTING, REMOTE_WAITING, REMOTE_CLAIMED, REMOTE_ENDED };
-enum remote_wish { REMOTE_GO_ON, REMOTE_PREVIEW, REMOTE_STOP, REMOTE_CANCEL }; /* a later one outdoes an earlier one */
-const char *remote_wish_name(enum remote_wish wish); /* "go_on", "preview", "stop", "cancel" */
+enum remote_request {
+    REMOTE_GO_ON,
+    REMOTE_PREVIEW,
+    REMOTE_STOP,
+    REMOTE_CANCEL
+};                                                            /* a later one outdoes an earlier one */
+const char *remote_request_name(enum remote_request request); /* "go_on", "preview", "stop", "cancel" */
 
 /* How an attempt ended, as its node says. */
 struct remote_end {
     char way[16];     /* "exit", "signal", "memory", "lost", "refused" or "preempted"; "": it has not ended */
     int code;         /* exit: the status; signal: its number */
     char reason[256]; /* in words for users; may be "" */
-    char words[REMOTE_WORDS_SIZE]; /* the last that its worker printed; may be "" */
+    char words[REMOTE_LOG_TAIL_SIZE]; /* the last that its worker printed; may be "" */
 };
 
 struct remote_row {
@@ -62,7 +67,7 @@ struct remote_row {
     int64_t heard_count;                    /* grows by one with every claim, report and end that is accepted */
     int64_t refused_count;                  /* claims of others: the site has started it more than once */
     int64_t last_seq;
-    enum remote_wish wanted;
+    enum remote_request wanted;
     double cpu_sec;
     struct remote_end end;
 };
@@ -86,8 +91,8 @@ enum status store_remote_explain(struct store *store, int64_t job_id, int number
  * written. */
 enum status store_remote_trouble(struct store *store, int64_t job_id, int number, const char *reason,
                                  struct error *err);
-enum status store_remote_wish(struct store *store, int64_t job_id, int number, enum remote_wish wish,
-                              struct error *err);
+enum status store_remote_request(struct store *store, int64_t job_id, int number, enum remote_request request,
+                                 struct error *err);
 enum status store_remote_get(struct store *store, int64_t job_id, int number, struct remote_row *row,
                              struct error *err);
 /* Those of an executor that have not ended, in no order; of all executors where it is NULL. *rows: [*count], the
@@ -96,11 +101,11 @@ enum status store_remote_list(struct store *store, const char *executor, struct 
                               struct error *err);
 /* Grows whenever a node has said something: while it stands still there is nothing to read. */
 uint64_t store_remote_changes(struct store *store);
-/* Reads the oldest report: passes its lines, each with its newline, to `hear`, and removes it. What `hear` enters into the
+/* Reads the oldest report: passes its lines, each with its newline, to `each`, and removes it. What `each` enters into the
  * store is one transaction with that: a report is entered whole, once, or not at all and read again. STATUS_NOT_FOUND
  * when there is none. */
-typedef void remote_hear(void *user, const char *lines);
-enum status store_remote_read(struct store *store, int64_t job_id, int number, remote_hear *hear, void *user,
+typedef void remote_lines_fn(void *user, const char *lines);
+enum status store_remote_read(struct store *store, int64_t job_id, int number, remote_lines_fn *each, void *user,
                               struct error *err);
 /* Nothing more is accepted; works on a full disk. *writers: how many are still at it. */
 enum status store_remote_close(struct store *store, int64_t job_id, int number, size_t *writers, struct error *err);
@@ -122,7 +127,7 @@ enum status store_remote_claim(struct store *store, const struct remote_key *key
 enum status store_remote_refuse(struct store *store, const struct remote_key *key, const char *reason,
                                 struct error *err);
 struct remote_reply {
-    enum remote_wish wanted;
+    enum remote_request wanted;
     int lease_sec;
     int64_t last_seq;
 };

@@ -17,7 +17,7 @@ static enum status obey(struct rig *rig, const char *line, struct error *err) {
     if (count == 2 && strcmp(word, "start") == 0)
         return store_job_start(rig->store, job, "process", &attempt, err);
     if (count == 3 && strcmp(word, "succeed") == 0)
-        return store_job_succeed(rig->store, job, attempt, err);
+        return store_job_succeed(rig->store, job, attempt, "", err);
     if (count == 3 && strcmp(word, "fail") == 0)
         return store_job_fail(rig->store, job, attempt, "it broke", "mend it", err);
     if (count == 3 && strcmp(word, "stop") == 0)

@@ -58,7 +58,7 @@ static void check_life(struct rig *rig) {
     add_metric(rig, job, attempt, 7);
     rig_receive(fd, &reply, "\"step\":7");
     CHECK(strstr(buf_text(&reply), "event: metric\n"));
-    rig_must(store_job_succeed(rig->store, job, attempt, &err), &err, "store_job_succeed");
+    rig_must(store_job_succeed(rig->store, job, attempt, "", &err), &err, "store_job_succeed");
     rig_receive(fd, &reply, "\r\n0\r\n\r\n"); /* the end of the body, without closing */
     CHECK(strstr(buf_text(&reply), "\"state\":\"succeeded\""));
     CHECK(strstr(buf_text(&reply), "\r\n0\r\n\r\n"));
@@ -100,7 +100,7 @@ static void check_past(struct rig *rig) {
     CHECK(rig_get(rig, path, "", &reply) == 400);
     buf_release(&reply);
     struct error err;
-    rig_must(store_job_succeed(rig->store, job, attempt, &err), &err, "store_job_succeed");
+    rig_must(store_job_succeed(rig->store, job, attempt, "", &err), &err, "store_job_succeed");
 }
 
 /* All that is stored, as JSON lines: each parses, ids grow, the snapshot has the asked-for id. */
@@ -161,7 +161,7 @@ static void *publish(void *user) {
     struct error err;
     for (int i = 0; i < STORM_EVENTS; i++)
         add_metric(p->rig, p->job, p->attempt, i);
-    rig_must(store_job_succeed(p->rig->store, p->job, p->attempt, &err), &err, "store_job_succeed");
+    rig_must(store_job_succeed(p->rig->store, p->job, p->attempt, "", &err), &err, "store_job_succeed");
     return NULL;
 }
 
@@ -280,7 +280,7 @@ static void check_event_source(struct rig *rig) {
     int attempt = rig_run_job(rig, job);
     for (int i = 0; i < 100; i++)
         add_metric(rig, job, attempt, i);
-    rig_must(store_job_succeed(rig->store, job, attempt, &err), &err, "store_job_succeed");
+    rig_must(store_job_succeed(rig->store, job, attempt, "", &err), &err, "store_job_succeed");
     char path[64], fields[64];
     snprintf(path, sizeof path, "/v1/jobs/%lld/events?after=0", (long long)job);
     struct event_source source = {.path = path};
@@ -369,7 +369,8 @@ static void check_burst(struct rig *rig) {
             close(fds[i]);
         CHECK_THAT(is_cut || (admitted == STREAM_MAX && refused == MORE), "%d were admitted, %d refused", admitted,
                    refused);
-        rig_must(store_job_succeed(rig->store, job, attempt, &err), &err, "store_job_succeed"); /* ends its streams */
+        rig_must(store_job_succeed(rig->store, job, attempt, "", &err), &err,
+                 "store_job_succeed"); /* ends its streams */
         mem_free(text);
     }
     await_streams(rig, 0);

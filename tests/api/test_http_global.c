@@ -204,7 +204,7 @@ static void check_resync(void) {
 
     /* Age: the last event of a job that has ended stays. */
     bool more = true;
-    rig_must(store_job_succeed(rig.store, job, attempt, &err), &err, "succeed");
+    rig_must(store_job_succeed(rig.store, job, attempt, "", &err), &err, "succeed");
     for (int i = 0; i < 10 && more; i++)
         rig_must(store_event_prune(rig.store, INT64_MAX, &more, &err), &err, "prune");
     CHECK(!more);

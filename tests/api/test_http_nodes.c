@@ -152,7 +152,7 @@ static void check_reports(struct rig *rig) {
     }
     CHECK(store_remote_read(rig->store, job, number, check_lines, "{\"a\":1}\ntwo\n", &err) == STATUS_OK);
     CHECK(store_remote_read(rig->store, job, number, check_lines, "", &err) == STATUS_NOT_FOUND);
-    CHECK(store_remote_wish(rig->store, job, number, REMOTE_STOP, &err) == STATUS_OK);
+    CHECK(store_remote_request(rig->store, job, number, REMOTE_STOP, &err) == STATUS_OK);
     IS(post(rig, "report", ANN, "{\"seq\":2,\"lines\":[]}"), 200);
     SAYS("\"do\":\"stop\"");
     static const char *const bad[] = {"{}",

@@ -34,7 +34,7 @@ int main(void) {
     model.random = 1;
     model.job_count = JOBS_MAX;
     for (size_t i = 0; i < model.job_count; i++)
-        model.job[i] = (struct model_job){.id = add_one(), .wish = -1};
+        model.job[i] = (struct model_job){.id = add_one(), .request = -1};
     daemon_begins();
     double begun = cpu_sec();
     while (!all_over() && model.now < 100000.0) {

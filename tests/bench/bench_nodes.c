@@ -186,7 +186,7 @@ static void run_one(const struct cluster_job *c) {
     cJSON *order = NULL;
     const struct link_config config = {
         .url = url, .token = c->token, .job_id = c->job, .number = c->attempt, .beat = beat, .user = &link};
-    const struct link_end end = {.way = "exit", .reason = "", .last_words = ""};
+    const struct link_end end = {.way = "exit", .reason = "", .log_tail = ""};
     link_init(&link, &config);
     enum status status = link_claim(&link, "node", 1, &order, &why);
     if (status == STATUS_OK)

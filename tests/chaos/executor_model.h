@@ -55,7 +55,7 @@ struct model_job {
     int attempt;
     bool has_node_end, succeeded, was_killed_daemon, is_over;
     int64_t heard; /* the last line */
-    int wish;      /* RUN_STOP, RUN_KILL; -1: none */
+    int request;   /* RUN_STOP, RUN_KILL; -1: none */
 };
 
 static struct model {
@@ -76,7 +76,7 @@ static struct model {
     size_t job_count, running, running_max; /* running_max 0: no limit */
     char *dir;
     long claims, ends, restarts, losses, preemptions; /* over all scripts */
-    long last_words;                                  /* of nodes, after this side had decided */
+    long log_tail;                                    /* of nodes, after this side had decided */
 } model;
 
 static inline double chance(void) { return (double)(rng_mix64(model.random++) >> 11) * 0x1p-53; }
@@ -383,7 +383,7 @@ static inline void start_one(struct model_job *job) {
     const struct executor *executor = remote_executor(model.remote);
     job->heard = 0;
     job->has_node_end = job->was_killed_daemon = false;
-    job->wish = -1;
+    job->request = -1;
     OK(executor->start(executor, &work, &job->run, &err));
     model.running++;
     cJSON_Delete(order);
@@ -402,7 +402,7 @@ static inline void node_hurries(const struct model_job *job) {
         c->done = WORK_REPORTS;
         const struct remote_key key = {c->job_id, c->attempt, c->token_sha256, c->claimant};
         node_reports(c, &key);
-        model.last_words++;
+        model.log_tail++;
         return;
     }
 }
@@ -417,7 +417,7 @@ static inline void check_end(const struct model_job *job, const struct remote_ro
                    (long long)job->id, row->end.way, row->end.code, (int)end->way, end->reason);
     for (size_t i = 0; i < model.cluster_count; i++)
         was_there |= strcmp(model.cluster[i].name, row->name) == 0;
-    CHECK_THAT(end->way != RUN_LOST || job->wish >= 0 || was_there || model.cluster_count == CLUSTER_MAX,
+    CHECK_THAT(end->way != RUN_LOST || job->request >= 0 || was_there || model.cluster_count == CLUSTER_MAX,
                "attempt %d of job %lld is lost, and the site never had it", job->attempt, (long long)job->id);
 }
 
@@ -426,12 +426,12 @@ static inline void settle(struct model_job *job, const struct run_end *end) {
     for (size_t i = 0; i < model.cluster_count; i++)
         CHECK_THAT(!(model.cluster[i].is_writing && model.cluster[i].job_id == job->id),
                    "attempt %d of job %lld has ended and is written to", job->attempt, (long long)job->id);
-    bool was_asked = job->wish >= 0;
+    bool was_asked = job->request >= 0;
     model.ends++;
     if (end->way == RUN_EXIT && end->code == 0) {
         CHECK(job->has_node_end && !job->succeeded);
         struct job row;
-        OK(store_job_succeed(store, job->id, job->attempt, &err));
+        OK(store_job_succeed(store, job->id, job->attempt, "", &err));
         OK(store_job_get(store, job->id, &row, &err));
         job->succeeded = row.state == JOB_SUCCEEDED;
         job_release(&row);
@@ -467,11 +467,11 @@ static inline void job_turn(struct model_job *job) {
             CHECK_THAT(job->heard == told, "%lld lines of %lld were heard", (long long)job->heard, (long long)told);
             check_end(job, &at_end, &end);
             settle(job, &end);
-        } else if (job->wish < 0 && happens(0.0005)) {
-            job->wish = chance() < 0.5 ? RUN_STOP : RUN_KILL;
-            if (job->wish == RUN_KILL)
+        } else if (job->request < 0 && happens(0.0005)) {
+            job->request = chance() < 0.5 ? RUN_STOP : RUN_KILL;
+            if (job->request == RUN_KILL)
                 OK(store_job_cancel(model.store, job->id, &err));
-            run_ask(job->run, (enum run_request)job->wish);
+            run_ask(job->run, (enum run_request)job->request);
             if (happens(0.5))
                 node_hurries(job);
         }
@@ -514,8 +514,8 @@ static inline void daemon_dies(void) {
         if (!job->run)
             continue;
         OK(executor->resume(executor, job->id, job->attempt, &job->run, &err));
-        if (job->wish >= 0) /* the store remembers what the user wants */
-            run_ask(job->run, (enum run_request)job->wish);
+        if (job->request >= 0) /* the store remembers what the user wants */
+            run_ask(job->run, (enum run_request)job->request);
     }
 }
 
@@ -566,7 +566,7 @@ static inline void run_script(uint64_t seed) {
     model.last_status[0] = '\0';
     model.job_count = 1 + (size_t)(chance() * JOBS_MAX) % JOBS_MAX;
     for (size_t i = 0; i < model.job_count; i++)
-        model.job[i] = (struct model_job){.id = add_job(model.store, SCENE_A, 0), .wish = -1};
+        model.job[i] = (struct model_job){.id = add_job(model.store, SCENE_A, 0), .request = -1};
     daemon_begins();
     while (!all_over() && model.now < LAST_SEC) {
         model.now += 1.0;

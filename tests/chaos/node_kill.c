@@ -200,7 +200,7 @@ static void check_equal(const struct remote_attempt *a) {
     for (size_t i = 0; i < WORKER_OUTPUTS; i++)
         CHECK_THAT(strcmp(sums[i], home_sums[i]) == 0, "job %lld: %s differs", (long long)a->job, worker_outputs[i]);
     mem_free(dir);
-    OK(store_job_succeed(rig.store, a->job, a->number, &err));
+    OK(store_job_succeed(rig.store, a->job, a->number, "", &err));
 }
 
 static void show_log(void) {
@@ -310,17 +310,17 @@ static void test_taken_back(int number) {
 
 static void test_wishes(void) {
     static const struct {
-        enum remote_wish wish;
+        enum remote_request request;
         const char *way;
         int code, exit_status;
     } t[] = {{REMOTE_STOP, "exit", 85, 85}, {REMOTE_CANCEL, "signal", SIGKILL, 1}};
     for (size_t i = 0; i < sizeof t / sizeof *t; i++) {
         struct remote_attempt a = {.lease_sec = LEASE_SEC};
         begin(&a, rig_job(&rig), 2, ENDLESS);
-        OK(store_remote_wish(rig.store, a.job, a.number, REMOTE_PREVIEW, &err));
+        OK(store_remote_request(rig.store, a.job, a.number, REMOTE_PREVIEW, &err));
         a.pid = start_node(&a);
         wait_for_part(&a);
-        OK(store_remote_wish(rig.store, a.job, a.number, t[i].wish, &err));
+        OK(store_remote_request(rig.store, a.job, a.number, t[i].request, &err));
         int code = follow(&a, -1, 0.0, 0);
         CHECK_THAT(code == t[i].exit_status && strcmp(a.row.end.way, t[i].way) == 0 && a.row.end.code == t[i].code,
                    "%d, %s %d", code, a.row.end.way, a.row.end.code);
@@ -349,7 +349,7 @@ static void test_full_disk(bool all) {
     wait_for_part(&a);
     atomic_store(&disk_is_full, true);
     usleep(1000000);
-    OK(store_remote_wish(rig.store, a.job, a.number, REMOTE_STOP, &err));
+    OK(store_remote_request(rig.store, a.job, a.number, REMOTE_STOP, &err));
     int code = follow(&a, -1, 0.0, 0);
     CHECK_THAT(code == 85 && strcmp(a.row.end.way, "exit") == 0 && a.row.end.code == 85 && a.no_space_count == 0,
                "%d, %s %d: %s", code, a.row.end.way, a.row.end.code, a.row.end.reason);

@@ -15,10 +15,10 @@ int main(void) {
     printf("%ld scripts in %.0f s: %ld claims, %ld ends, %ld deaths of the daemon, %ld lost, %ld pre-empted, "
            "%ld last words\n",
            count, clock_sec() - begun, model.claims, model.ends, model.restarts, model.losses, model.preemptions,
-           model.last_words);
+           model.log_tail);
     /* The scripts do what they are for. */
     CHECK(count < 100 || (model.claims > count && model.restarts > count / 2 && model.losses > 0 &&
-                          model.preemptions > 0 && model.last_words > 0));
+                          model.preemptions > 0 && model.log_tail > 0));
     if (getenv("UNBAKE_LONG"))
         figure("executor scripts that broke the model", check_failed_count, 0, "lower");
     model_close();

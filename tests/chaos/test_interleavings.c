@@ -25,7 +25,7 @@ static enum status obey(struct rig *rig, const char *line, struct error *err) {
     if (strcmp(word, "start") == 0)
         return store_job_start(rig->store, job, "process", &attempt, err);
     if (strcmp(word, "succeed") == 0)
-        return store_job_succeed(rig->store, job, attempt, err);
+        return store_job_succeed(rig->store, job, attempt, "", err);
     if (strcmp(word, "fail") == 0)
         return store_job_fail(rig->store, job, attempt, "r", "h", err);
     if (strcmp(word, "crash") == 0)

@@ -65,13 +65,13 @@ struct said {
 
 static struct said *said_of(struct run *run) { return (struct said *)(void *)run; }
 
-static void said_read(struct run *run, run_hear *each, void *user) {
+static void said_read(struct run *run, run_line_fn *each, void *user) {
     struct said *said = said_of(run);
     lines_read(&said->lines, SIZE_MAX, each, user);
     run->long_lines = said->lines.dropped;
 }
 
-static bool said_ended(struct run *run, struct run_end *end, run_hear *each, void *user) {
+static bool said_ended(struct run *run, struct run_end *end, run_line_fn *each, void *user) {
     said_read(run, each, user);
     *end = said_of(run)->end;
     return true;
@@ -96,7 +96,7 @@ static struct said *said_new(const uint8_t *data, size_t size) {
     static const struct run_kind kind = {.read = said_read,
                                          .ended = said_ended,
                                          .cpu_sec = said_cpu_sec,
-                                         .last_words = said_last_words,
+                                         .log_tail = said_last_words,
                                          .free = said_free};
     struct said *said = mem_calloc(1, sizeof *said);
     said->run.kind = &kind;

@@ -67,7 +67,7 @@ static void add_jobs(struct error *err) {
     MUST_OK(
         store_output_put(lab.store, 1, attempt, EVENT_OUTPUT, "preview/a.png", strlen(text), digest, "image/png", err),
         err);
-    MUST_OK(store_job_succeed(lab.store, 1, attempt, err), err);
+    MUST_OK(store_job_succeed(lab.store, 1, attempt, "", err), err);
     MUST_OK(store_job_start(lab.store, 2, "process", &attempt, err), err);
     MUST_OK(store_job_pause(lab.store, 4, err), err);
 }

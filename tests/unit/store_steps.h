@@ -223,7 +223,7 @@ static enum status crash_job(void) { return store_job_crash(store, job, attempt,
 static enum status stop_job(void) { return store_job_stop(store, job, attempt, "why", &err); }
 static enum status block_job(void) { return store_job_block(store, job, attempt, "why", "hint", &err); }
 static enum status fail_job(void) { return store_job_fail(store, job, attempt, "why", "hint", &err); }
-static enum status succeed_job(void) { return store_job_succeed(store, job, attempt, &err); }
+static enum status succeed_job(void) { return store_job_succeed(store, job, attempt, "", &err); }
 static enum status delete_job(void) { return store_job_delete(store, second_job, &err); }
 static enum status explain(void) { return store_job_explain(store, 0, "it waits", "", "", &err); }
 static enum status explain_no_more(void) { return store_job_explain(store, 0, "", "it", "", &err); }

@@ -134,7 +134,7 @@ static int64_t make_former(bool runs) {
     CHECK(start_attempt(id) == 2);
     announce(id, 2, "preview/a.png");
     if (!runs)
-        OK(store_job_succeed(store, id, 2, &err));
+        OK(store_job_succeed(store, id, 2, "", &err));
     OK(sql_run(&store->sql, &err, "DELETE FROM attempts WHERE job_id = ?", "i", id));
     OK(sql_run(&store->sql, &err, "INSERT INTO attempts (job_id, number, executor, phase) VALUES (?, 2, 'process', 0)",
                "i", id));

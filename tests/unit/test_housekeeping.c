@@ -82,7 +82,7 @@ static int running_events;
 static bool run_once(bool is_sql, long n, bool stays) {
     int64_t id = start_job();
     struct job_files f = make_files(id);
-    OK(store_job_succeed(store, id, 1, &err));
+    OK(store_job_succeed(store, id, 1, "", &err));
     log_forget();
     strike(is_sql, n, stays);
     housekeeping_run(&config, store);

@@ -18,7 +18,7 @@ static int64_t add_source(void) {
     int attempt;
     OK(store_job_start(store, id, "process", &attempt, &err));
     OK(store_output_put(store, id, attempt, EVENT_OUTPUT, JOB_SOURCE_OUTPUT, 100, HEX, "model/x", &err));
-    OK(store_job_succeed(store, id, attempt, &err));
+    OK(store_job_succeed(store, id, attempt, "", &err));
     return id;
 }
 
@@ -47,7 +47,7 @@ static int64_t add_reader(enum job_kind kind, int64_t source, double cost) {
 static void run(int64_t id) {
     int attempt;
     OK(store_job_start(store, id, "process", &attempt, &err));
-    OK(store_job_succeed(store, id, attempt, &err));
+    OK(store_job_succeed(store, id, attempt, "", &err));
 }
 
 static void check_sources(void) {
@@ -99,7 +99,7 @@ static void check_scenes(void) {
     int attempt;
     OK(store_job_start(store, source, "process", &attempt, &err));
     OK(store_output_put(store, source, attempt, EVENT_OUTPUT, JOB_SOURCE_OUTPUT, 100, HEX, "model/x", &err));
-    OK(store_job_succeed(store, source, attempt, &err));
+    OK(store_job_succeed(store, source, attempt, "", &err));
     struct job_new new = {.kind = JOB_RENDER,
                           .source_id = source,
                           .scene_id = SCENE_B,

@@ -16,7 +16,7 @@ static int64_t add_render(void) {
     bool replayed;
     OK(store_job_start(store, source, "process", &attempt, &err));
     OK(store_output_put(store, source, attempt, EVENT_OUTPUT, JOB_SOURCE_OUTPUT, 100, DIGEST, "model/x", &err));
-    OK(store_job_succeed(store, source, attempt, &err));
+    OK(store_job_succeed(store, source, attempt, "", &err));
     struct job_new new = {.kind = JOB_RENDER,
                           .source_id = source,
                           .scene_id = SCENE_A,
@@ -98,12 +98,12 @@ static void test_turns(void) {
     CHECK(wanted == 2);
     int first = start(id, 1), second = start(id, 2);
     CHECK(next(" slurm ") == 0);
-    OK(store_job_succeed(store, id, first, &err));
+    OK(store_job_succeed(store, id, first, "", &err));
     check_job(id, JOB_RUNNING, 1, "");
     CHECK(next(NULL) == 0); /* the whole waits for the last of them */
     IS(store_event_add(store, id, first, EVENT_LOG, "{}", &err), STATUS_CONFLICT);
     OK(store_event_add(store, id, second, EVENT_LOG, "{}", &err));
-    OK(store_job_succeed(store, id, second, &err));
+    OK(store_job_succeed(store, id, second, "", &err));
     check_job(id, JOB_RUNNING, 2, "");
     CHECK(next(" process ") == id);
     OK(store_job_yield(store, id, "", &err)); /* its place was taken */
@@ -112,7 +112,7 @@ static void test_turns(void) {
     int whole = start(id, 0);
     IS(store_job_yield(store, id, "", &err), STATUS_CONFLICT);
     IS(store_job_split(store, id, whole, 10, 2, DIGEST, &err), STATUS_CONFLICT);
-    OK(store_job_succeed(store, id, whole, &err));
+    OK(store_job_succeed(store, id, whole, "", &err));
     check_job(id, JOB_SUCCEEDED, 2, "");
     OK(store_job_retry(store, id, 2, "render", NULL, &err)); /* it is split anew */
     check_job(id, JOB_QUEUED, 0, "");
@@ -158,7 +158,7 @@ static void test_failure(void) {
 static void test_block(void) {
     int64_t id = add_split(2);
     int first = start(id, 1), second = start(id, 2);
-    OK(store_job_succeed(store, id, first, &err));
+    OK(store_job_succeed(store, id, first, "", &err));
     OK(store_job_block(store, id, second, "disk full", "hint", &err));
     check_job(id, JOB_PAUSED, 1, "part 2 of 2: disk full");
     OK(store_job_resume(store, id, NULL, &err));
@@ -200,7 +200,7 @@ static void test_progress(void) {
     CHECK(all.done == 1.0 && all.total == 10.0 && fabs(all.eta_sec - 18.0) < 1e-9);
     OK(store_part_progress(store, id, second, 2.0, 3.0, &all, &err)); /* 3 in 3 s */
     CHECK(all.done == 3.0 && fabs(all.eta_sec - 7.0 / 1.5) < 1e-9);
-    OK(store_job_succeed(store, id, second, &err));
+    OK(store_job_succeed(store, id, second, "", &err));
     OK(store_part_progress(store, id, first, 99.0, -1.0, &all, &err));
     CHECK(all.done == 10.0 && all.eta_sec < 0.0);
     IS(store_part_progress(store, id, second, 1.0, 1.0, &all, &err), STATUS_CONFLICT);

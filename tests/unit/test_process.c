@@ -115,15 +115,15 @@ static void test_last_words(void) {
     struct run *r;
     struct heard heard;
     run(&r, "echo 'not a word of mine' >&2; printf 'caf\\303\\251\\nis \\033[31mred \\n\\n' >&2", &heard);
-    char *words = run_last_words(r, 400);
+    char *words = run_log_tail(r, 400);
     CHECK_STRING(words, "not a word of mine caf?? is ?[31mred");
     mem_free(words);
-    words = run_last_words(r, 20); /* from the first whole line on */
+    words = run_log_tail(r, 20); /* from the first whole line on */
     CHECK_STRING(words, "is ?[31mred");
     mem_free(words);
     run_free(r);
     run(&r, "exit 3", &heard); /* an earlier process's words are not its own */
-    words = run_last_words(r, 400);
+    words = run_log_tail(r, 400);
     CHECK_STRING(words, "");
     mem_free(words);
     run_free(r);
@@ -139,7 +139,7 @@ static void test_large_log(void) {
     run_free(r);
     CHECK(stat(log, &info) == 0 && info.st_size > 1100000);
     run(&r, "echo more >&2", &heard);
-    char *words = run_last_words(r, 400);
+    char *words = run_log_tail(r, 400);
     CHECK_STRING(words, "more");
     CHECK(stat(log, &info) == 0 && info.st_size < 100000 && info.st_size > 60000);
     mem_free(words);
@@ -162,7 +162,7 @@ static void test_refusals(void) {
     OK(begin(&r, "/nonexistent/unbaked", dir, NULL));
     struct run_end end = wait_for_end(r, &heard);
     CHECK(end.way == RUN_EXIT && end.code == 127);
-    char *words = run_last_words(r, 400);
+    char *words = run_log_tail(r, 400);
     CHECK_STRING(words, "cannot execute the worker's program");
     mem_free(words);
     run_free(r);
@@ -178,7 +178,7 @@ static void test_none(void) {
     run_ask(NULL, RUN_KILL);
     CHECK(!run_ended(NULL, &end, hear, &heard) && run_cpu_sec(NULL) == 0.0 && heard.count == 0);
     CHECK(run_poll(NULL, fds, &look) == 0 && isinf(look));
-    char *words = run_last_words(NULL, 400);
+    char *words = run_log_tail(NULL, 400);
     CHECK_STRING(words, "");
     mem_free(words);
     run_free(NULL);

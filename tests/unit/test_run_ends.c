@@ -13,9 +13,9 @@ struct planned {
 static struct run_end next; /* how the next run ends */
 static struct counters figures;
 
-static void planned_read(struct run *run, run_hear *each, void *user) { (void)run, (void)each, (void)user; }
+static void planned_read(struct run *run, run_line_fn *each, void *user) { (void)run, (void)each, (void)user; }
 static void planned_ask(struct run *run, enum run_request request) { (void)run, (void)request; }
-static bool planned_ended(struct run *run, struct run_end *end, run_hear *each, void *user) {
+static bool planned_ended(struct run *run, struct run_end *end, run_line_fn *each, void *user) {
     struct planned *p = (struct planned *)(void *)run;
     static const char line[] = "{\"type\":\"end\",\"status\":\"ok\"}";
     if (p->has_ended)
@@ -42,7 +42,7 @@ static enum status planned_start(const struct executor *executor, const struct r
                                          .ask = planned_ask,
                                          .ended = planned_ended,
                                          .cpu_sec = planned_cpu_sec,
-                                         .last_words = planned_last_words,
+                                         .log_tail = planned_last_words,
                                          .free = planned_free};
     (void)executor, (void)why;
     /* What it is told means the same anywhere. */

@@ -223,7 +223,7 @@ static void test_running(void) {
     CHECK(kept_by(ALICE) == before + 5000);
     OK(store_output_put(store, id, number, EVENT_OUTPUT, "b.exr", 7000, SCENE_A, "x/y", &err));
     CHECK(kept_by(ALICE) == before + 8000);
-    OK(store_job_succeed(store, id, number, &err));
+    OK(store_job_succeed(store, id, number, "", &err));
     CHECK(kept_by(ALICE) == before + 5000);
     OK(store_job_delete(store, id, &err));
 }

@@ -30,7 +30,7 @@ static int64_t job_in(struct store *store, enum condition condition, int *attemp
     if (condition == CANCELLING)
         OK(store_job_cancel(store, id, &err));
     if (condition == SUCCEEDED)
-        OK(store_job_succeed(store, id, *attempt, &err));
+        OK(store_job_succeed(store, id, *attempt, "", &err));
     if (condition == FAILED)
         OK(store_job_fail(store, id, *attempt, "why", "do", &err));
     return id;
@@ -81,7 +81,7 @@ static void test_transitions(void) {
             case AGAIN: status = store_job_retry(store, id, 3, "report", NULL, &err); break;
             case EXTEND: status = store_job_extend(store, id, 3, "{\"seed\":2}", NULL, &err); break;
             case START: status = store_job_start(store, id, "process", &started, &err); break;
-            case SUCCEED: status = store_job_succeed(store, id, attempt, &err); break;
+            case SUCCEED: status = store_job_succeed(store, id, attempt, "", &err); break;
             case FAIL: status = store_job_fail(store, id, attempt, "r", "h", &err); break;
             case CRASH: status = store_job_crash(store, id, attempt, "r", "h", 0, &err); break;
             case STOP: status = store_job_stop(store, id, attempt, "r", &err); break;
@@ -121,7 +121,7 @@ static void test_attempts(void) {
     /* The first attempt's process is still there and reports: every report is refused. */
     IS(store_event_add(store, id, first, EVENT_LOG, "{}", &err), STATUS_CONFLICT);
     IS(store_output_put(store, id, first, EVENT_OUTPUT, "a.exr", 1, SCENE_A, "x/y", &err), STATUS_CONFLICT);
-    IS(store_job_succeed(store, id, first, &err), STATUS_CONFLICT);
+    IS(store_job_succeed(store, id, first, "", &err), STATUS_CONFLICT);
     IS(store_job_fail(store, id, first, "", "", &err), STATUS_CONFLICT);
     IS(store_job_crash(store, id, first, "", "", 0, &err), STATUS_CONFLICT);
     IS(store_job_stop(store, id, first, "", &err), STATUS_CONFLICT);

@@ -366,7 +366,7 @@ static void test_outbox(void) {
     CHECK(isinf(wait));
     OK(store_job_add(store, &new, 1000, &id, &replayed, &err));
     OK(store_job_start(store, id, "process", &attempt, &err));
-    OK(store_job_succeed(store, id, attempt, &err));
+    OK(store_job_succeed(store, id, attempt, "", &err));
     OK(store_outbox_next(store, 0, NULL, 0, &first, &err));
     OK(store_outbox_next(store, first.id, NULL, 0, &second, &err));
     CHECK(strstr(first.body, "running") && strstr(second.body, "succeeded"));

@@ -73,7 +73,7 @@ static void child(const char *dir, int first_key, int fd) {
         if (key % 4 == 1)
             continue;
         a.state = key % 4 == 2 ? JOB_SUCCEEDED : JOB_FAILED;
-        if ((key % 4 == 2 ? store_job_succeed(store, a.id, a.attempt, &err)
+        if ((key % 4 == 2 ? store_job_succeed(store, a.id, a.attempt, "", &err)
                           : store_job_fail(store, a.id, a.attempt, "r", "h", &err)) != STATUS_OK)
             _exit(6);
         tell(fd, &a);

@@ -80,7 +80,7 @@ static void check_life(struct store *store) {
     OK(store_remote_end(store, &key, 4, &end, 3.0, &err));
     OK(store_remote_get(store, key.job_id, key.number, &row, &err));
     CHECK(row.phase == REMOTE_ENDED && strcmp(row.end.way, "exit") == 0 && strcmp(row.end.words, "bye") == 0);
-    OK(store_job_succeed(store, key.job_id, key.number, &err));
+    OK(store_job_succeed(store, key.job_id, key.number, "", &err));
 }
 
 /* The reply was lost, and the node says it again: the same reply, and nothing twice. */
@@ -166,22 +166,22 @@ static void check_fence(struct store *store) {
 static void check_wishes(struct store *store) {
     struct remote_key key = begin_attempt(store);
     OK(store_remote_claim(store, &key, "node7", &row, &err));
-    OK(store_remote_wish(store, key.job_id, key.number, REMOTE_PREVIEW, &err));
+    OK(store_remote_request(store, key.job_id, key.number, REMOTE_PREVIEW, &err));
     OK(store_remote_report(store, &key, 1, "", 0.0, &reply, &err));
     CHECK(reply.wanted == REMOTE_PREVIEW);
     OK(store_remote_report(store, &key, 1, "", 0.0, &reply, &err)); /* that reply was lost */
     CHECK(reply.wanted == REMOTE_PREVIEW);
     OK(store_remote_report(store, &key, 2, "", 0.0, &reply, &err));
     CHECK(reply.wanted == REMOTE_GO_ON);
-    OK(store_remote_wish(store, key.job_id, key.number, REMOTE_STOP, &err));
-    OK(store_remote_wish(store, key.job_id, key.number, REMOTE_PREVIEW, &err));
+    OK(store_remote_request(store, key.job_id, key.number, REMOTE_STOP, &err));
+    OK(store_remote_request(store, key.job_id, key.number, REMOTE_PREVIEW, &err));
     for (int64_t seq = 3; seq < 5; seq++) {
         OK(store_remote_report(store, &key, seq, "", 0.0, &reply, &err));
         CHECK(reply.wanted == REMOTE_STOP);
     }
-    OK(store_remote_wish(store, key.job_id, key.number, REMOTE_CANCEL, &err));
+    OK(store_remote_request(store, key.job_id, key.number, REMOTE_CANCEL, &err));
     OK(store_remote_report(store, &key, 5, "", 0.0, &reply, &err));
-    CHECK(reply.wanted == REMOTE_CANCEL && strcmp(remote_wish_name(reply.wanted), "cancel") == 0);
+    CHECK(reply.wanted == REMOTE_CANCEL && strcmp(remote_request_name(reply.wanted), "cancel") == 0);
     OK(store_job_stop(store, key.job_id, key.number, "", &err));
 }
 
@@ -235,7 +235,7 @@ static void check_full(struct store *store) {
     fill_disk(store, true);
     OK(store_remote_get(store, key.job_id, key.number, &row, &err));
     int64_t heard = row.heard_count;
-    OK(store_remote_wish(store, key.job_id, key.number, REMOTE_STOP, &err));
+    OK(store_remote_request(store, key.job_id, key.number, REMOTE_STOP, &err));
     OK(store_remote_report(store, &key, 2, "two\n", 0.0, &reply, &err));
     CHECK(reply.last_seq == 1 && reply.wanted == REMOTE_STOP && reply.lease_sec == 60);
     OK(store_remote_get(store, key.job_id, key.number, &row, &err));

@@ -125,7 +125,7 @@ static int64_t test_running(void) {
     OK(store_job_start(store, id, "process", &attempt, &err));
     int64_t second = job_of(3, 0);
     CHECK(owner_next(1) == 2 && owner_next(2) == 3);
-    OK(store_job_succeed(store, id, attempt, &err));
+    OK(store_job_succeed(store, id, attempt, "", &err));
     CHECK(owner_next(1) == 3);
     OK(store_job_start(store, second, "process", &attempt, &err));
     return second;
@@ -226,7 +226,7 @@ static void test_ten_users(void) {
         OK(store_job_get(store, id, &job, &err));
         OK(store_job_start(store, id, "process", &attempt, &err));
         OK(store_usage_add(store, job.owner_id, 3600.0, &err));
-        OK(store_job_succeed(store, id, attempt, &err));
+        OK(store_job_succeed(store, id, attempt, "", &err));
         if (job.owner_id > 10) {
             int *mine = &started[job.owner_id - 11], least = 99;
             for (int i = 0; i < 10; i++)

@@ -204,12 +204,12 @@ void job_request_settings(const struct job_request *w, struct settings *settings
     cJSON_Delete(problems);
 }
 
-void job_request_executor(const char *wish, const char *names, cJSON *params) {
+void job_request_executor(const char *chosen, const char *names, cJSON *params) {
     const char *at = names ? names : "";
-    size_t length = strlen(wish);
+    size_t length = strlen(chosen);
     while (length > 0 && *(at += strspn(at, " ,\t"))) {
         size_t each = strcspn(at, " ,\t");
-        if (each == length && strncmp(at, wish, length) == 0)
+        if (each == length && strncmp(at, chosen, length) == 0)
             return;
         at += each;
     }

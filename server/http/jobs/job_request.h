@@ -38,7 +38,7 @@ void job_request_settings(const struct job_request *w, struct settings *settings
 
 /* A problem where the settings name an executor that is not one of `names` (separated by spaces or commas; NULL: all are
  * known). */
-void job_request_executor(const char *wish, const char *names, cJSON *params);
+void job_request_executor(const char *chosen, const char *names, cJSON *params);
 
 /* NULL where mesh and photographs of the scene fit, as far as is known, or the job takes them as they are; else 409, with
  * the remedy. */

@@ -117,7 +117,7 @@ static enum status read_lines(const cJSON *body, struct buf *lines, struct error
 
 static struct response *answer(const struct remote_reply *from) {
     cJSON *reply = cJSON_CreateObject();
-    json_add_string(reply, "do", remote_wish_name(from->wanted));
+    json_add_string(reply, "do", remote_request_name(from->wanted));
     json_add_int(reply, "lease_sec", from->lease_sec);
     json_add_int(reply, "last_seq", from->last_seq);
     return response_json(200, reply);
