@@ -77,11 +77,15 @@ static const struct setting table[] = {
     {"padding", SETTING_INT, "texels", 0, 40, NULL, "2", NULL,
      "free texels between two charts of the textures: 2 keep mip level 1 clean, 7 level 2, 16 level 3; 0: 7, or 2 where 7 would cost more "
      "than a tenth of texels_per_metre"},
+    {"photograph_megapixels", SETTING_REAL, "megapixels", 0, 100000, NULL, "3.2", NULL,
+     "larger photographs are reduced to a half, a third ... of their sides, by means of their pixels; told for a texture_size of 2048: "
+     "larger ones keep as many times more pixels as they have more texels; 0: photographs are kept whole, which takes many times the "
+     "memory and time"},
     {"preview_interval_sec", SETTING_REAL, "s", 1, 86400, NULL, "15", NULL,
      "time between preview pictures while the job runs"},
     {"quality", SETTING_CHOICE, "", 0, 0, "draft|standard|fine", "standard", NULL,
-     "how much work is done: it sets those of detail_steps, gather_samples, gloss_passes, listing1_looks, measure_stride, refine_looks "
-     "and report_samples that are not given"},
+     "how much work is done: it sets those of detail_steps, gather_samples, gloss_passes, listing1_looks, measure_stride, "
+     "photograph_megapixels, refine_looks and report_samples that are not given"},
     {"refine_looks", SETTING_INT, "looks", 0, 1000000000, NULL, "1000", "solve",
      "refine: ends when so many looks were taken at each part of the texture; with iterations, or 0 and a time_limit_sec: "
      "goes on to the end of that"},
@@ -126,6 +130,7 @@ static const struct {
     {"gloss_passes", {1, 2, 2}},
     {"listing1_looks", {400, 4000, 16000}},
     {"measure_stride", {2, 1, 1}},
+    {"photograph_megapixels", {1.6, 3.2, 0}},
     {"refine_looks", {100, 1000, 4000}},
     {"report_samples", {16, 64, 256}},
     /* clang-format on */

@@ -30,11 +30,12 @@ enum status grey_card_find(struct grey_card *card, const struct pixel_setting *p
     if (!photo)
         return error_set(err, STATUS_INPUT, "grey_card: there is no photograph %s, or more than one",
                          pixel->photograph);
-    if (pixel->x >= photo->camera.width || pixel->y >= photo->camera.height)
+    const struct camera camera = photograph_file_camera(photo);
+    if (pixel->x >= camera.width || pixel->y >= camera.height)
         return error_set(err, STATUS_INPUT, "grey_card: %s has %u x %u pixels, none at %u, %u", pixel->photograph,
-                         photo->camera.width, photo->camera.height, pixel->x, pixel->y);
-    vec3 origin = camera_origin(&photo->camera);
-    if (!camera_direction(&photo->camera, (float)pixel->x + 0.5f, (float)pixel->y + 0.5f, &direction) ||
+                         camera.width, camera.height, pixel->x, pixel->y);
+    vec3 origin = camera_origin(&camera);
+    if (!camera_direction(&camera, (float)pixel->x + 0.5f, (float)pixel->y + 0.5f, &direction) ||
         !accel_intersect(accel, origin, direction, 0.0f, INFINITY, &hit)) {
         error_set(err, STATUS_INPUT, "grey_card: pixel %u, %u of %s shows nothing of the mesh", pixel->x, pixel->y,
                   pixel->photograph);

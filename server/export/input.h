@@ -37,8 +37,8 @@ struct export_sun {
 
 /* Where a photograph was taken from. */
 struct export_camera {
-    const char *name; /* the photograph's */
-    const struct camera *camera;
+    const char *name;     /* the photograph's */
+    struct camera camera; /* of the picture in the file */
     bool is_held_out;
 };
 

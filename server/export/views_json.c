@@ -65,6 +65,6 @@ cJSON *cameras_json(const struct export_input *in) {
     cJSON *root = cJSON_CreateObject(), *frames = cJSON_AddArrayToObject(root, "frames");
     for (size_t i = 0; i < in->camera_count; i++)
         cJSON_AddItemToArray(frames, views_json_frame(in->camera[i].name, in->camera[i].is_held_out ? "test" : "train",
-                                                      in->camera[i].camera, in->mesh->offset));
+                                                      &in->camera[i].camera, in->mesh->offset));
     return root;
 }

@@ -245,6 +245,7 @@ static enum status load_photographs(const char *root, const char *name, const st
         .decode_bytes = limits->decode_bytes,
         .spill = limits->spill,
         .later_bytes = limits->later_bytes,
+        .kept_pixels = limits->kept_pixels,
     };
     return photos_load(root, name, t, &options, pool, scene, f, err);
 }

@@ -26,6 +26,7 @@ struct bundle_limits {
     uint64_t decode_bytes;
     struct spill *spill;
     uint64_t later_bytes;
+    double kept_pixels;
 };
 
 struct bundle_limits bundle_default_limits(void);

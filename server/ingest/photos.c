@@ -14,6 +14,7 @@
 #include "server/ingest/photo_color.h"
 #include "server/ingest/photo_fit.h"
 #include "server/ingest/photo_pixels.h"
+#include "server/scene/photograph_reduce.h"
 
 /* Memory of a picture that is being decoded, bytes a pixel: 16 of four channels as float, 6 that are kept of it, and the
  * decoder's own coefficients or planes. An estimate; it only bounds how many are decoded at the same time. */
@@ -45,7 +46,8 @@ struct loading {
     const double *offset; /* [3] of the mesh */
     const struct photos_options *options;
     struct gate gate;
-    uint64_t pixels;               /* of all pictures together */
+    uint64_t pixels;               /* that are kept of all pictures together */
+    uint32_t *step;                /* [frame_count] of its pixels, in each direction, one is made */
     char **path;                   /* [frame_count] of the picture, below dir; NULL where absent; of the frames */
     struct photograph *photograph; /* [frame_count] */
     struct photo_outcome *outcome; /* [frame_count] */
@@ -129,6 +131,28 @@ static enum status keep_pixels(const struct loading *l, const struct image *imag
     return STATUS_OK;
 }
 
+/* Puts means of its pixels, in the caller's memory, in place of a photograph that is in memory whole. A pixel that some
+ * of its pixels saturate is excluded, so that "clipped" is all that there is to say of one. */
+static enum status reduce(const struct loading *l, size_t index, struct error *err) {
+    struct photograph whole = l->photograph[index], *photo = &l->photograph[index];
+    struct camera camera = camera_reduced(&whole.camera, l->step[index]);
+    size_t count = (size_t)camera.width * camera.height;
+    enum status status = spill_reserve(l->options->spill, ALL, 2, 2 * count, l->options->later_bytes * l->pixels, err);
+    if (status != STATUS_OK)
+        return status;
+    photograph_reduce(&whole, l->step[index], l->options->spill, photo);
+    photo->clipped = photo->saturated;
+    photo->saturated = NULL;
+    photo->name = whole.name;
+    photo->color_space = whole.color_space;
+    photo->file.step = l->step[index];
+    photo->file.width = whole.camera.width;
+    photo->file.height = whole.camera.height;
+    whole.name = whole.color_space = NULL;
+    photograph_release(&whole);
+    return STATUS_OK;
+}
+
 static enum status load_photograph(const struct loading *l, size_t index) {
     const struct frame *frame = &l->transforms->frame[index];
     struct photograph *photo = &l->photograph[index];
@@ -144,7 +168,7 @@ static enum status load_photograph(const struct loading *l, size_t index) {
     photo->name = mem_strdup(frame->file);
     photo->is_test = frame->is_test;
     photo->gain = rgb_gray(1.0f);
-    photo->spill = l->options->spill;
+    photo->spill = l->step[index] > 1 ? NULL : l->options->spill;
     photo_fit_apply(&l->fit[index], &info, &image);
     set_clip(l, &info, photo);
     photo_color_note(&l->color[index], frame->file, &image, &info);
@@ -161,7 +185,7 @@ static enum status load_photograph(const struct loading *l, size_t index) {
             photo_pixels_load_mask(l->dir, frame->mask, l->fit[index].turn, photo, &outcome->is_broken, &outcome->err);
         outcome->mask_failed = status != STATUS_OK;
     }
-    return status;
+    return status == STATUS_OK && l->step[index] > 1 ? reduce(l, index, &outcome->err) : status;
 }
 
 /* --- on all threads ---------------------------------------------------------------------- */
@@ -200,13 +224,17 @@ static void load_body(void *user, size_t index, int thread) {
     gate_leave(&l->gate, bytes);
 }
 
-/* Sets the cameras, makes room, then reads the pixels. */
+/* Sets the cameras and how far each is reduced, makes room, then reads the pixels. */
 static enum status load_all(struct loading *l, struct parallel *pool, struct error *err) {
     size_t count = l->transforms->frame_count;
     for (size_t i = 0; i < count; i++) {
         if (l->path[i])
             l->outcome[i].status = check_size(l, i, &l->photograph[i].camera, &l->outcome[i]);
-        l->pixels += pixels_of(l, i);
+        if (pixels_of(l, i) == 0)
+            continue;
+        l->step[i] = camera_step_to(&l->photograph[i].camera, l->options->kept_pixels);
+        struct camera camera = camera_reduced(&l->photograph[i].camera, l->step[i]);
+        l->pixels += (uint64_t)camera.width * camera.height;
     }
     enum status status = spill_reserve(l->options->spill, ALL, count, PHOTOGRAPH_PIXEL_BYTES * l->pixels,
                                        l->options->later_bytes * l->pixels, err);
@@ -343,6 +371,7 @@ enum status photos_load(const char *dir, const char *name, const struct frames *
         l.path[i] = file_is_in(dir, t->frame[i].file) ? t->frame[i].file : NULL;
     l.color = mem_calloc(t->frame_count, sizeof *l.color);
     l.fit = mem_calloc(t->frame_count, sizeof *l.fit);
+    l.step = mem_calloc(t->frame_count, sizeof *l.step);
     photo_fit_all(dir, name, l.path, t, pool, l.fit, f);
     pthread_mutex_init(&l.gate.mutex, NULL);
     pthread_cond_init(&l.gate.freed, NULL);
@@ -358,6 +387,7 @@ enum status photos_load(const char *dir, const char *name, const struct frames *
     mem_free(l.path);
     mem_free(l.color);
     mem_free(l.fit);
+    mem_free(l.step);
     mem_free(l.outcome);
     mem_free(l.half_of_srgb);
     return status;

@@ -23,6 +23,7 @@ struct photos_options {
     uint64_t decode_bytes; /* memory of pictures that are being decoded at the same time; 0: no limit. One is always */
     struct spill *spill;   /* for the pixels; NULL: memory; borrowed */
     uint64_t later_bytes;  /* that the caller will take of it for each pixel, beside what is loaded */
+    double kept_pixels; /* of one photograph; larger ones are reduced to a whole fraction of their sides; 0: none is */
 };
 
 /* Loads the picture and mask of every frame from folder `dir` into scene->photograph, in the frames' order; missing

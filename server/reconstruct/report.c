@@ -198,7 +198,7 @@ static void compare_view(struct reconstruction *r, struct photograph *photo, str
         render_view(r, photo, view, samples, median, views, hooks);
         return;
     }
-    photograph_reduce(photo, step, &smaller);
+    photograph_reduce(photo, step, NULL, &smaller);
     render_view(r, &smaller, view, samples, median, views, hooks);
     photo->exposure = smaller.exposure;
     photo->gain = smaller.gain;

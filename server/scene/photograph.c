@@ -19,6 +19,20 @@ void photograph_release(struct photograph *photo) {
     *photo = (struct photograph){0};
 }
 
+struct camera photograph_file_camera(const struct photograph *photo) {
+    struct camera camera = photo->camera;
+    if (photo->file.step <= 1)
+        return camera;
+    float step = (float)photo->file.step;
+    camera.width = photo->file.width;
+    camera.height = photo->file.height;
+    camera.fx *= step;
+    camera.fy *= step;
+    camera.cx *= step;
+    camera.cy *= step;
+    return camera;
+}
+
 static void use_plane(const struct photograph *photo, const void *plane, size_t size, size_t at, size_t count) {
     if (plane)
         spill_use(photo->spill, (const char *)plane + at * size, count * size);

@@ -47,6 +47,10 @@ struct photograph {
                              * exceed the clip; owned */
     char *color_space;       /* name of the file's colour space if it was converted ("Display P3"), else NULL; owned */
     uint8_t *mask;           /* [height][width] 0: the pixel is excluded; NULL: none is; owned */
+    struct {
+        uint32_t step;          /* its pixels, in each direction, of which each of these is the mean; 0 and 1: one */
+        uint32_t width, height; /* of it; set where step is more than 1 */
+    } file;
 };
 
 struct photograph_sample {
@@ -61,6 +65,9 @@ static inline bool photograph_sample_saturates(const struct photograph_sample *s
 }
 
 void photograph_release(struct photograph *photo);
+
+/* The camera of the picture in the file, before it was reduced. */
+struct camera photograph_file_camera(const struct photograph *photo);
 
 /* Whether the file clips this channel of pixel number `at`, given its value. */
 static inline bool photograph_clips(const struct photograph *photo, size_t at, int channel, float value) {

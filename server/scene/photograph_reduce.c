@@ -6,9 +6,20 @@
 #include "common/image.h"
 #include "common/mem.h"
 
-uint32_t camera_step(const struct camera *camera) {
+#define USUAL_SIDE 2048.0 /* texels, for which photograph_megapixels is told */
+
+uint32_t camera_step_to(const struct camera *camera, double most) {
     double width = (double)camera->width, height = (double)camera->height;
-    return (uint32_t)fmin(fmax(ceil(sqrt(width * height / REDUCED_MAX_PIXELS)), 1.0), fmin(width, height));
+    if (most <= 0.0)
+        return 1;
+    return (uint32_t)fmin(fmax(ceil(sqrt(width * height / most)), 1.0), fmin(width, height));
+}
+
+uint32_t camera_step(const struct camera *camera) { return camera_step_to(camera, REDUCED_MAX_PIXELS); }
+
+double photograph_kept_pixels(const struct settings *settings) {
+    double side = settings_number(settings, "texture_size") / USUAL_SIDE;
+    return 1e6 * settings_number(settings, "photograph_megapixels") * fmax(side * side, 1.0);
 }
 
 struct camera camera_reduced(const struct camera *camera, uint32_t step) {
@@ -58,19 +69,20 @@ static void put_pixel(const struct pixel_block *block, uint32_t step, size_t at,
     out->mask[at] = is_usable;
 }
 
-void photograph_reduce(const struct photograph *photo, uint32_t step, struct photograph *out) {
+void photograph_reduce(const struct photograph *photo, uint32_t step, struct spill *spill, struct photograph *out) {
     *out = *photo;
     out->camera = camera_reduced(&photo->camera, step);
     size_t width = out->camera.width, height = out->camera.height;
-    out->spill = NULL;
+    out->spill = spill;
     out->name = out->color_space = NULL;
     out->firefly = NULL;
     out->clipped = NULL;
     out->black = 0.0f; /* what is stored as 0 is read as less, before the mean is taken */
-    out->pixel = mem_array(width * height, sizeof *out->pixel);
-    out->saturated = mem_array(width * height, sizeof *out->saturated);
-    out->mask = mem_array(width * height, sizeof *out->mask);
+    out->pixel = spill_take(spill, width * height, sizeof *out->pixel);
+    out->saturated = spill_take(spill, width * height, sizeof *out->saturated);
+    out->mask = spill_take(spill, width * height, sizeof *out->mask);
     for (size_t y = 0; y < height; y++) {
+        photograph_use(out, y * width, width);
         for (size_t row = 0; row < step; row++)
             photograph_use(photo, (y * step + row) * photo->camera.width, photo->camera.width);
         for (size_t x = 0; x < width; x++) {

@@ -11,6 +11,7 @@
 
 #include "common/parallel.h"
 #include "server/gather/probes.h"
+#include "server/scene/photograph_reduce.h"
 #include "server/state/held_out_size.h"
 
 #define PREPARE_SEC 3.0          /* of any room */
@@ -97,7 +98,8 @@ static void plan_all(const struct pace *p, const struct scene *scene) {
     plan_init(p->plan, settings_number(p->settings, "time_limit_sec"));
     for (size_t i = 0; i < scene->photograph_count; i++) {
         const struct camera *c = &scene->photograph[i].camera;
-        pixels += (double)c->width * (double)c->height;
+        double step = (double)camera_step_to(c, photograph_kept_pixels(p->settings));
+        pixels += (double)c->width * (double)c->height / (step * step);
     }
     if (held_out == 0.0 && every > 0.0)
         held_out = held_out_pixels_of_all(scene) / every;

@@ -8,6 +8,7 @@
 #include "server/ingest/photo_color.h"
 #include "server/ingest/photos.h"
 #include "server/ingest/pixels.h"
+#include "server/scene/photograph_reduce.h"
 #include "server/scene/select.h"
 #include "server/worker/pixel_memory.h"
 
@@ -30,6 +31,25 @@ static enum status select_parts(struct progress *progress, const struct settings
     return STATUS_OK;
 }
 
+static void tell_reduced(struct progress *progress, const struct scene *scene) {
+    size_t count = 0;
+    const struct photograph *last = NULL;
+    for (size_t i = 0; i < scene->photograph_count; i++) {
+        if (scene->photograph[i].file.step > 1) {
+            last = &scene->photograph[i];
+            count++;
+        }
+    }
+    if (count == 0)
+        return;
+    char *text = mem_printf("photographs: %zu of %zu are reduced, %s from %u x %u to %u x %u pixels "
+                            "(photograph_megapixels)",
+                            count, scene->photograph_count, last->name, last->file.width, last->file.height,
+                            last->camera.width, last->camera.height);
+    progress_log(progress, "info", text);
+    mem_free(text);
+}
+
 static void tell_pixels(struct progress *progress, struct spill *spill, const struct scene *scene) {
     uint64_t bytes = spill_file_bytes(spill);
     if (bytes == 0)
@@ -47,6 +67,7 @@ enum status load_scene(const struct order *order, struct progress *progress, str
     struct bundle_limits limits = bundle_default_limits();
     pixels_use(spill, &limits);
     limits.later_bytes = PHOTOGRAPH_LATER_BYTES;
+    limits.kept_pixels = photograph_kept_pixels(settings);
     struct reading reading;
     const char *transforms = settings_text(settings, "transforms");
     enum status status = reading_parse(order->reading, &reading, err);
@@ -81,7 +102,9 @@ enum status load_scene(const struct order *order, struct progress *progress, str
         mem_free(text);
     }
     mem_free(color);
-    if (status == STATUS_OK)
+    if (status == STATUS_OK) {
+        tell_reduced(progress, scene);
         tell_pixels(progress, spill, scene);
+    }
     return status;
 }

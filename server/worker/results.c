@@ -39,7 +39,7 @@ void results_make(struct export_input *input, const struct reconstruction *r, co
     struct export_camera *camera = mem_array(r->scene->photograph_count, sizeof *camera);
     for (size_t i = 0; i < r->scene->photograph_count; i++) {
         const struct photograph *p = &r->scene->photograph[i];
-        camera[i] = (struct export_camera){p->name, &p->camera, p->is_test};
+        camera[i] = (struct export_camera){p->name, photograph_file_camera(p), p->is_test};
     }
     *input = results_so_far(r, title);
     input->camera = camera;

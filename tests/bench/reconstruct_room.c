@@ -13,6 +13,7 @@
 #include "common/mem.h"
 #include "server/ingest/bundle.h"
 #include "server/ingest/pixels.h"
+#include "server/scene/photograph_reduce.h"
 #include "server/worker/results.h"
 #include "server/worker/working_time.h"
 
@@ -137,6 +138,8 @@ static enum status run(int argc, char **argv, struct error *err) {
     if (spill)
         pixels_use(spill, &limits);
     limits.later_bytes = PHOTOGRAPH_LATER_BYTES;
+    if (status == STATUS_OK)
+        limits.kept_pixels = photograph_kept_pixels(&settings);
     struct reading reading = reading_default();
     reading.transforms = mem_strdup(settings_text(&settings, "transforms"));
     cJSON *problems = cJSON_CreateArray(); /* err has the first */
@@ -145,6 +148,9 @@ static enum status run(int argc, char **argv, struct error *err) {
     cJSON_Delete(problems);
     reading_release(&reading);
     printf("loaded in %.1f s\n", clock_sec() - begin);
+    for (size_t i = 0; i < scene.photograph_count && i < 1; i++)
+        printf("the first photograph has %u x %u pixels\n", scene.photograph[i].camera.width,
+               scene.photograph[i].camera.height);
     if (status == STATUS_OK)
         status = reconstruct_run(&scene, &settings, pool, &hooks, &r, err);
     if (status == STATUS_OK)

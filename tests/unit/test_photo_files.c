@@ -12,10 +12,14 @@
 static char work[64];
 static struct parallel *pool;
 static struct scene scene;
-static char told[16384]; /* problems and warnings of the last bundle, a line each */
+static double kept_pixels;  /* of a photograph; 0: all */
+static struct spill *spill; /* NULL: memory */
+static char told[16384];    /* problems and warnings of the last bundle, a line each */
 
 static bool load(const char *dir) {
     struct bundle_limits limits = bundle_default_limits();
+    limits.kept_pixels = kept_pixels;
+    limits.spill = spill;
     cJSON *problems = cJSON_CreateArray(), *problem;
     struct error err = {.message = ""};
     scene_release(&scene);
@@ -106,6 +110,46 @@ static void turned(void) {
     CHECK_THAT(scene.photograph[0].camera.width == 16 && strstr(told, "turned by"), "%s", told);
     CHECK(load_copies(JPEG, "\"fl_x\":20,\"cx\":12,\"cy\":8") && scene.photograph[0].camera.width == 24);
     CHECK(load_copies(JPEG, "\"fl_x\":20") && scene.photograph[0].camera.width == 24);
+}
+
+/* Photographs of more pixels than are kept are means of theirs, in a file as in memory; the camera of the file stays known. */
+static void reduced(void) {
+    struct image image;
+    CHECK(image_read_photograph(PLAIN, &image, NULL, NULL) == STATUS_OK);
+    for (int is_in_file = 0; is_in_file < 2; is_in_file++) {
+        struct spill_limits limits = {.memory_bytes = 1};
+        kept_pixels = 96.0;
+        spill = is_in_file ? spill_new(work, &limits) : NULL;
+        CHECK(load_copies(PLAIN, "\"w\":24,\"h\":16,\"fl_x\":20,\"cx\":11.5,\"cy\":8.25") &&
+              scene.photograph_count == 5);
+        check_lens(10, 10, 5.75, 4.125);
+        for (size_t i = 0; i < scene.photograph_count; i++) {
+            const struct photograph *p = &scene.photograph[i];
+            struct camera file = photograph_file_camera(p);
+            CHECK(p->camera.width == 12 && p->camera.height == 8 && p->name && !p->saturated && p->clipped);
+            CHECK(file.width == 24 && file.height == 16 && file.fx == 20.0f && file.cx == 11.5f && file.cy == 8.25f);
+            size_t wrong = 0;
+            for (uint32_t y = 0; y < 8; y++)
+                for (uint32_t x = 0; x < 12; x++) {
+                    float mean = 0.0f;
+                    for (uint32_t k = 0; k < 4; k++)
+                        mean += 0.25f * image_srgb_to_linear(
+                                            image.pixel[((size_t)(2 * y + k / 2) * 24 + 2 * x + k % 2) * 3 + 1]);
+                    wrong += fabsf(image_float_from_half(p->pixel[y * 12 + x][1]) - mean) > 1e-3f;
+                }
+            CHECK_THAT(wrong == 0, "%zu pixels are no means", wrong);
+        }
+        kept_pixels = 383.0;
+        CHECK(load_copies(PLAIN, "\"fl_x\":20") && scene.photograph[0].camera.width == 12);
+        kept_pixels = 384.0;
+        CHECK(load_copies(PLAIN, "\"fl_x\":20") && scene.photograph[0].camera.width == 24);
+        CHECK(scene.photograph[0].file.step <= 1 && photograph_file_camera(&scene.photograph[0]).width == 24);
+        scene_release(&scene);
+        spill_free(spill);
+    }
+    kept_pixels = 0.0;
+    spill = NULL;
+    image_release(&image);
 }
 
 /* All eight orientations against the definition of each: where the stored first row and first column are seen. */
@@ -293,6 +337,7 @@ int main(void) {
     put("mesh.ply", MESH, strlen(MESH));
     orientations();
     turned();
+    reduced();
     scaled();
     cropped();
     broken();

@@ -24,7 +24,7 @@ static struct photograph make(void) {
 
 static void test_means(void) {
     struct photograph p = make(), small;
-    photograph_reduce(&p, 2, &small);
+    photograph_reduce(&p, 2, NULL, &small);
     CHECK(small.camera.width == 3 && small.camera.height == 2);
     struct photograph_sample s;
     for (uint32_t y = 0; y < 2; y++) {
@@ -37,7 +37,7 @@ static void test_means(void) {
     }
     photograph_release(&small);
     p.black = 0.25f; /* read as the stored 0 is, once */
-    photograph_reduce(&p, 2, &small);
+    photograph_reduce(&p, 2, NULL, &small);
     CHECK(photograph_sample(&small, 0.5f, 0.5f, &s));
     CHECK_NEAR(s.radiance.r, 0.5 * (0.5 - 0.125), 1e-6);
     CHECK_NEAR(s.radiance.b, 0.5 * -0.25, 1e-6);
@@ -57,7 +57,7 @@ static void test_left_out(void) {
     for (int y = 2; y < 4; y++)
         for (int x = 0; x < 2; x++)
             p.pixel[7 * y + x][0] = image_half_from_float(100.0f + (float)x);
-    photograph_reduce(&p, 2, &small);
+    photograph_reduce(&p, 2, NULL, &small);
     for (int x = 0; x < 3; x++)
         CHECK(!photograph_sample(&small, (float)x + 0.5f, 0.5f, &s));
     CHECK(photograph_sample(&small, 0.5f, 1.5f, &s));
@@ -89,6 +89,30 @@ static void test_step(void) {
     CHECK(camera_step(&(struct camera){.width = 4000, .height = 3000}) == 3);
     CHECK(camera_step(&(struct camera){.width = 30000, .height = 2}) == 1);
     CHECK(camera_step(&(struct camera){.width = 300000000, .height = 2}) == 2);
+    CHECK(camera_step_to(&(struct camera){.width = 4000, .height = 3000}, 3.2e6) == 2);
+    CHECK(camera_step_to(&(struct camera){.width = 4000, .height = 3000}, 0.0) == 1);
+}
+
+/* As many times more of a large texture; all at the finest quality. */
+static void test_kept(void) {
+    static const struct {
+        const char *settings;
+        double pixels;
+    } of[] = {{"{}", 3.2e6},
+              {"{\"quality\":\"draft\",\"texture_size\":512}", 1.6e6},
+              {"{\"quality\":\"fine\"}", 0.0},
+              {"{\"texture_size\":4096}", 12.8e6},
+              {"{\"photograph_megapixels\":0}", 0.0}};
+    for (size_t i = 0; i < sizeof of / sizeof of[0]; i++) {
+        struct settings settings;
+        struct error err;
+        cJSON *given = cJSON_Parse(of[i].settings);
+        settings_init(&settings);
+        CHECK(settings_apply(&settings, given, NULL, &err) == STATUS_OK);
+        CHECK_NEAR(photograph_kept_pixels(&settings), of[i].pixels, 1.0);
+        settings_release(&settings);
+        cJSON_Delete(given);
+    }
 }
 
 int main(void) {
@@ -96,5 +120,6 @@ int main(void) {
     test_left_out();
     test_camera();
     test_step();
+    test_kept();
     return check_result();
 }
