@@ -207,7 +207,7 @@ paper: ## repeat the paper's experiments (hours; PAPER=short: minutes, to see th
 	@+$(BUILD) all $(B)/tests/bench/reconstruct_room $(B)/tests/bench/perturb_mesh
 	@tests/bench/paper.sh $(B)
 
-many: deps ## reconstruct from 300 photographs of 12 megapixels (hours), print the peak memory; MANY_FACTOR, MANY_MIB
+many: deps ## reconstruct from 300 photographs of 12 megapixels (half an hour), print the peak memory; MANY_FACTOR, MANY_MIB
 	@+$(BUILD) all $(B)/tests/bench/reconstruct_room $(B)/tests/bench/enlarge_room
 	@tests/bench/many_photographs.sh $(B)
 

@@ -1,6 +1,7 @@
 #!/bin/bash
-# Peak memory of a reconstruction from 300 photographs of 12 megapixels, whose pixels (40 GB with what is found of them) lie on
-# the disk. Takes hours on two cores. Prints lines "name value goal better". MANY_FACTOR: size of the photographs, 10 for
+# Peak memory of a reconstruction from 300 photographs of 12 megapixels. They are reduced as a job of draft quality does (1.6
+# megapixels); with photograph_megapixels=0 in MANY_SETTINGS their pixels (40 GB with what is found of them) lie on the disk, and
+# it takes hours. Prints lines "name value goal better". MANY_FACTOR: size of the photographs, 10 for
 # 4000 x 3000; MANY: their number; MANY_MIB: memory for pixels; all smaller for a trial, with MANY_SETTINGS for the job, as
 # MANY=60 MANY_FACTOR=4 MANY_MIB=400 MANY_SETTINGS="texture_size=512 iterations=2 report_samples=1". usage: many_photographs.sh BUILD
 set -u
