@@ -145,6 +145,8 @@ $(B)/tests/fuzz/%: $(B)/obj/tests/fuzz/%.o $(B)/obj/tests/fuzz/seeds.o $(FUZZ_DR
 	@mkdir -p $(@D)
 	$(CC) $(TEST_LDFLAGS) -o $@ $^ $(SERVER_LIBS)
 $(B)/tests/unit/test_image_formats: TEST_LIBS = -lwebpmux
+# Each parallel loop passes through cores.h, which measures it on demand.
+$(B)/tests/bench/reconstruct_room: TEST_LIBS = -Wl,--wrap=parallel_for
 $(B)/tests/bench/perturb_mesh: TEST_LIBS = $(if $(wildcard /usr/include/meshoptimizer.h),-lmeshoptimizer)
 
 # What a test slips under a program of ours.

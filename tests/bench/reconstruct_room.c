@@ -1,7 +1,8 @@
 /* reconstruct_room ROOM OUT [name=value ...] -- one reconstruction without the daemon, for
  * benches and experiments: reads the unpacked bundle ROOM, writes the outputs to OUT, prints the
  * curve and the figures. No checkpoints. Where the environment has ROOM_PIXEL_MIB, pixels of photographs
- * beyond so many MiB lie in a file in OUT. */
+ * beyond so many MiB lie in a file in OUT. Where it has ROOM_CORES, what each stage would gain by so many cores is
+ * printed (cores.h). */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,6 +17,7 @@
 #include "server/scene/photograph_reduce.h"
 #include "server/worker/results.h"
 #include "server/worker/working_time.h"
+#include "tests/bench/cores.h"
 
 struct room_clock {
     double last; /* when a figure was printed */
@@ -34,6 +36,7 @@ static bool never(void *user) {
 
 static void print_stage(void *user, const char *stage) {
     (void)user;
+    cores_begin_stage(stage);
     printf("stage %s\n", stage);
     fflush(stdout);
 }
@@ -131,6 +134,7 @@ static enum status run(int argc, char **argv, struct error *err) {
         status = settings_apply(&settings, object, NULL, err);
     struct parallel *pool = parallel_new(0);
     working_time_init(&clock.worked, parallel_thread_count(pool));
+    cores_begin_stage("load");
     struct scene scene = {0};
     struct reconstruction r = {0};
     struct bundle_limits limits = bundle_default_limits();
@@ -153,8 +157,10 @@ static enum status run(int argc, char **argv, struct error *err) {
                scene.photograph[i].camera.height);
     if (status == STATUS_OK)
         status = reconstruct_run(&scene, &settings, pool, &hooks, &r, err);
+    cores_begin_stage("export");
     if (status == STATUS_OK)
         status = write_outputs(argv[2], &r, err);
+    cores_print();
     if (status == STATUS_OK) {
         char *text = json_page(cJSON_GetObjectItem(r.report, "metrics"));
         struct rusage usage;
@@ -176,6 +182,12 @@ static enum status run(int argc, char **argv, struct error *err) {
 int main(int argc, char **argv) {
     if (argc < 3) {
         fprintf(stderr, "usage: reconstruct_room ROOM OUT [name=value ...]\n");
+        return 2;
+    }
+    const char *wanted = getenv("ROOM_CORES");
+    cores.cores = wanted ? atoi(wanted) : 0;
+    if (cores.cores < 0 || cores.cores > CORES_MAX) {
+        fprintf(stderr, "reconstruct_room: ROOM_CORES is from 1 to %d\n", CORES_MAX);
         return 2;
     }
     struct error err = {0};
