@@ -5,6 +5,7 @@
 
 #include "common/image.h"
 #include "common/mem.h"
+#include "common/ordered.h"
 #include "server/scene/materials.h"
 #include "server/scene/surface.h"
 
@@ -31,14 +32,19 @@ struct grids {
     struct chart_evidence *cell[LEVELS]; /* [2^k][2^k][2^k]; owned */
 };
 
-static void evidence_add(struct chart_evidence *e, const struct measured *m) {
+/* What one texel adds. */
+static struct chart_evidence evidence_of(const struct measured *m) {
     rgb v = measured_value(m);
     double weight = MIXING_FLOOR / (MIXING_FLOOR + (double)image_float_from_half(m->mixing));
-    e->color[0] += weight * (double)v.r;
-    e->color[1] += weight * (double)v.g;
-    e->color[2] += weight * (double)v.b;
-    e->squares += weight * (double)rgb_dot(v, v);
-    e->weight += weight;
+    return (struct chart_evidence){
+        {weight * (double)v.r, weight * (double)v.g, weight * (double)v.b}, weight * (double)rgb_dot(v, v), weight};
+}
+
+static void evidence_add(struct chart_evidence *sum, const struct chart_evidence *e) {
+    for (int c = 0; c < 3; c++)
+        sum->color[c] += e->color[c];
+    sum->squares += e->squares;
+    sum->weight += e->weight;
 }
 
 static struct color_prior prior_of(const struct chart_evidence *e) {
@@ -50,7 +56,7 @@ static struct color_prior prior_of(const struct chart_evidence *e) {
     return (struct color_prior){mean, fmaxf(variance, MIN_VARIANCE)};
 }
 
-/* --- surroundings -------------------------------------------------------------------------------- */
+/* --- grids --------------------------------------------------------------------------------------- */
 
 static void grids_init(struct grids *g, const struct mesh *mesh) {
     vec3 upper;
@@ -79,83 +85,142 @@ static struct chart_evidence *grids_cell(const struct grids *g, int level, vec3 
     return &g->cell[level][index];
 }
 
-static bool is_known(const struct surface *s, const bool *is_emitter, const struct measured *measured, uint32_t texel) {
-    return measured[texel].weight > 0.0f && !is_emitter[surface_segment(s, texel)];
+/* --- sums over texels ---------------------------------------------------------------------------- */
+
+struct prior_sums {
+    const struct surface *surface;
+    const bool *is_emitter;
+    const struct measured *measured;
+    struct parallel *pool;
+    struct grids grids;
+    struct chart_evidence *around; /* [chart_count] means over the surroundings of each chart's texels */
+    struct chart_evidence *own;    /* [segment_count] over each segment */
+    size_t *texels;                /* [segment_count] of each segment */
+};
+
+/* What a texel contributes. */
+struct term {
+    bool is_there;
+    vec3 position; /* of grids alone */
+    struct chart_evidence evidence;
+};
+
+static bool is_known(const struct prior_sums *s, uint32_t texel) {
+    return s->measured[texel].weight > 0.0f && !s->is_emitter[surface_segment(s->surface, texel)];
 }
 
-static void grids_fill(struct grids *g, const struct surface *s, const bool *is_emitter,
-                       const struct measured *measured) {
-    for (size_t i = 0; i < s->inverse->valid_count; i += STRIDE) {
-        uint32_t texel = s->inverse->valid[i];
-        struct surface_point at;
-        if (!is_known(s, is_emitter, measured, texel) || !surface_at_texel(s->mesh, s->atlas, s->inverse, texel, &at))
-            continue;
-        for (int k = 0; k < LEVELS; k++)
-            evidence_add(grids_cell(g, k, at.position), &measured[texel]);
-    }
+static uint32_t texel_of_grid(const struct prior_sums *s, size_t index) {
+    return s->surface->inverse->valid[index * STRIDE];
 }
 
-/* Means over the surroundings of each chart's texels, each from the finest grid that has enough measurements there. */
-static struct chart_evidence *around_charts(const struct surface *s, const struct grids *g) {
-    struct chart_evidence *around = mem_calloc(s->atlas->chart_count, sizeof *around);
-    for (size_t i = 0; i < s->inverse->valid_count; i += STRIDE) {
-        uint32_t texel = s->inverse->valid[i];
-        struct surface_point at;
-        if (!surface_at_texel(s->mesh, s->atlas, s->inverse, texel, &at))
-            continue;
-        int level = LEVELS - 1;
-        while (level > 0 && !(grids_cell(g, level, at.position)->weight > MIN_WEIGHT))
-            level--;
-        const struct chart_evidence *cell = grids_cell(g, level, at.position);
-        if (!(cell->weight > 0.0))
-            continue;
-        struct chart_evidence *to = &around[surface_chart(s, texel)];
-        for (int c = 0; c < 3; c++)
-            to->color[c] += cell->color[c] / cell->weight;
-        to->squares += cell->squares / cell->weight;
-        to->weight += 1.0;
-    }
-    return around;
+static size_t count_of_grid(const struct prior_sums *s) {
+    return (s->surface->inverse->valid_count + STRIDE - 1) / STRIDE;
 }
 
-/* --- segments ------------------------------------------------------------------------------------ */
-
-/* Sums over each segment, and its number of texels. */
-static struct chart_evidence *of_segments(const struct surface *s, const bool *is_emitter,
-                                          const struct measured *measured, size_t *texels) {
-    struct chart_evidence *own = mem_calloc(s->segments->count, sizeof *own);
-    for (size_t i = 0; i < s->inverse->valid_count; i++) {
-        uint32_t texel = s->inverse->valid[i];
-        texels[surface_segment(s, texel)]++;
-        if (is_known(s, is_emitter, measured, texel))
-            evidence_add(&own[surface_segment(s, texel)], &measured[texel]);
-    }
-    return own;
+static bool position_of(const struct prior_sums *s, uint32_t texel, vec3 *position) {
+    struct surface_point at;
+    if (!surface_at_texel(s->surface->mesh, s->surface->atlas, s->surface->inverse, texel, &at))
+        return false;
+    *position = at.position;
+    return true;
 }
+
+static void grid_term(void *user, size_t index, void *result) {
+    const struct prior_sums *s = user;
+    uint32_t texel = texel_of_grid(s, index);
+    struct term *term = result;
+    term->is_there = is_known(s, texel) && position_of(s, texel, &term->position);
+    if (term->is_there)
+        term->evidence = evidence_of(&s->measured[texel]);
+}
+
+static void add_to_grids(void *user, size_t index, const void *result) {
+    (void)index;
+    const struct prior_sums *s = user;
+    const struct term *term = result;
+    for (int k = 0; k < LEVELS && term->is_there; k++)
+        evidence_add(grids_cell(&s->grids, k, term->position), &term->evidence);
+}
+
+/* The mean of the finest grid that has enough measurements there. */
+static void surroundings_term(void *user, size_t index, void *result) {
+    const struct prior_sums *s = user;
+    struct term *term = result;
+    term->is_there = position_of(s, texel_of_grid(s, index), &term->position);
+    if (!term->is_there)
+        return;
+    int level = LEVELS - 1;
+    while (level > 0 && !(grids_cell(&s->grids, level, term->position)->weight > MIN_WEIGHT))
+        level--;
+    const struct chart_evidence *cell = grids_cell(&s->grids, level, term->position);
+    term->is_there = cell->weight > 0.0;
+    for (int c = 0; c < 3; c++)
+        term->evidence.color[c] = cell->color[c] / cell->weight;
+    term->evidence.squares = cell->squares / cell->weight;
+    term->evidence.weight = 1.0;
+}
+
+static void add_to_chart(void *user, size_t index, const void *result) {
+    const struct prior_sums *s = user;
+    const struct term *term = result;
+    if (term->is_there)
+        evidence_add(&s->around[surface_chart(s->surface, texel_of_grid(s, index))], &term->evidence);
+}
+
+static void own_term(void *user, size_t index, void *result) {
+    const struct prior_sums *s = user;
+    uint32_t texel = s->surface->inverse->valid[index];
+    struct term *term = result;
+    term->is_there = is_known(s, texel);
+    if (term->is_there)
+        term->evidence = evidence_of(&s->measured[texel]);
+}
+
+static void add_to_segment(void *user, size_t index, const void *result) {
+    const struct prior_sums *s = user;
+    const struct term *term = result;
+    uint32_t segment = surface_segment(s->surface, s->surface->inverse->valid[index]);
+    s->texels[segment]++;
+    if (term->is_there)
+        evidence_add(&s->own[segment], &term->evidence);
+}
+
+static void sums_make(struct prior_sums *s) {
+    s->texels = mem_calloc(s->surface->segments->count, sizeof *s->texels);
+    s->own = mem_calloc(s->surface->segments->count, sizeof *s->own);
+    s->around = mem_calloc(s->surface->atlas->chart_count, sizeof *s->around);
+    grids_init(&s->grids, s->surface->mesh);
+    ordered_for(s->pool, s->surface->inverse->valid_count, sizeof(struct term), own_term, add_to_segment, s);
+    ordered_for(s->pool, count_of_grid(s), sizeof(struct term), grid_term, add_to_grids, s);
+    ordered_for(s->pool, count_of_grid(s), sizeof(struct term), surroundings_term, add_to_chart, s);
+}
+
+static void sums_release(struct prior_sums *s) {
+    grids_release(&s->grids);
+    mem_free(s->around);
+    mem_free(s->own);
+    mem_free(s->texels);
+}
+
+/* --- priors -------------------------------------------------------------------------------------- */
 
 static struct color_prior mix(struct color_prior a, struct color_prior b, float part_of_b) {
     return (struct color_prior){rgb_mad(rgb_scale(a.mean, 1.0f - part_of_b), part_of_b, b.mean),
                                 a.variance + part_of_b * (b.variance - a.variance)};
 }
 
-struct color_prior *color_priors(const struct surface *s, const bool *is_emitter, const struct measured *measured) {
-    struct grids grids;
-    size_t *texels = mem_calloc(s->segments->count, sizeof *texels);
-    struct chart_evidence *own = of_segments(s, is_emitter, measured, texels);
-    grids_init(&grids, s->mesh);
-    grids_fill(&grids, s, is_emitter, measured);
-    struct chart_evidence *around = around_charts(s, &grids);
-    struct color_prior *prior = mem_array(s->atlas->chart_count, sizeof *prior);
-    for (size_t i = 0; i < s->mesh->triangle_count; i++) {
-        size_t chart = s->atlas->chart_of_triangle[i], segment = s->segments->of_triangle[i];
-        double share = own[segment].weight / ((double)texels[segment] + 1.0) / SHARE_KNOWN;
+struct color_prior *color_priors(const struct surface *surface, const bool *is_emitter, const struct measured *measured,
+                                 struct parallel *pool) {
+    struct prior_sums s = {.surface = surface, .is_emitter = is_emitter, .measured = measured, .pool = pool};
+    sums_make(&s);
+    struct color_prior *prior = mem_array(surface->atlas->chart_count, sizeof *prior);
+    for (size_t i = 0; i < surface->mesh->triangle_count; i++) {
+        size_t chart = surface->atlas->chart_of_triangle[i], segment = surface->segments->of_triangle[i];
+        double share = s.own[segment].weight / ((double)s.texels[segment] + 1.0) / SHARE_KNOWN;
         prior[chart] = is_emitter[segment] ? (struct color_prior){rgb_gray(NEUTRAL_BASE_COLOR), 1.0f}
-                                           : mix(prior_of(&around[chart]), prior_of(&own[segment]),
+                                           : mix(prior_of(&s.around[chart]), prior_of(&s.own[segment]),
                                                  (float)(share * share / (1.0 + share * share)));
     }
-    mem_free(around);
-    mem_free(own);
-    mem_free(texels);
-    grids_release(&grids);
+    sums_release(&s);
     return prior;
 }

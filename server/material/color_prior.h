@@ -6,11 +6,12 @@
 #ifndef UNBAKE_MATERIAL_COLOR_PRIOR_H
 #define UNBAKE_MATERIAL_COLOR_PRIOR_H
 
+#include "common/parallel.h"
 #include "server/material/denoise.h"
 #include "server/scene/surface.h"
 
 /* [chart_count] from measured[height][width]; the caller's. Emitters get NEUTRAL_BASE_COLOR. */
-struct color_prior *color_priors(const struct surface *surface, const bool *is_emitter,
-                                 const struct measured *measured);
+struct color_prior *color_priors(const struct surface *surface, const bool *is_emitter, const struct measured *measured,
+                                 struct parallel *pool);
 
 #endif

@@ -375,7 +375,7 @@ void divide_finish(struct divide *d) {
     const struct surface *s = &d->surface;
     for (size_t i = 0; i < s->inverse->valid_count; i++)
         d->measured[s->inverse->valid[i]] = d->measured[source_texel(d, s->inverse->valid[i])];
-    struct color_prior *prior = color_priors(s, d->is_emitter, d->measured);
+    struct color_prior *prior = color_priors(s, d->is_emitter, d->measured, d->pool);
     if (d->denoises)
         denoise(s->atlas, s->inverse, s->mesh->triangle_count, d->measured, prior, NULL, &d->materials->base_color,
                 d->stride, d->materials->deviation, d->pool);

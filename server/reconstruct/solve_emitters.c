@@ -1,9 +1,11 @@
 /* solve_emitters.c -- see solve_emitters.h. */
 #include "server/reconstruct/solve_emitters.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "common/mem.h"
+#include "common/ordered.h"
 #include "server/light/changing_light.h"
 #include "server/light/lambert_mean.h"
 #include "server/light/sky_doubt.h"
@@ -49,28 +51,51 @@ void solve_emitters_light(struct solve_emitters *s) {
     world_update_lights(&r->world);
 }
 
-/* Fills evidence.lambert with means over the observed texels; all texels of a segment that was observed only in mixed
- * pixels, such as a lamp thinner than a pixel. */
+struct lambert_sums {
+    const struct solve_emitters *emitters;
+    struct lambert_mean *sum; /* [segment_count] */
+};
+
+static uint32_t evidence_texel(const struct reconstruction *r, size_t index) {
+    return r->inverse.valid[index * EVIDENCE_STRIDE];
+}
+
+/* Lambert radiance of a texel that is observed, or of any of a segment that was observed only in mixed pixels, such as
+ * a lamp thinner than a pixel; else NAN. */
+static void find_lambert(void *user, size_t index, void *result) {
+    const struct lambert_sums *sums = user;
+    const struct reconstruction *r = sums->emitters->r;
+    uint32_t texel = evidence_texel(r, index);
+    rgb *lambert = result;
+    bool is_seen = r->fused.count[texel] > 0.0f || r->evidence[reconstruction_segment(r, texel)].only_mixed;
+    if (!is_seen || !divide_lambert(sums->emitters->divide, texel, lambert))
+        *lambert = rgb_gray(NAN);
+}
+
+static void add_lambert(void *user, size_t index, const void *result) {
+    const struct lambert_sums *sums = user;
+    const struct reconstruction *r = sums->emitters->r;
+    uint32_t texel = evidence_texel(r, index);
+    size_t segment = reconstruction_segment(r, texel);
+    const rgb *lambert = result;
+    if (!isnan(lambert->r))
+        lambert_mean_add(&sums->sum[segment], &r->evidence[segment], fused_radiance(&r->fused, texel), *lambert);
+}
+
+/* Fills evidence.lambert with means over the texels. */
 static void average_lambert(const struct solve_emitters *s) {
     const struct reconstruction *r = s->r;
-    struct lambert_mean *sum = mem_calloc(r->segments.count, sizeof *sum);
-    for (size_t i = 0; i < r->inverse.valid_count; i += EVIDENCE_STRIDE) {
-        uint32_t texel = r->inverse.valid[i];
-        size_t segment = reconstruction_segment(r, texel);
-        rgb lambert;
-        bool is_seen = r->fused.count[texel] > 0.0f || r->evidence[segment].only_mixed;
-        if (!is_seen || !divide_lambert(s->divide, texel, &lambert))
-            continue;
-        lambert_mean_add(&sum[segment], &r->evidence[segment], fused_radiance(&r->fused, texel), lambert);
-    }
+    struct lambert_sums sums = {s, mem_calloc(r->segments.count, sizeof *sums.sum)};
+    ordered_for(r->pool, (r->inverse.valid_count + EVIDENCE_STRIDE - 1) / EVIDENCE_STRIDE, sizeof(rgb), find_lambert,
+                add_lambert, &sums);
     for (size_t i = 0; i < r->segments.count; i++) {
         struct emitter_evidence *e = &r->evidence[i];
         rgb lambert;
-        if (!lambert_mean_of(&sum[i], &lambert))
+        if (!lambert_mean_of(&sums.sum[i], &lambert))
             lambert = e->radiance; /* without evidence a segment counts as a reflector */
         evidence_set_lambert(e, lambert);
     }
-    mem_free(sum);
+    mem_free(sums.sum);
 }
 
 struct decision {

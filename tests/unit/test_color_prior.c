@@ -71,7 +71,7 @@ int main(void) {
     show_from(SIDE * SIDE / 10, FRAME, 0.5f, 0.25f);
 
     const struct surface surface = reconstruction_surface(&r);
-    struct color_prior *prior = color_priors(&surface, is_emitter, measured);
+    struct color_prior *prior = color_priors(&surface, is_emitter, measured, r.pool);
     CHECK_THAT(fabsf(prior[WHITE].mean.g - 0.9f) < 0.01f, "%g", (double)prior[WHITE].mean.g);
     CHECK_THAT(fabsf(prior[BLACK].mean.g - 0.05f) < 0.01f, "%g", (double)prior[BLACK].mean.g);
     CHECK_THAT(prior[BLACK].variance < 0.01f, "%g", (double)prior[BLACK].variance);
@@ -80,23 +80,29 @@ int main(void) {
     CHECK_THAT(prior[FRAME].mean.g < 0.05f, "%g", (double)prior[FRAME].mean.g);
     CHECK_THAT(prior[LAMP].mean.g > 0.3f && prior[LAMP].mean.g < 0.7f, "%g", (double)prior[LAMP].mean.g);
 
+    struct parallel *three = parallel_new(3);
+    struct color_prior *again = color_priors(&surface, is_emitter, measured, three);
+    CHECK(memcmp(prior, again, WALLS * sizeof *prior) == 0);
+    mem_free(again);
+    parallel_free(three);
+
     /* Its own mean counts with the square of the share of its texels that is known: of one black texel among 1024, beside a
      * white wall, with .325^2 / (1 + .325^2) and not .325 / 1.325. (It is none that the grids take in.) */
     mem_free(prior);
     measured[HIDDEN * SIDE * SIDE + 1] = (struct measured){.weight = 1.0f};
     CHECK((HIDDEN * SIDE * SIDE + 1) % 3 != 0);
     double share = 1.0 / 1025.0 / 0.003, part = share * share / (1.0 + share * share);
-    prior = color_priors(&surface, is_emitter, measured);
+    prior = color_priors(&surface, is_emitter, measured, r.pool);
     float beside = prior[HIDDEN].mean.g;
     measured[HIDDEN * SIDE * SIDE + 1] = (struct measured){0};
     mem_free(prior);
-    prior = color_priors(&surface, is_emitter, measured);
+    prior = color_priors(&surface, is_emitter, measured, r.pool);
     CHECK_NEAR(beside / prior[HIDDEN].mean.g, 1.0 - part, 0.01);
 
     /* Where nothing is known at all, grey; and nothing is known well. */
     mem_free(prior);
     memset(measured, 0, sizeof measured);
-    prior = color_priors(&surface, is_emitter, measured);
+    prior = color_priors(&surface, is_emitter, measured, r.pool);
     for (int w = 0; w < WALLS; w++)
         CHECK_THAT(prior[w].mean.r > 0.3f && prior[w].mean.r < 0.7f && prior[w].variance > 0.1f, "%d", w);
     mem_free(prior);
