@@ -5,10 +5,8 @@
 #include <string.h>
 
 #include "common/mem.h"
-#include "server/capture/conjugate.h"
 #include "server/scene/rgb_half.h"
 
-#define NONE UINT32_MAX
 /* Prior standard deviations of logarithms, by kind: of a cell's factor, and of its difference from a neighbour's. Light
  * may be off by 20 %, in tint by 3 %; along a line of cells the differences add up to that over 100 cells, in tint over
  * 25. */
@@ -17,10 +15,6 @@ static const double difference_deviation[CORRECTION_KINDS] = {0.02, 0.006};
 /* Observations with the room's mean variance that are added to a cell's own, which are too few for a variance. */
 #define ROOM_OBSERVATIONS 64.0f /* +25 %: +0.01 dB */
 #define MAX_LOG_FACTOR 0.1f     /* bound of a logarithm; +25 %: 0 dB */
-/* Conjugate gradients end at this part of the squared residual, or after MAX_STEPS steps. The wide prior on factors
- * makes the system ill-conditioned. */
-#define RESIDUAL_PART 1e-8 /* +25 %: 0 dB */
-#define MAX_STEPS 2000     /* +25 %: no change */
 #define MIXED_WEIGHT 0.01f /* weight in a cell's light of a texel observed only in mixed pixels; +25 %: no change */
 /* Lower bound of corrected base colour: no factor could raise 0 again. */
 #define MIN_COLOR 0.002f /* +25 %: 0 dB */
@@ -29,12 +23,12 @@ static const double difference_deviation[CORRECTION_KINDS] = {0.02, 0.006};
 
 static uint32_t cell_in(const struct correction *c, long column, long row, uint32_t chart) {
     if (column < 0 || row < 0 || column >= (long)c->columns || row >= (long)c->rows)
-        return NONE;
+        return MARKOV_NONE;
     size_t block = (size_t)row * c->columns + (size_t)column;
     for (uint32_t k = c->first[block]; k < c->first[block + 1]; k++)
-        if (c->cell[k].chart == chart)
+        if (c->chart[k] == chart)
             return k;
-    return NONE;
+    return MARKOV_NONE;
 }
 
 static uint32_t cell_of(const struct correction *c, uint32_t texel) {
@@ -51,13 +45,13 @@ static void add_cells(struct correction *c, size_t block, size_t *capacity) {
     for (uint32_t y = y0; y < y0 + c->spacing && y < inverse->height; y++) {
         for (uint32_t x = x0; x < x0 + c->spacing && x < inverse->width; x++) {
             uint32_t triangle = inverse->triangle[(size_t)y * inverse->width + x];
-            if (triangle == INVERSE_UV_NONE || cell_of(c, y * inverse->width + x) != NONE)
+            if (triangle == INVERSE_UV_NONE || cell_of(c, y * inverse->width + x) != MARKOV_NONE)
                 continue;
             if (c->count == *capacity) {
                 *capacity *= 2;
-                c->cell = mem_realloc_array(c->cell, *capacity, sizeof *c->cell);
+                c->chart = mem_realloc_array(c->chart, *capacity, sizeof *c->chart);
             }
-            c->cell[c->count++] = (struct correction_cell){.chart = c->chart_of_triangle[triangle]};
+            c->chart[c->count++] = c->chart_of_triangle[triangle];
             c->first[block + 1] = (uint32_t)c->count;
         }
     }
@@ -66,11 +60,10 @@ static void add_cells(struct correction *c, size_t block, size_t *capacity) {
 static void find_neighbours(struct correction *c, size_t block) {
     long column = (long)(block % c->columns), row = (long)(block / c->columns);
     for (uint32_t k = c->first[block]; k < c->first[block + 1]; k++) {
-        struct correction_cell *cell = &c->cell[k];
-        cell->neighbour[0] = cell_in(c, column - 1, row, cell->chart);
-        cell->neighbour[1] = cell_in(c, column + 1, row, cell->chart);
-        cell->neighbour[2] = cell_in(c, column, row - 1, cell->chart);
-        cell->neighbour[3] = cell_in(c, column, row + 1, cell->chart);
+        c->neighbour[k][0] = cell_in(c, column - 1, row, c->chart[k]);
+        c->neighbour[k][1] = cell_in(c, column + 1, row, c->chart[k]);
+        c->neighbour[k][2] = cell_in(c, column, row - 1, c->chart[k]);
+        c->neighbour[k][3] = cell_in(c, column, row + 1, c->chart[k]);
     }
 }
 
@@ -84,11 +77,13 @@ void correction_init(struct correction *c, struct texture *base_color, const str
                              .rows = (inverse->height + spacing - 1) / spacing};
     size_t blocks = (size_t)c->columns * c->rows, capacity = blocks;
     c->first = mem_calloc(blocks + 1, sizeof *c->first);
-    c->cell = mem_array(capacity, sizeof *c->cell);
+    c->chart = mem_array(capacity, sizeof *c->chart);
     for (size_t block = 0; block < blocks; block++)
         add_cells(c, block, &capacity);
+    c->neighbour = mem_array(c->count + 1, sizeof *c->neighbour);
     for (size_t block = 0; block < blocks; block++)
         find_neighbours(c, block);
+    markov_field_init(&c->field, c->count, (const uint32_t(*)[4])c->neighbour);
     c->sums = mem_calloc(c->count, sizeof *c->sums);
     c->solved = mem_calloc_large((size_t)inverse->width * inverse->height, sizeof *c->solved);
     c->light = mem_calloc(c->count, sizeof *c->light);
@@ -96,7 +91,9 @@ void correction_init(struct correction *c, struct texture *base_color, const str
 
 void correction_release(struct correction *c) {
     mem_free(c->first);
-    mem_free(c->cell);
+    mem_free(c->chart);
+    mem_free(c->neighbour);
+    markov_field_release(&c->field);
     mem_free(c->sums);
     mem_free(c->solved);
     mem_free(c->light);
@@ -169,36 +166,6 @@ void correction_add(struct correction *c, uint32_t texel, const struct compariso
 
 /* --- factors ------------------------------------------------------------------------------------ */
 
-/* Normal equations of the logarithms of one kind (and channel, of a tint): terms of observations, prior and
- * neighbours. */
-struct normal_equations {
-    const struct correction *correction;
-    double prior, smoothness; /* inverse prior variances */
-    double *precision;        /* [count] inverse variances of the observations */
-};
-
-static void equations_multiply(const void *user, const double *value, double *out) {
-    const struct normal_equations *l = user;
-    for (size_t i = 0; i < l->correction->count; i++) {
-        out[i] = (l->precision[i] + l->prior) * value[i];
-        for (int k = 0; k < 4; k++) {
-            uint32_t neighbour = l->correction->cell[i].neighbour[k];
-            out[i] += neighbour == NONE ? 0.0 : l->smoothness * (value[i] - value[neighbour]);
-        }
-    }
-}
-
-/* Jacobi preconditioner. */
-static void equations_precondition(const void *user, const double *residual, double *out) {
-    const struct normal_equations *l = user;
-    for (size_t i = 0; i < l->correction->count; i++) {
-        double diagonal = l->precision[i] + l->prior;
-        for (int k = 0; k < 4; k++)
-            diagonal += l->correction->cell[i].neighbour[k] == NONE ? 0.0 : l->smoothness;
-        out[i] = residual[i] / diagonal;
-    }
-}
-
 /* Mean squared residual of all observations. */
 static void room_variance(const struct correction *c, float variance[CORRECTION_KINDS]) {
     double weight = 0.0, squared[CORRECTION_KINDS] = {0.0};
@@ -224,53 +191,60 @@ static void log_ratios(const struct correction_sums *s, float log_ratio[3]) {
         log_ratio[k] = s->observed[k] > 0.0f && s->rendered[k] > 0.0f ? logf(s->observed[k] / s->rendered[k]) : 0.0f;
 }
 
-/* Logarithms by gray, and by the tints of the three channels: four independent systems, solved at once. */
-enum { SYSTEM_GRAY, SYSTEM_TINTS, SYSTEMS = SYSTEM_TINTS + 3 };
+/* Logarithms by gray, and by the tints of the three channels: four fields. */
+enum { FIELD_GRAY, FIELD_TINTS, FIELDS = FIELD_TINTS + 3 };
 
 struct factor_job {
     const struct correction *correction;
     float room[CORRECTION_KINDS];
-    double *value[SYSTEMS]; /* [count] the solutions; owned */
+    double *value[FIELDS]; /* [count] what was observed, then the field; owned, both */
+    double *precision[FIELDS];
 };
 
-/* Starts from 0, not from the previous solution, so that applying twice gives the same result. */
-static void solve_system(void *user, size_t number, int thread) {
-    const struct factor_job *job = user;
+static int kind_of(size_t field) { return field == FIELD_GRAY ? CORRECTION_GRAY : CORRECTION_TINT; }
+
+static void observe(struct factor_job *job) {
     const struct correction *c = job->correction;
-    int kind = number == SYSTEM_GRAY ? CORRECTION_GRAY : CORRECTION_TINT;
-    int channel = number == SYSTEM_GRAY ? 0 : (int)number - SYSTEM_TINTS;
-    struct normal_equations l = {.correction = c,
-                                 .prior = 1.0 / (factor_deviation[kind] * factor_deviation[kind]),
-                                 .smoothness = 1.0 / (difference_deviation[kind] * difference_deviation[kind]),
-                                 .precision = mem_array(c->count, sizeof *l.precision)};
-    const struct conjugate_system system = {c->count, equations_multiply, equations_precondition, &l};
-    double *residual = mem_array(c->count, sizeof *residual);
-    (void)thread;
     for (size_t i = 0; i < c->count; i++) {
         float log_ratio[3];
         log_ratios(&c->sums[i], log_ratio);
         float gray = mean_by(log_ratio, c->sums[i].weight);
-        l.precision[i] = (double)precision_of(&c->sums[i], kind, channel, job->room[kind]);
-        residual[i] = l.precision[i] * (double)(kind == CORRECTION_GRAY ? gray : log_ratio[channel] - gray);
+        for (size_t k = 0; k < FIELDS; k++) {
+            int channel = k == FIELD_GRAY ? 0 : (int)k - FIELD_TINTS;
+            job->precision[k][i] = (double)precision_of(&c->sums[i], kind_of(k), channel, job->room[kind_of(k)]);
+            job->value[k][i] = (double)(k == FIELD_GRAY ? gray : log_ratio[channel] - gray);
+        }
     }
-    double goal = RESIDUAL_PART * conjugate_dot(residual, residual, c->count);
-    conjugate_solve(&system, MAX_STEPS, goal, residual, job->value[number]);
-    mem_free(l.precision);
-    mem_free(residual);
+}
+
+/* One field on one part of the cells. */
+static void solve_part(void *user, size_t index, int thread) {
+    const struct factor_job *job = user;
+    size_t k = index % FIELDS;
+    double factor = factor_deviation[kind_of(k)], difference = difference_deviation[kind_of(k)];
+    const struct markov_precision precision = {1.0 / (factor * factor), 1.0 / (difference * difference),
+                                               job->precision[k]};
+    (void)thread;
+    markov_field_solve(&job->correction->field, index / FIELDS, &precision, job->value[k]);
 }
 
 static void find_factors(struct correction *c, struct parallel *pool) {
     struct factor_job job = {.correction = c};
     room_variance(c, job.room);
-    for (size_t k = 0; k < SYSTEMS; k++)
-        job.value[k] = mem_calloc(c->count, sizeof *job.value[k]);
-    parallel_for(pool, SYSTEMS, solve_system, &job);
+    for (size_t k = 0; k < FIELDS; k++) {
+        job.value[k] = mem_array(c->count, sizeof *job.value[k]);
+        job.precision[k] = mem_array(c->count, sizeof *job.precision[k]);
+    }
+    observe(&job);
+    parallel_for(pool, c->field.part_count * FIELDS, solve_part, &job);
     for (size_t i = 0; i < c->count; i++)
         for (size_t k = 0; k < 3; k++)
-            c->sums[i].factor[k] = clampf((float)job.value[SYSTEM_GRAY][i] + (float)job.value[SYSTEM_TINTS + k][i],
+            c->sums[i].factor[k] = clampf((float)job.value[FIELD_GRAY][i] + (float)job.value[FIELD_TINTS + k][i],
                                           -MAX_LOG_FACTOR, MAX_LOG_FACTOR);
-    for (size_t k = 0; k < SYSTEMS; k++)
+    for (size_t k = 0; k < FIELDS; k++) {
+        mem_free(job.precision[k]);
         mem_free(job.value[k]);
+    }
 }
 
 /* --- texels ------------------------------------------------------------------------------------- */
@@ -285,7 +259,7 @@ static void factor_at(const struct correction *c, uint32_t texel, float factor[3
     factor[0] = factor[1] = factor[2] = 0.0f;
     for (int tap = 0; tap < 4; tap++) {
         uint32_t cell = cell_in(c, column + (tap & 1), row + (tap >> 1), chart);
-        if (cell == NONE)
+        if (cell == MARKOV_NONE)
             continue;
         float weight = (tap & 1 ? tx : 1.0f - tx) * (tap & 2 ? ty : 1.0f - ty) + 1e-6f;
         for (int k = 0; k < 3; k++)

@@ -3,8 +3,8 @@
  * Errors that solve leaves are those of light, which vary slowly along a surface. Each cell, the part of a chart in one
  * block of the atlas, sums observed and rendered radiance; their ratio is the factor by which its base colour must
  * change (to first order a surface's radiance is its base colour times its light). A single observation is off by a
- * third, so the logarithms of the factors are the maximum a posteriori of a Gaussian Markov random field (Rue and Held
- * 2005): they are near 0, and near those of the neighbouring cells of the chart. Changes of tint have a narrower prior
+ * third, so the logarithms of the factors are the maximum a posteriori of a Gaussian Markov random field
+ * (markov_field.h): they are near 0, and near those of the neighbouring cells of the chart. Changes of tint have a narrower prior
  * than changes of lightness. Factors are interpolated between the centres of cells; texture within a cell stays.
  *
  * The noise of a cell is measured on its observations; channels are weighted by the noise of all photographs (noise.h).
@@ -19,16 +19,12 @@
 #include "common/parallel.h"
 #include "server/capture/fuse.h"
 #include "server/refine/comparison.h"
+#include "server/refine/markov_field.h"
 #include "server/scene/inverse_uv.h"
 #include "server/scene/texture.h"
 
 /* Lightness, common to all channels, and tint, the channels' differences from it. */
 enum { CORRECTION_GRAY, CORRECTION_TINT, CORRECTION_KINDS };
-
-struct correction_cell {
-    uint32_t chart;
-    uint32_t neighbour[4]; /* cells of the chart left, right, above, below; UINT32_MAX: none */
-};
 
 /* Sums over the observations of a cell. */
 struct correction_sums {
@@ -46,7 +42,9 @@ struct correction {
     uint32_t columns, rows; /* of blocks */
     uint32_t *first;        /* [columns * rows + 1] first cell of a block; owned, as all below */
     size_t count;
-    struct correction_cell *cell; /* [count] by block */
+    uint32_t *chart;              /* [count] of each cell, by block */
+    uint32_t (*neighbour)[4];     /* [count] cells of the chart left, right, above, below; MARKOV_NONE: none */
+    struct markov_field field;    /* the cells' factors */
     struct correction_sums *sums; /* [count] */
     uint16_t (*solved)[3];        /* [height][width] base colour before correction */
     rgb *light;                   /* [count] mean observed radiance of a cell over its mean base colour */
