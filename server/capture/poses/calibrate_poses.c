@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "common/mem.h"
+#include "common/ordered.h"
 #include "server/capture/poses/held_out_poses.h"
 #include "server/capture/poses/pose_solver.h"
 #include "server/capture/poses/pose_walk.h"
@@ -37,10 +38,10 @@ static double shift_of(const struct pose_solver *s, size_t f, const struct camer
     return count ? sqrt(squares / (double)count) : 0.0;
 }
 
-static void run_rounds(struct pose_solver *s, int level, int rounds, struct parallel *pool) {
+static void run_rounds(struct pose_solver *s, int level, int rounds) {
     s->level = level;
     for (int round = 0; round < rounds; round++) {
-        pose_linearise(s, pool);
+        pose_linearise(s);
         pose_reweight(s);
         pose_solve(s);
         for (size_t f = 0; f < s->frames; f++)
@@ -50,33 +51,69 @@ static void run_rounds(struct pose_solver *s, int level, int rounds, struct para
 
 /* --- judgement ------------------------------------------------------------------------------------ */
 
+/* Costs of a photograph at a track, by the others' consensus: at its first camera, NAN where there is none, and now. */
+struct judged {
+    double before, now;
+};
+
+static struct judged judge_observation(const struct pose_solver *s, size_t track, size_t k) {
+    struct pose_observation *observation = s->observation + track * POSE_OBSERVATIONS_MAX + k;
+    const struct pose_frame *frame = &s->frame[observation->frame];
+    struct judged none = {(double)NAN, 0.0};
+    float x, y, depth_m, value = observation->value;
+    double consensus, weight[POSE_OBSERVATIONS_MAX];
+    if (!isfinite(value) || !camera_project(&frame->before, s->track[track]->point, &x, &y, &depth_m))
+        return none;
+    float old = pyramid_value(&s->tracks->pyramid[observation->frame], s->level, x, y);
+    observation->value = NAN; /* leaves it out of the consensus */
+    pose_weigh_track(s, track, &consensus, weight);
+    observation->value = value;
+    if (!isfinite(old) || !isfinite(consensus))
+        return none;
+    return (struct judged){pose_robust_cost((double)old - s->x[observation->offset] - consensus, frame->scale),
+                           pose_robust_cost((double)value - s->x[observation->offset] - consensus, frame->scale)};
+}
+
+struct frame_validations {
+    const struct pose_solver *solver;
+    struct validation *of; /* [frames] */
+};
+
+static void judge_track(void *user, size_t index, void *result) {
+    const struct frame_validations *all = user;
+    const struct pose_solver *s = all->solver;
+    struct judged *judged = result;
+    size_t track = index * POSE_HELD_OUT_EVERY;
+    for (size_t k = 0; k < pose_observation_count(s->track[track]); k++)
+        judged[k] = judge_observation(s, track, k);
+}
+
+static void add_judged(void *user, size_t index, const void *result) {
+    const struct frame_validations *all = user;
+    const struct pose_solver *s = all->solver;
+    const struct judged *judged = result;
+    size_t track = index * POSE_HELD_OUT_EVERY;
+    for (size_t k = 0; k < pose_observation_count(s->track[track]); k++)
+        if (!isnan(judged[k].before))
+            validation_add(&all->of[s->observation[track * POSE_OBSERVATIONS_MAX + k].frame], judged[k].before,
+                           judged[k].now);
+}
+
+static size_t held_out_tracks(const struct pose_solver *s) {
+    return (s->track_count + POSE_HELD_OUT_EVERY - 1) / POSE_HELD_OUT_EVERY;
+}
+
 static void validate_frames(const struct pose_solver *s, struct validation *validation) {
-    for (size_t i = 0; i < s->track_count; i += POSE_HELD_OUT_EVERY) {
-        struct pose_observation *observation = s->observation + i * POSE_OBSERVATIONS_MAX;
-        for (size_t k = 0; k < pose_observation_count(s->track[i]); k++) {
-            const struct pose_frame *frame = &s->frame[observation[k].frame];
-            float x, y, depth_m, value = observation[k].value;
-            double consensus, weight[POSE_OBSERVATIONS_MAX];
-            if (!isfinite(value) || !camera_project(&frame->before, s->track[i]->point, &x, &y, &depth_m))
-                continue;
-            float old = pyramid_value(&s->tracks->pyramid[observation[k].frame], s->level, x, y);
-            observation[k].value = NAN; /* leaves it out of the consensus */
-            pose_weigh_track(s, i, &consensus, weight);
-            observation[k].value = value;
-            if (!isfinite(old) || !isfinite(consensus))
-                continue;
-            double cost = pose_robust_cost((double)old - s->x[observation[k].offset] - consensus, frame->scale);
-            validation_add(&validation[observation[k].frame], cost,
-                           pose_robust_cost((double)value - s->x[observation[k].offset] - consensus, frame->scale));
-        }
-    }
+    struct frame_validations all = {s, validation};
+    ordered_for(s->pool, held_out_tracks(s), POSE_OBSERVATIONS_MAX * sizeof(struct judged), judge_track, add_judged,
+                &all);
 }
 
 /* Resets frames whose correction is small or not significant. */
-static void judge(struct pose_solver *s, struct parallel *pool) {
+static void judge(struct pose_solver *s) {
     struct validation *validation = mem_calloc(s->frames + 1, sizeof *validation);
     s->level = 0;
-    pose_linearise(s, pool);
+    pose_linearise(s);
     pose_reweight(s);
     validate_frames(s, validation);
     for (size_t f = 0; f < s->frames; f++) {
@@ -89,30 +126,39 @@ static void judge(struct pose_solver *s, struct parallel *pool) {
     mem_free(validation);
 }
 
+struct track_costs {
+    const struct pose_solver *solver;
+    double *cost; /* [held-out tracks] mean over its observations; NAN: none */
+};
+
+static void cost_of_track(void *user, size_t index, int thread) {
+    (void)thread;
+    const struct track_costs *costs = user;
+    const struct pose_solver *s = costs->solver;
+    size_t track = index * POSE_HELD_OUT_EVERY;
+    const struct pose_observation *observation = s->observation + track * POSE_OBSERVATIONS_MAX;
+    double consensus, weight[POSE_OBSERVATIONS_MAX], count = 0.0, sum = 0.0;
+    pose_weigh_track(s, track, &consensus, weight);
+    for (size_t k = 0; k < pose_observation_count(s->track[track]) && isfinite(consensus); k++) {
+        if (!isfinite(observation[k].value))
+            continue;
+        sum += pose_robust_cost((double)observation[k].value - s->x[observation[k].offset] - consensus, COMMON_SCALE);
+        count += 1.0;
+    }
+    costs->cost[index] = count > 0.0 ? sum / count : (double)NAN;
+}
+
 /* Robust cost of each held-out track with all frames where they are now and offsets fitted to that. */
-static void costs_now(struct pose_solver *s, struct parallel *pool, double *cost) {
+static void costs_now(struct pose_solver *s, double *cost) {
     bool *is_fixed = mem_array(s->frames + 1, sizeof *is_fixed);
     for (size_t f = 0; f < s->frames; f++) {
         is_fixed[f] = s->frame[f].is_fixed;
         s->frame[f].is_fixed = true;
     }
-    run_rounds(s, 0, 2, pool); /* offsets only: all frames are fixed */
+    run_rounds(s, 0, 2); /* offsets only: all frames are fixed */
     for (size_t f = 0; f < s->frames; f++)
         s->frame[f].is_fixed = is_fixed[f];
-    for (size_t i = 0; i < s->track_count; i += POSE_HELD_OUT_EVERY) {
-        const struct pose_observation *observation = s->observation + i * POSE_OBSERVATIONS_MAX;
-        double consensus, weight[POSE_OBSERVATIONS_MAX], count = 0.0, *sum = &cost[i / POSE_HELD_OUT_EVERY];
-        pose_weigh_track(s, i, &consensus, weight);
-        *sum = 0.0;
-        for (size_t k = 0; k < pose_observation_count(s->track[i]) && isfinite(consensus); k++) {
-            if (!isfinite(observation[k].value))
-                continue;
-            *sum +=
-                pose_robust_cost((double)observation[k].value - s->x[observation[k].offset] - consensus, COMMON_SCALE);
-            count += 1.0;
-        }
-        *sum = count > 0.0 ? *sum / count : NAN;
-    }
+    parallel_for(s->pool, held_out_tracks(s), cost_of_track, &(struct track_costs){s, cost});
     mem_free(is_fixed);
 }
 
@@ -150,13 +196,13 @@ static void free_all(struct pose_solver *s) {
 }
 
 /* Finds all poses anew, coarse to fine, each held to its neighbours' corrections. */
-static void follow_walk(struct pose_solver *s, int coarsest, struct parallel *pool) {
+static void follow_walk(struct pose_solver *s, int coarsest) {
     free_all(s);
     s->walk = pose_walk_begin(s);
-    run_rounds(s, coarsest, POSE_ROUNDS, pool);
+    run_rounds(s, coarsest, POSE_ROUNDS);
     s->walk.is_learnt = true;
     for (int level = coarsest > 0 ? coarsest - 1 : 0; level >= 0; level--)
-        run_rounds(s, level, POSE_ROUNDS, pool);
+        run_rounds(s, level, POSE_ROUNDS);
 }
 
 /* Whether the poses that follow a walk drift, and agree better at held-out tracks. */
@@ -175,7 +221,7 @@ static double shift_along_walk(const struct pose_solver *s, size_t f) {
 }
 
 /* Where photographs were surely moved the tracker may drift: then those that are not sure follow their neighbours. */
-static void add_drift(struct pose_solver *s, size_t held_out_count, int coarsest, struct parallel *pool) {
+static void add_drift(struct pose_solver *s, size_t held_out_count, int coarsest) {
     size_t sure_count = 0;
     for (size_t f = 0; f < s->frames; f++)
         sure_count += !s->frame[f].is_fixed;
@@ -186,9 +232,9 @@ static void add_drift(struct pose_solver *s, size_t held_out_count, int coarsest
     struct pose_frame *sure = mem_array(s->frames, sizeof *sure);
     memcpy(sure, s->frame, s->frames * sizeof *sure);
     memcpy(x, s->x, s->unknowns * sizeof *x);
-    costs_now(s, pool, before);
-    follow_walk(s, coarsest, pool);
-    costs_now(s, pool, now);
+    costs_now(s, before);
+    follow_walk(s, coarsest);
+    costs_now(s, now);
     if (is_drift(s, before, now, held_out_count - 1)) {
         for (size_t f = 0; f < s->frames; f++)
             s->frame[f].shift_px = shift_along_walk(s, f);
@@ -217,21 +263,21 @@ void calibrate_poses(struct scene *scene, const struct tracks *tracks, struct pa
                      struct poses_found *found) {
     struct pose_solver s;
     const struct views *views = tracks->views;
-    pose_solver_init(&s, tracks);
+    pose_solver_init(&s, tracks, pool);
     size_t held_out_count = s.track_count / POSE_HELD_OUT_EVERY + 1;
     double *before = mem_calloc(2 * held_out_count, sizeof *before), *now = before + held_out_count;
-    costs_now(&s, pool, before);
+    costs_now(&s, before);
     for (int level = coarsest_level(tracks); level >= 0; level--)
-        run_rounds(&s, level, POSE_ROUNDS, pool);
-    costs_now(&s, pool, now);
+        run_rounds(&s, level, POSE_ROUNDS);
+    costs_now(&s, now);
     bool convincing = all_improved(before, now, held_out_count - 1);
     mem_free(before);
     for (size_t f = 0; f < s.frames && !convincing; f++)
         pose_reset(&s, f);
-    judge(&s, pool);
-    run_rounds(&s, 0, LAST_ROUNDS, pool);
-    judge(&s, pool);
-    add_drift(&s, held_out_count, coarsest_level(tracks), pool);
+    judge(&s);
+    run_rounds(&s, 0, LAST_ROUNDS);
+    judge(&s);
+    add_drift(&s, held_out_count, coarsest_level(tracks));
     *found = (struct poses_found){.shift = mem_calloc(s.frames + 1, sizeof *found->shift)};
     double squares = 0.0;
     for (size_t f = 0; f < s.frames; f++) {

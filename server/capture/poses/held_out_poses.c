@@ -210,15 +210,19 @@ static void judge(void *user, size_t index, int thread) {
 
 /* --- the whole ------------------------------------------------------------------------------------ */
 
+static void find_consensus(void *user, size_t track, int thread) {
+    (void)thread;
+    const struct held_out_set *all = user;
+    double weight[POSE_OBSERVATIONS_MAX];
+    pose_weigh_track(all->solver, track, &all->consensus[track], weight);
+}
+
 /* Consensus of the tracks at a level, by the training photographs where they are now. */
 static void update_consensus(struct held_out_set *all, struct pose_solver *s, int level, struct parallel *pool) {
     s->level = all->level = level;
-    pose_linearise(s, pool);
+    pose_linearise(s);
     pose_reweight(s);
-    for (size_t i = 0; i < s->track_count; i++) {
-        double weight[POSE_OBSERVATIONS_MAX];
-        pose_weigh_track(s, i, &all->consensus[i], weight);
-    }
+    parallel_for(pool, s->track_count, find_consensus, all);
 }
 
 static size_t init_all(struct held_out_set *all, struct scene *scene) {

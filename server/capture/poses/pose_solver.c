@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "common/mem.h"
+#include "common/ordered.h"
 
 /* Scale of a frame's residuals: so many times the mean absolute residual, which is .8 standard deviations, so that the
  * scale is two of them, as light_fit.h has it; each residual is clamped to so many scales. */
@@ -218,9 +219,7 @@ bool pose_slope(const struct pose_solver *s, size_t track, const struct camera *
     return slope_from(s->along[track], (const float(*)[2])place, g);
 }
 
-void pose_linearise(struct pose_solver *s, struct parallel *pool) {
-    parallel_for(pool, s->track_count, linearise_track, s);
-}
+void pose_linearise(struct pose_solver *s) { parallel_for(s->pool, s->track_count, linearise_track, s); }
 
 /* --- weights ---------------------------------------------------------------------------------- */
 
@@ -262,21 +261,44 @@ void pose_weigh_track(const struct pose_solver *s, size_t track, double *consens
     }
 }
 
+/* Sums of the frames' residuals. */
+struct reweighting {
+    struct pose_solver *solver;
+    double *sum, *count; /* [frames] */
+};
+
+/* Weighs a track's observations; their absolute residuals, NAN where there is none, into the result. */
+static void weigh_observations(void *user, size_t track, void *result) {
+    const struct reweighting *r = user;
+    struct pose_solver *s = r->solver;
+    struct pose_observation *observation = s->observation + track * POSE_OBSERVATIONS_MAX;
+    double consensus, weight[POSE_OBSERVATIONS_MAX], *residual = result;
+    pose_weigh_track(s, track, &consensus, weight);
+    for (size_t k = 0; k < pose_observation_count(s->track[track]); k++) {
+        observation[k].weight = pose_is_held_out(track) ? 0.0f : (float)weight[k];
+        residual[k] = weight[k] <= 0.0 ? (double)NAN
+                                       : fabs((double)observation[k].value - s->x[observation[k].offset] - consensus);
+    }
+}
+
+static void add_residuals(void *user, size_t track, const void *result) {
+    const struct reweighting *r = user;
+    const struct pose_solver *s = r->solver;
+    const struct pose_observation *observation = s->observation + track * POSE_OBSERVATIONS_MAX;
+    const double *residual = result;
+    for (size_t k = 0; k < pose_observation_count(s->track[track]); k++) {
+        if (isnan(residual[k]))
+            continue;
+        uint32_t f = observation[k].frame;
+        r->sum[f] += fmin(residual[k], RESIDUAL_CLAMP * s->frame[f].scale);
+        r->count[f] += 1.0;
+    }
+}
+
 void pose_reweight(struct pose_solver *s) {
     double *sum = mem_calloc(2 * s->frames + 1, sizeof *sum), *count = sum + s->frames;
-    for (size_t i = 0; i < s->track_count; i++) {
-        struct pose_observation *observation = s->observation + i * POSE_OBSERVATIONS_MAX;
-        double consensus, weight[POSE_OBSERVATIONS_MAX];
-        pose_weigh_track(s, i, &consensus, weight);
-        for (size_t k = 0; k < pose_observation_count(s->track[i]); k++) {
-            observation[k].weight = pose_is_held_out(i) ? 0.0f : (float)weight[k];
-            if (weight[k] <= 0.0)
-                continue;
-            double r = fabs((double)observation[k].value - s->x[observation[k].offset] - consensus);
-            sum[observation[k].frame] += fmin(r, RESIDUAL_CLAMP * s->frame[observation[k].frame].scale);
-            count[observation[k].frame] += 1.0;
-        }
-    }
+    struct reweighting r = {s, sum, count};
+    ordered_for(s->pool, s->track_count, POSE_OBSERVATIONS_MAX * sizeof(double), weigh_observations, add_residuals, &r);
     for (size_t f = 0; f < s->frames; f++) {
         if (count[f] > 0.0)
             s->frame[f].scale = fmax(POSE_MIN_SCALE, SCALE_PER_MEAN * sum[f] / count[f]);
@@ -308,9 +330,29 @@ static void init_observations(struct pose_solver *s, size_t index) {
     }
 }
 
-void pose_solver_init(struct pose_solver *s, const struct tracks *tracks) {
+/* Lists the observations of each frame. */
+static void sort_by_frame(struct pose_solver *s) {
+    s->first_of_frame = mem_calloc(s->frames + 1, sizeof *s->first_of_frame);
+    for (size_t t = 0; t < s->track_count; t++)
+        for (size_t k = 0; k < pose_observation_count(s->track[t]) && !pose_is_held_out(t); k++)
+            s->first_of_frame[s->observation[t * POSE_OBSERVATIONS_MAX + k].frame + 1]++;
+    for (size_t f = 0; f < s->frames; f++)
+        s->first_of_frame[f + 1] += s->first_of_frame[f];
+    size_t *next = mem_array(s->frames + 1, sizeof *next);
+    memcpy(next, s->first_of_frame, s->frames * sizeof *next);
+    s->of_frame = mem_array(s->first_of_frame[s->frames] + 1, sizeof *s->of_frame);
+    for (size_t t = 0; t < s->track_count; t++) {
+        for (size_t k = 0; k < pose_observation_count(s->track[t]) && !pose_is_held_out(t); k++) {
+            size_t i = t * POSE_OBSERVATIONS_MAX + k;
+            s->of_frame[next[s->observation[i].frame]++] = (uint32_t)i;
+        }
+    }
+    mem_free(next);
+}
+
+void pose_solver_init(struct pose_solver *s, const struct tracks *tracks, struct parallel *pool) {
     const struct views *views = tracks->views;
-    *s = (struct pose_solver){.tracks = tracks, .frames = views->train_count};
+    *s = (struct pose_solver){.tracks = tracks, .pool = pool, .frames = views->train_count};
     s->unknowns = (POSE_UNKNOWNS + POSE_CELLS) * s->frames;
     s->frame = mem_calloc(s->frames + 1, sizeof *s->frame);
     s->x = mem_calloc(s->unknowns + 1, sizeof *s->x);
@@ -324,9 +366,11 @@ void pose_solver_init(struct pose_solver *s, const struct tracks *tracks) {
         }
     }
     s->observation = mem_calloc(s->track_count * POSE_OBSERVATIONS_MAX + 1, sizeof *s->observation);
+    s->pull = mem_array(s->track_count * POSE_OBSERVATIONS_MAX + 1, sizeof *s->pull);
     s->along = mem_calloc(s->track_count + 1, sizeof *s->along);
     for (size_t i = 0; i < s->track_count; i++)
         init_observations(s, i);
+    sort_by_frame(s);
     for (size_t f = 0; f < s->frames; f++) {
         s->frame[f].depth_m /= fmax(1.0, (double)s->frame[f].observation_count);
         s->frame[f].is_fixed = s->frame[f].observation_count < POSE_MIN_OBSERVATIONS;
@@ -339,5 +383,8 @@ void pose_solver_release(struct pose_solver *s) {
     mem_free(s->track);
     mem_free(s->owner);
     mem_free(s->observation);
+    mem_free(s->first_of_frame);
+    mem_free(s->of_frame);
+    mem_free(s->pull);
     mem_free(s->along);
 }

@@ -73,23 +73,27 @@ struct pose_walk {
 
 struct pose_solver {
     const struct tracks *tracks;
+    struct parallel *pool;
     struct pose_walk walk; /* in place of pose_prior where it is known */
     size_t frames, track_count, unknowns;
     const struct track **track;           /* [track_count] */
     uint32_t *owner;                      /* [track_count] the photograph it comes from */
     struct pose_observation *observation; /* [track_count][POSE_OBSERVATIONS_MAX], the owner's first */
+    size_t *first_of_frame;               /* [frames + 1] into of_frame */
+    uint32_t *of_frame;       /* observations of tracks that are not held out, by frame, in the order of tracks */
+    double *pull;             /* [track_count][POSE_OBSERVATIONS_MAX] scratch of pose_solve */
     float (*along)[2];        /* [track_count] mean change of the value per `right` and `down`, at this level */
     struct pose_frame *frame; /* [frames] */
     double *x;                /* [unknowns]: twist of each frame, then POSE_CELLS offsets of each */
     int level;
 };
 
-/* Every photograph starts at its camera; one with few observations is fixed. `tracks` is borrowed. */
-void pose_solver_init(struct pose_solver *s, const struct tracks *tracks);
+/* Every photograph starts at its camera; one with few observations is fixed. Both are borrowed. */
+void pose_solver_init(struct pose_solver *s, const struct tracks *tracks, struct parallel *pool);
 void pose_solver_release(struct pose_solver *s);
 
 /* Values and derivatives of all observations at the present cameras. */
-void pose_linearise(struct pose_solver *s, struct parallel *pool);
+void pose_linearise(struct pose_solver *s);
 
 /* Image gradient g of a track in any camera, from the mean of all photographs (after pose_linearise): texture moves
  * with the surface, reflections do not. */

@@ -31,26 +31,77 @@ static double own_prior(const struct pose_solver *s, size_t f) {
     return s->walk.is_known ? 0.0 : pose_prior(&s->frame[f]);
 }
 
-/* out += A' W (I - M) z for one track; z[] by observation. */
-static void scatter(const struct pose_solver *s, size_t track, const double *z, double *out) {
+#define CHUNK 64 /* tracks a work item */
+
+/* A product with A' W (I - M): track by track the observations' errors, less their mean, then frame by frame what they
+ * pull at. Frames take them in the order of tracks, so that sums do not depend on threads. */
+struct product {
+    struct pose_solver *solver;
+    const double *x; /* error z = A x; NULL: z = -value */
+    /* The frame's equations beside its observations, into its part of out; NULL: out is added to. */
+    void (*start)(const void *user, size_t frame, const double *x, double *out);
+    const void *user;
+    double *out; /* [unknowns] */
+};
+
+static double error_of(const struct product *p, const struct pose_observation *observation) {
+    if (!p->x)
+        return -(double)observation->value;
+    const double *twist = p->x + POSE_UNKNOWNS * observation->frame;
+    double z = -p->x[observation->offset];
+    for (int j = 0; j < POSE_UNKNOWNS; j++)
+        z += (double)observation->d[j] * twist[j];
+    return z;
+}
+
+static void pull_of_track(const struct product *p, size_t track) {
+    const struct pose_solver *s = p->solver;
     const struct pose_observation *observation = s->observation + track * POSE_OBSERVATIONS_MAX;
+    double *pull = s->pull + track * POSE_OBSERVATIONS_MAX, sum = 0.0, weight = 0.0;
     size_t count = pose_observation_count(s->track[track]);
-    double sum = 0.0, weight = 0.0;
-    for (size_t k = 0; k < count; k++) {
-        if (observation[k].weight > 0.0f) {
-            sum += (double)observation[k].weight * z[k];
-            weight += (double)observation[k].weight;
-        }
-    }
     for (size_t k = 0; k < count; k++) {
         if (!(observation[k].weight > 0.0f))
             continue;
-        double r = (double)observation[k].weight * (z[k] - sum / weight);
-        double *twist = out + POSE_UNKNOWNS * observation[k].frame;
-        for (int j = 0; j < POSE_UNKNOWNS; j++)
-            twist[j] += r * (double)observation[k].d[j];
-        out[observation[k].offset] -= r;
+        pull[k] = error_of(p, &observation[k]);
+        sum += (double)observation[k].weight * pull[k];
+        weight += (double)observation[k].weight;
     }
+    for (size_t k = 0; k < count; k++)
+        if (observation[k].weight > 0.0f)
+            pull[k] = (double)observation[k].weight * (pull[k] - sum / weight);
+}
+
+static void pull_of_chunk(void *user, size_t chunk, int thread) {
+    (void)thread;
+    const struct product *p = user;
+    size_t end = (chunk + 1) * CHUNK < p->solver->track_count ? (chunk + 1) * CHUNK : p->solver->track_count;
+    for (size_t t = chunk * CHUNK; t < end; t++)
+        if (!pose_is_held_out(t))
+            pull_of_track(p, t);
+}
+
+static void sum_frame(void *user, size_t f, int thread) {
+    (void)thread;
+    const struct product *p = user;
+    const struct pose_solver *s = p->solver;
+    double *twist = p->out + POSE_UNKNOWNS * f;
+    if (p->start)
+        p->start(p->user, f, p->x, p->out);
+    for (size_t i = s->first_of_frame[f]; i < s->first_of_frame[f + 1]; i++) {
+        const struct pose_observation *observation = &s->observation[s->of_frame[i]];
+        if (!(observation->weight > 0.0f))
+            continue;
+        double r = s->pull[s->of_frame[i]];
+        for (int j = 0; j < POSE_UNKNOWNS; j++)
+            twist[j] += r * (double)observation->d[j];
+        p->out[observation->offset] -= r;
+    }
+}
+
+static void multiply_out(struct product *p) {
+    struct pose_solver *s = p->solver;
+    parallel_for(s->pool, (s->track_count + CHUNK - 1) / CHUNK, pull_of_chunk, p);
+    parallel_for(s->pool, s->frames, sum_frame, p);
 }
 
 static void project(const struct pose_solver *s, double *x) {
@@ -67,57 +118,62 @@ struct preconditioner {
 };
 
 struct twist_system {
-    const struct pose_solver *solver;
+    struct pose_solver *solver;
     double *damping; /* [POSE_UNKNOWNS * frames] added to the diagonal of the twists; owned */
     struct preconditioner preconditioner;
 };
 
-static void multiply(const void *user, const double *x, double *out) {
+/* Priors of a frame's twist and of its offsets. */
+static void start_frame(const void *user, size_t f, const double *x, double *out) {
     const struct twist_system *system = user;
     const struct pose_solver *s = system->solver;
-    size_t twists = POSE_UNKNOWNS * s->frames;
-    for (size_t i = 0; i < s->unknowns; i++)
-        out[i] = x[i] * (i < twists ? own_prior(s, i / POSE_UNKNOWNS) + system->damping[i]
-                                    : 1.0 / (OFFSET_SIGMA * OFFSET_SIGMA));
-    for (size_t t = 0; t < s->track_count; t++) {
-        const struct pose_observation *observation = s->observation + t * POSE_OBSERVATIONS_MAX;
-        double z[POSE_OBSERVATIONS_MAX];
-        if (pose_is_held_out(t))
-            continue;
-        for (size_t k = 0; k < pose_observation_count(s->track[t]); k++) {
-            const double *twist = x + POSE_UNKNOWNS * observation[k].frame;
-            z[k] = -x[observation[k].offset];
-            for (int j = 0; j < POSE_UNKNOWNS; j++)
-                z[k] += (double)observation[k].d[j] * twist[j];
-        }
-        scatter(s, t, z, out);
-    }
+    size_t twist = POSE_UNKNOWNS * f, offset = POSE_UNKNOWNS * s->frames + POSE_CELLS * f;
+    double prior = own_prior(s, f);
+    for (size_t i = twist; i < twist + POSE_UNKNOWNS; i++)
+        out[i] = x[i] * (prior + system->damping[i]);
+    for (size_t i = offset; i < offset + POSE_CELLS; i++)
+        out[i] = x[i] * (1.0 / (OFFSET_SIGMA * OFFSET_SIGMA));
+}
+
+static void multiply(const void *user, const double *x, double *out) {
+    const struct twist_system *system = user;
+    struct pose_solver *s = system->solver;
+    multiply_out(&(struct product){s, x, start_frame, system, out});
     if (s->walk.is_known)
         pose_walk_multiply(s, x, out);
     project(s, out);
 }
 
-static void preconditioner_init(struct preconditioner *p, const struct pose_solver *s, double *damping) {
+static void sum_blocks(void *user, size_t f, int thread) {
+    (void)thread;
+    const struct twist_system *system = user;
+    const struct pose_solver *s = system->solver;
+    const struct preconditioner *p = &system->preconditioner;
+    double(*a)[POSE_UNKNOWNS] = p->block[f];
+    for (size_t at = s->first_of_frame[f]; at < s->first_of_frame[f + 1]; at++) {
+        const struct pose_observation *observation = &s->observation[s->of_frame[at]];
+        if (!(observation->weight > 0.0f))
+            continue;
+        double w = (double)observation->weight;
+        p->diagonal[observation->offset] += w;
+        for (int i = 0; i < POSE_UNKNOWNS; i++)
+            for (int j = 0; j <= i; j++)
+                a[i][j] += w * (double)observation->d[i] * (double)observation->d[j];
+    }
+}
+
+static void preconditioner_init(struct twist_system *system) {
+    struct pose_solver *s = system->solver;
+    struct preconditioner *p = &system->preconditioner;
     p->block = mem_calloc(s->frames + 1, sizeof *p->block);
     p->diagonal = mem_calloc(s->unknowns + 1, sizeof *p->diagonal);
-    for (size_t t = 0; t < s->track_count; t++) {
-        const struct pose_observation *observation = s->observation + t * POSE_OBSERVATIONS_MAX;
-        for (size_t k = 0; k < pose_observation_count(s->track[t]); k++) {
-            if (!(observation[k].weight > 0.0f))
-                continue;
-            double w = (double)observation[k].weight, (*a)[POSE_UNKNOWNS] = p->block[observation[k].frame];
-            p->diagonal[observation[k].offset] += w;
-            for (int i = 0; i < POSE_UNKNOWNS; i++)
-                for (int j = 0; j <= i; j++)
-                    a[i][j] += w * (double)observation[k].d[i] * (double)observation[k].d[j];
-        }
-    }
+    parallel_for(s->pool, s->frames, sum_blocks, system);
     for (size_t f = 0; f < s->frames; f++) {
         double walk[2] = {0.0, 0.0};
         if (s->walk.is_known)
             pose_walk_diagonal(s, f, walk);
         for (int i = 0; i < POSE_UNKNOWNS; i++) {
-            damping[POSE_UNKNOWNS * f + (size_t)i] = POSE_DAMPING * p->block[f][i][i];
+            system->damping[POSE_UNKNOWNS * f + (size_t)i] = POSE_DAMPING * p->block[f][i][i];
             p->block[f][i][i] += own_prior(s, f) + walk[i / 3] + POSE_DAMPING * p->block[f][i][i];
         }
         pose_factor(p->block[f]);
@@ -150,16 +206,10 @@ void pose_solve(struct pose_solver *s) {
     double *r = mem_calloc(n, sizeof *r), *x = s->x;
     struct twist_system twist = {.solver = s, .damping = mem_calloc(twists, sizeof *twist.damping)};
     const struct conjugate_system system = {n, multiply, precondition, &twist};
-    preconditioner_init(&twist.preconditioner, s, twist.damping);
+    preconditioner_init(&twist);
     if (s->walk.is_known && s->walk.is_learnt)
         pose_walk_learn(s, twist.preconditioner.block);
-    for (size_t t = 0; t < s->track_count; t++) {
-        double y[POSE_OBSERVATIONS_MAX];
-        for (size_t k = 0; k < pose_observation_count(s->track[t]); k++)
-            y[k] = -(double)s->observation[t * POSE_OBSERVATIONS_MAX + k].value;
-        if (!pose_is_held_out(t))
-            scatter(s, t, y, r);
-    }
+    multiply_out(&(struct product){.solver = s, .out = r});
     memset(x, 0, twists * sizeof *x);
     for (size_t i = 0; i < twists; i++)
         r[i] -= own_prior(s, i / POSE_UNKNOWNS) * s->frame[i / POSE_UNKNOWNS].total[i % POSE_UNKNOWNS];
