@@ -218,7 +218,8 @@ static void answered(struct attempt_link *l) {
     for (size_t i = 0; i < l->pending; i++)
         mem_free(l->line[i]);
     l->line_count -= l->pending;
-    memmove(l->line, l->line + l->pending, l->line_count * sizeof *l->line);
+    if (l->line_count > 0)
+        memmove(l->line, l->line + l->pending, l->line_count * sizeof *l->line);
     l->pending = 0;
     l->is_pending = false;
     l->failures = 0;

@@ -139,7 +139,7 @@ static enum status tell_kept(struct render_run *run, const char *folder, size_t 
         if (is_there && S_ISDIR(info.st_mode) && strcmp(name, PREVIEWS) != 0)
             status = tell_kept(run, name, sorted_count, err);
         else if (is_there && S_ISREG(info.st_mode) &&
-                 !bsearch(&name, run->told, sorted_count, sizeof *run->told, by_name))
+                 (sorted_count == 0 || !bsearch(&name, run->told, sorted_count, sizeof *run->told, by_name)))
             tell_file(run, name);
         mem_free(full);
         mem_free(name);
