@@ -69,6 +69,10 @@ enum status store_begin(struct store *store, struct error *err);
 /* A transaction that frees space or stops work, and therefore works on a full disk; see reserve.c. Where it fails
  * with STATUS_NO_SPACE, the caller repeats it after store_reserve_spend, as long as that returns true. */
 enum status store_begin_freeing(struct store *store, struct error *err);
+/* Runs the change in one, as often as that takes, so `change` may be called again after it was undone. It says in
+ * *changed_job (STORE_NOTHING_CHANGED before) whose subscribers are told. */
+typedef enum status store_change(struct store *store, void *what, int64_t *changed_job, struct error *err);
+enum status store_change_freeing(struct store *store, store_change *change, void *what, struct error *err);
 /* From here on, until store_group_end, all transactions of this thread are one: each of them is still undone alone where it
  * fails, but nothing of any is kept unless the whole is. Other threads wait. Subscribers are told after the whole of the
  * job that the last one has changed. It is one that frees space, as above. */

@@ -188,28 +188,15 @@ enum status store_remote_explain(struct store *store, int64_t job_id, int number
     return store_end(store, status, job_id, err);
 }
 
-/* Runs the change in a transaction that works on a full disk. */
-static enum status change_freeing(struct store *store,
-                                  enum status (*change)(struct store *store, void *what, struct error *err), void *what,
-                                  struct error *err) {
-    enum status status;
-    do {
-        status = store_begin_freeing(store, err);
-        if (status != STATUS_OK)
-            return status;
-        status = store_end(store, change(store, what, err), STORE_NOTHING_CHANGED, err);
-    } while (status == STATUS_NO_SPACE && store_reserve_spend(store));
-    return status;
-}
-
 struct requested {
     int64_t job_id;
     int number;
     enum remote_request request;
 };
 
-static enum status enter_request(struct store *store, void *what, struct error *err) {
+static enum status enter_request(struct store *store, void *what, int64_t *changed_job, struct error *err) {
     const struct requested *w = what;
+    (void)changed_job; /* no subscriber sees it */
     return sql_run(&store->sql, err,
                    "UPDATE remote SET wanted = ?1, told_seq = 0"
                    " WHERE job_id = ?2 AND part = 0 AND number = ?3 AND wanted < ?1 AND phase < 3",
@@ -234,7 +221,7 @@ enum status store_remote_trouble(struct store *store, int64_t job_id, int number
 enum status store_remote_request(struct store *store, int64_t job_id, int number, enum remote_request request,
                                  struct error *err) {
     struct requested requested = {job_id, number, request};
-    return change_freeing(store, enter_request, &requested, err);
+    return store_change_freeing(store, enter_request, &requested, err);
 }
 
 /* Under the mutex: the oldest report. */
@@ -287,8 +274,9 @@ struct closed {
     size_t writers;
 };
 
-static enum status enter_closed(struct store *store, void *what, struct error *err) {
+static enum status enter_closed(struct store *store, void *what, int64_t *changed_job, struct error *err) {
     struct closed *c = what;
+    (void)changed_job;
     c->writers = remote_writer_count(store, c->job_id, c->number);
     return sql_run(&store->sql, err,
                    "UPDATE remote SET phase = 3 WHERE job_id = ? AND part = 0 AND number = ? AND phase < 3", "in",
@@ -297,7 +285,7 @@ static enum status enter_closed(struct store *store, void *what, struct error *e
 
 enum status store_remote_close(struct store *store, int64_t job_id, int number, size_t *writers, struct error *err) {
     struct closed closed = {.job_id = job_id, .number = number};
-    enum status status = change_freeing(store, enter_closed, &closed, err);
+    enum status status = store_change_freeing(store, enter_closed, &closed, err);
     *writers = closed.writers;
     return status;
 }

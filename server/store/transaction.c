@@ -63,6 +63,19 @@ enum status store_end(struct store *store, enum status status, int64_t changed_j
     return status;
 }
 
+enum status store_change_freeing(struct store *store, store_change *change, void *what, struct error *err) {
+    enum status status;
+    do {
+        int64_t changed_job = STORE_NOTHING_CHANGED;
+        status = store_begin_freeing(store, err);
+        if (status != STATUS_OK)
+            return status;
+        status = change(store, what, &changed_job, err);
+        status = store_end(store, status, changed_job, err);
+    } while (status == STATUS_NO_SPACE && store_reserve_spend(store));
+    return status;
+}
+
 enum status store_group_begin(struct store *store, struct error *err) {
     enum status status = store_begin_freeing(store, err);
     if (status == STATUS_OK)

@@ -4,6 +4,8 @@
 #include <sched.h>
 #include <sys/mount.h>
 
+#include "server/store/attempts.h"
+#include "server/store/remote.h"
 #include "tests/unit/store_rig.h"
 
 #define DISK "size=64m"
@@ -11,7 +13,7 @@
 #define EVENTS 3000 /* of each of two jobs, in turn: pages of events have both jobs' */
 
 static struct store *store;
-static char *disk;
+static char *disk, *dir, *reserve;
 
 /* Takes every byte that the disk still has. */
 static void fill_disk(void) {
@@ -107,10 +109,65 @@ static void stop_all(const int64_t *ids, const int *attempt, const char *token_u
     IS(add_refused(), STATUS_NO_SPACE);
 }
 
+/* What is the first to be entered by a daemon that has begun on a full disk, about job `id`, which runs elsewhere. */
+static void requeue(int64_t id, int attempt) {
+    size_t requeued;
+    (void)attempt;
+    OK(store_reconcile(store, NULL, 0, &requeued, &err));
+    CHECK(requeued == 1 && state_of(id) == JOB_QUEUED);
+}
+
+/* Of the job's two parts the other is taken up. */
+static void end_stray(int64_t id, int attempt) {
+    const struct attempt_key kept = {id, attempt + 1};
+    struct attempt_row row;
+    size_t requeued;
+    OK(store_reconcile(store, &kept, 1, &requeued, &err));
+    OK(store_attempt_get(store, &(struct attempt_key){id, attempt}, &row, &err));
+    CHECK(requeued == 0 && row.phase == ATTEMPT_ROW_ENDED && state_of(id) == JOB_RUNNING);
+}
+
+static void request(int64_t id, int attempt) {
+    struct remote_row row;
+    OK(store_remote_request(store, id, attempt, REMOTE_CANCEL, &err));
+    OK(store_remote_get(store, id, attempt, &row, &err));
+    CHECK(row.wanted == REMOTE_CANCEL);
+}
+
+static void close_attempt(int64_t id, int attempt) {
+    struct remote_row row;
+    size_t writers;
+    OK(store_remote_close(store, id, attempt, &writers, &err));
+    OK(store_remote_get(store, id, attempt, &row, &err));
+    CHECK(row.phase == REMOTE_ENDED);
+}
+
+/* A daemon that ended, killed or not, on a disk that is full now: it has nothing left but its reserve. */
+static void begin_on_full_disk(void (*first)(int64_t id, int attempt)) {
+    int64_t id;
+    int attempt;
+    empty_disk();
+    OK(store_probe(store, &err));
+    OK(add_refused());
+    store_reserve_renew(store);
+    id = add_job(store, SCENE_A, 0);
+    OK(store_job_start(store, id, "site", &attempt, &err));
+    struct remote_row row = {.job_id = id, .number = attempt, .executor = "site", .lease_sec = 60};
+    snprintf(row.name, sizeof row.name, "unbake-%lld-1", (long long)id);
+    OK(store_remote_begin(store, &row, "hash", &err));
+    store_close(store);
+    fill_disk();
+    OK(store_open(&store, dir, &err));
+    CHECK(access(reserve, F_OK) == 0);
+    first(id, attempt);
+    CHECK(access(reserve, F_OK) != 0);
+    OK(store_job_cancel(store, id, &err));
+}
+
 int main(void) {
     if (unshare(CLONE_NEWNS) != 0 || mount(NULL, "/", NULL, MS_REC | MS_PRIVATE, NULL) != 0)
         CHECK_SKIP("this user may not mount a small disk");
-    char *reserve, *dir, token[TOKEN_SIZE];
+    char token[TOKEN_SIZE];
     int64_t ids[JOBS], token_id;
     int attempt[2];
     disk = fresh_dir();
@@ -139,19 +196,10 @@ int main(void) {
     stop_all(ids, attempt, "anna");
     CHECK(access(reserve, F_OK) == 0); /* none of this has needed it */
 
-    empty_disk();
-    OK(store_probe(store, &err));
-    OK(add_refused());
-    /* A daemon that ended, killed or not, on a disk that is full now. */
-    int64_t id = add_job(store, SCENE_A, 0);
-    size_t requeued;
-    OK(store_job_start(store, id, "process", &attempt[0], &err));
-    store_close(store);
-    fill_disk();
-    OK(store_open(&store, dir, &err));
-    OK(store_reconcile(store, NULL, 0, &requeued, &err));
-    CHECK(requeued == 1);
-    OK(store_job_cancel(store, id, &err));
+    begin_on_full_disk(requeue);
+    begin_on_full_disk(end_stray);
+    begin_on_full_disk(request);
+    begin_on_full_disk(close_attempt);
     store_close(store);
     CHECK(umount2(disk, MNT_DETACH) == 0);
     mem_free(reserve);
