@@ -1,7 +1,7 @@
 #!/bin/bash
-# The disk of a node is full while it fetches the scene, while its worker begins, while that writes a checkpoint: the job is
-# paused, and says on which machine and what to do; it loses no attempt, and goes on from its checkpoint once it is resumed,
-# to the textures of a job at home. The daemon's own disk: tests/chaos/node_kill.c.
+# The disk of a node is full while it fetches the scene, while its worker begins, while that writes a checkpoint, and the
+# outputs, some of which have been sent: the job is paused, and says on which machine and what to do; it loses no attempt, and
+# goes on from its checkpoint once it is resumed, to the textures of a job at home. The daemon's own disk: tests/chaos/node_kill.c.
 set -u
 . tests/api/site.sh "$@"
 make_room "$work/room"
@@ -46,8 +46,16 @@ wait_for 60 has_sent
 cat /dev/zero >"$disk/filler" 2>/dev/null
 blocked "while it writes a checkpoint" "$disk/work/*No space left"
 rm "$disk/filler"
+# A disk without room for more files, since those that are there may grow: checkpoints are written on, textures sent, and
+# then it is full.
+mount -o remount,nr_inodes=$(($(df --output=iused "$disk" | tail -1) + 26)) "$disk"
 run 0 resume "$job"
-same "after three full disks" 4
+blocked "while it writes outputs" "$disk/work/*/out/scene.*No space left"
+[ "$("$build/unbake" show "$job" --json | jq '[.outputs[] | select(.attempt == 4) | .name] | contains(["base_color.exr"])')" = true ] ||
+    fail "no texture was sent before"
+mount -o remount,nr_inodes=10000 "$disk"
+run 0 resume "$job"
+same "after four full disks" 5
 equal "$(ls -d "$data/jobs/$job"/attempt-* | wc -l)" 1 "folders of attempts"
 [ $failures = 0 ] || cat "$work/nodes.log"
 finish
