@@ -19,7 +19,6 @@
 #define URL_SEC 5.0
 #define LOOK_SEC 1.0
 #define END_SEC 120.0 /* for a job to be seen to end, or to go once it is cancelled */
-#define CLOCK_SEC 2.0 /* by which clocks may differ; leases do not depend on them, times of files and logs do */
 #define OUTPUT_LINES 5
 
 struct attempt_at {
@@ -215,7 +214,7 @@ static void try_shared(struct attempt_at *t, const char *file) {
     snprintf(text, sizeof text, "%s wrote to it; its unbaked is %s, here it is %s", host, version, source_version);
     say(t, strcmp(version, source_version) == 0, "shared", text);
     snprintf(text, sizeof text, "the clock of %s and that of the folder are %.1f s apart", host, apart);
-    say(t, apart < CLOCK_SEC && apart > -CLOCK_SEC, "clocks", text);
+    say(t, apart < CLOCKS_APART_SEC && apart > -CLOCKS_APART_SEC, "clocks", text);
     snprintf(text, sizeof text, *url_error ? "%.60s: %.180s" : "%.60s reaches %.180s", host,
              *url_error ? url_error : t->site->url);
     say(t, !*url_error, "url", text);

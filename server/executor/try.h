@@ -6,7 +6,8 @@
 
 #include "server/executor/site.h"
 
-#define TRY_JOB_SEC 5 /* that the job takes */
+#define TRY_JOB_SEC 5        /* that the job takes */
+#define CLOCKS_APART_SEC 2.0 /* by which clocks may differ: leases do not depend on them, times of files and logs do */
 
 struct node_probe {
     const char *file; /* NULL: it writes nothing */

@@ -155,4 +155,34 @@ for name in $examples; do
     [ ! -e "$work/$name.taken" ] || fail "$name: garbage is taken for a listing: $(cat "$work/$name.log")"
     grep -q '^FAIL' "$work/$name.log" || fail "$name, garbage: $(cat "$work/$name.log")"
 done
+
+# What doctor finds out without a job: everything is in place; then the status command prints garbage, the program of the nodes
+# is an older one, nothing can be written to the folder that they share, its clock is another, a program is gone.
+rm "$work/garbage"
+mkdir "$work/shared"
+sed -i "1i shared = $work/shared" "$work/executors.d/pbs.conf"
+sed -i "s,^url = .*,url = http://127.0.0.1:1," "$work/executors.d/pbs.conf"
+doctor() { # WANTED-LINE... of those about the executor
+    local line
+    "$build/unbaked" doctor --data "$work/data" --set executors=process,pbs --set executors_dir="$work/executors.d" |
+        grep ' executor ' >"$work/doctor"
+    for line; do grep -qE "^$line" "$work/doctor" || fail "doctor has no line '$line': $(cat "$work/doctor")"; done
+}
+doctor 'ok +executor +pbs: qstat answers; [0-9]+ jobs' "ok +executor +pbs: $build/unbaked, .* is of this version" \
+    "ok +executor +pbs: the shared folder $work/shared takes files" 'warn +executor +pbs: from here, .*127.0.0.1:1' \
+    'ok +executor +pbs: .unbaked executor test pbs. tells the version and the clock'
+if ! ldd "$build/unbaked" | grep -q 'lib[at]san'; then
+    printf '\x64\0\0\0\0\0\0\0' >"$work/clock" # 100 s
+    UNBAKE_CLOCK=$work/clock LD_PRELOAD=$build/tests/chaos/preload/clock.so \
+        doctor "warn +executor +pbs: the shared folder .* its clock and this machine's are 100.0 s apart"
+fi
+printf '#!/bin/sh\necho "unbaked 0.0.9 (sources 0123456789abcdef)"\n' >"$work/bin/older"
+chmod +x "$work/bin/older"
+sed -i "s,^node = .*,node = $work/bin/older,; s,^shared = .*,shared = /proc/none," "$work/executors.d/pbs.conf"
+touch "$work/garbage"
+doctor 'warn +executor +pbs: .* qstat has no line as status_line says' \
+    "warn +executor +pbs: $work/bin/older, .* is 0.0.9 .sources 0123456789abcdef., and this is .*: nodes of another" \
+    'warn +executor +pbs: nothing can be written to the shared folder /proc/none'
+rm "$work/bin/qdel"
+doctor 'warn +executor +pbs: there is no program qdel'
 finish
