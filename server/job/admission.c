@@ -76,19 +76,26 @@ static enum status need_of_render(const struct admission *a, struct store *store
     return status;
 }
 
+enum status admission_foretell(const struct admission *a, struct store *store, const struct job *job, double *need,
+                               struct error *err) {
+    struct scene_row scene = {0};
+    *need = 0.0;
+    if (job->kind == JOB_RENDER)
+        return need_of_render(a, store, job, need, err);
+    enum status status = store_scene_get(store, job->scene_id, &scene, err);
+    if (status == STATUS_OK)
+        *need = admission_need(a, scene.facts, job);
+    scene_row_release(&scene);
+    return status;
+}
+
 static enum status find_need(const struct admission *a, struct store *store, int64_t id, double *need,
                              struct error *err) {
     struct job job = {0};
-    struct scene_row scene = {0};
     *need = 0.0;
     enum status status = store_job_get(store, id, &job, err);
-    if (status == STATUS_OK && job.kind == JOB_RENDER)
-        status = need_of_render(a, store, &job, need, err);
-    else if (status == STATUS_OK)
-        status = store_scene_get(store, job.scene_id, &scene, err);
-    if (status == STATUS_OK && job.kind != JOB_RENDER)
-        *need = admission_need(a, scene.facts, &job);
-    scene_row_release(&scene);
+    if (status == STATUS_OK)
+        status = admission_foretell(a, store, &job, need, err);
     job_release(&job);
     return status == STATUS_NOT_FOUND ? STATUS_OK : status; /* deleted meanwhile: its start will find that */
 }

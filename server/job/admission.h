@@ -26,6 +26,9 @@ void admission_init(struct admission *a, uint64_t limit_bytes, uint64_t worker_l
 
 /* Bytes that the job's next attempt needs by the facts of its scene; 0: not foretold. */
 double admission_need(const struct admission *a, const char *facts, const struct job *job);
+/* The same for a job of any kind: what a render needs, the files tell that it reads. */
+enum status admission_foretell(const struct admission *a, struct store *store, const struct job *job, double *need,
+                               struct error *err);
 
 /* *may: the job may begin beside `running` others, which need `used` bytes; *need: its own. One that may not is told
  * why; one that was told and need not wait any more is told, too. */

@@ -58,11 +58,14 @@ static enum status run_job(struct attempt *a, const struct scheduler_config *con
     enum status status = orders_of_job(&todo, config, store, &order, err);
     if (status == STATUS_OK && job->source_id)
         status = find_outputs(store, job->source_id, &outputs, err);
+    const struct admission foretold = {.worker_limit_bytes = config->worker_memory_bytes};
+    double need = 0.0;
+    if (status == STATUS_OK)
+        status = admission_foretell(&foretold, store, job, &need, err);
     if (status == STATUS_OK)
         status = prepare_folder(a, config, job, anew, err);
     char *folder = layout_attempt(NULL, job->id, a->number), *home = layout_job(NULL, job->id),
          *log = layout_log(a->part.part > 0 ? folder : home);
-    const struct admission foretold = {.worker_limit_bytes = config->worker_memory_bytes};
     const struct run_work work = {.folder = folder,
                                   .log = log,
                                   .scene_id = job->kind == JOB_RENDER ? NULL : job->scene_id,
@@ -71,7 +74,7 @@ static enum status run_job(struct attempt *a, const struct scheduler_config *con
                                   .order = order,
                                   .job_id = job->id,
                                   .attempt = a->number,
-                                  .memory_bytes = row->facts ? admission_need(&foretold, row->facts, job) : 0.0};
+                                  .memory_bytes = need};
     if (status == STATUS_OK)
         status = config->executor->start(config->executor, &work, &a->run, err);
     cJSON_Delete(order);

@@ -90,7 +90,7 @@ struct job_lane {
 enum status store_job_next(struct store *store, int user_max_running, const struct job_lane *lane, int64_t *id,
                            struct error *err);
 /* The executor on which the job must run: the one that its user has chosen, JOB_EXECUTOR_HERE for all kinds but
- * reconstructions, "": any. The caller's (mem_free). */
+ * reconstructions and parts of renders, "": any. The caller's (mem_free). */
 enum status store_job_executor(struct store *store, int64_t id, char **executor, struct error *err);
 /* Attempts that run, and what is wanted of them, for the scheduler, with every job that runs. Fills list[limit]. */
 struct running {
