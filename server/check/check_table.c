@@ -54,15 +54,15 @@ static void tell_sizes(const struct scene *scene, struct buf *text) {
     } size[SIZES_MAX];
     size_t kinds = 0, others = 0;
     for (size_t i = 0; i < scene->photograph_count; i++) {
-        const struct camera *c = &scene->photograph[i].camera;
+        struct camera c = photograph_file_camera(&scene->photograph[i]);
         size_t k = 0;
-        while (k < kinds && (size[k].width != c->width || size[k].height != c->height))
+        while (k < kinds && (size[k].width != c.width || size[k].height != c.height))
             k++;
         if (k < kinds) {
             size[k].count++;
         } else if (kinds < SIZES_MAX) {
-            size[kinds].width = c->width;
-            size[kinds].height = c->height;
+            size[kinds].width = c.width;
+            size[kinds].height = c.height;
             size[kinds++].count = 1;
         } else {
             others++;

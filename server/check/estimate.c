@@ -12,10 +12,16 @@
 #define UV_BYTES 24.0           /* of a triangle of a mesh with texture coordinates */
 #define PIXEL_BYTES 25.0        /* 11 to 13 of a photograph with what is found of it, 14 while detail is solved */
 
+/* A job may keep them all (photograph_megapixels). */
+static double file_pixels(const struct photograph *photo) {
+    struct camera camera = photograph_file_camera(photo);
+    return (double)camera.width * (double)camera.height;
+}
+
 double estimate_memory_bytes(const struct scene *scene, double side) {
     double pixels = 0.0;
     for (size_t i = 0; i < scene->photograph_count; i++)
-        pixels += (double)scene->photograph[i].camera.width * (double)scene->photograph[i].camera.height;
+        pixels += file_pixels(&scene->photograph[i]);
     double pixel_bytes = PIXEL_BYTES * pixels;
     if (scene->spill)
         pixel_bytes = fmin(pixel_bytes, (double)spill_memory_bytes(scene->spill));

@@ -3,11 +3,14 @@
 
 #include "common/clock.h"
 #include "common/mem.h"
+#include "server/scene/photograph_reduce.h"
 
 static enum status load(struct scene_check *room, const char *dir, const struct bundle_limits *limits,
                         struct parallel *pool, cJSON *problems, struct error *err) {
     double begin = clock_sec();
-    enum status status = bundle_load(dir, &room->reading, limits, pool, &room->scene, problems, err);
+    struct bundle_limits reduced = *limits;
+    reduced.kept_pixels = REDUCED_MAX_PIXELS; /* they tell as well whether mesh and photographs fit */
+    enum status status = bundle_load(dir, &room->reading, &reduced, pool, &room->scene, problems, err);
     room->load_sec += clock_sec() - begin;
     if (status == STATUS_OK && room->read)
         room->read(room->user, &room->scene);

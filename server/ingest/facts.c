@@ -80,8 +80,9 @@ cJSON *facts_of(const struct scene *scene) {
         const struct photograph *p = &scene->photograph[i];
         test_count += p->is_test;
         hdr_count += p->is_hdr;
-        mask_count += p->mask != NULL;
-        pixel_count += (uint64_t)p->camera.width * p->camera.height;
+        mask_count += p->file.has_mask;
+        struct camera camera = photograph_file_camera(p);
+        pixel_count += (uint64_t)camera.width * camera.height;
     }
     add_mesh_facts(facts, scene);
     json_add_string(facts, "source", scene->source);

@@ -185,6 +185,7 @@ static enum status load_photograph(const struct loading *l, size_t index) {
             photo_pixels_load_mask(l->dir, frame->mask, l->fit[index].turn, photo, &outcome->is_broken, &outcome->err);
         outcome->mask_failed = status != STATUS_OK;
     }
+    photo->file.has_mask = photo->mask != NULL;
     return status == STATUS_OK && l->step[index] > 1 ? reduce(l, index, &outcome->err) : status;
 }
 

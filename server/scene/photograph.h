@@ -50,6 +50,7 @@ struct photograph {
     struct {
         uint32_t step;          /* its pixels, in each direction, of which each of these is the mean; 0 and 1: one */
         uint32_t width, height; /* of it; set where step is more than 1 */
+        bool has_mask;          /* it came with a mask, or transparent */
     } file;
 };
 

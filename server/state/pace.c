@@ -97,9 +97,9 @@ static void plan_all(const struct pace *p, const struct scene *scene) {
     double pixels = 0.0, held_out = held_out_pixels(scene), every = settings_number(p->settings, "hold_out_every");
     plan_init(p->plan, settings_number(p->settings, "time_limit_sec"));
     for (size_t i = 0; i < scene->photograph_count; i++) {
-        const struct camera *c = &scene->photograph[i].camera;
-        double step = (double)camera_step_to(c, photograph_kept_pixels(p->settings));
-        pixels += (double)c->width * (double)c->height / (step * step);
+        struct camera c = photograph_file_camera(&scene->photograph[i]);
+        double step = (double)camera_step_to(&c, photograph_kept_pixels(p->settings));
+        pixels += (double)c.width * (double)c.height / (step * step);
     }
     if (held_out == 0.0 && every > 0.0)
         held_out = held_out_pixels_of_all(scene) / every;

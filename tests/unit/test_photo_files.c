@@ -6,6 +6,7 @@
 #include "common/image.h"
 #include "common/mem.h"
 #include "server/ingest/bundle.h"
+#include "server/ingest/facts.h"
 #include "server/ingest/photos.h"
 #include "tests/check.h"
 
@@ -139,6 +140,10 @@ static void reduced(void) {
                 }
             CHECK_THAT(wrong == 0, "%zu pixels are no means", wrong);
         }
+        cJSON *facts = facts_of(&scene); /* tell of the files */
+        CHECK_NEAR(cJSON_GetNumberValue(cJSON_GetObjectItem(facts, "pixel_count")), 5 * 24 * 16, 0.0);
+        CHECK_NEAR(cJSON_GetNumberValue(cJSON_GetObjectItem(facts, "mask_count")), 0.0, 0.0);
+        cJSON_Delete(facts);
         kept_pixels = 383.0;
         CHECK(load_copies(PLAIN, "\"fl_x\":20") && scene.photograph[0].camera.width == 12);
         kept_pixels = 384.0;
