@@ -4,6 +4,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
+#include <strings.h>
 
 #include "common/json.h"
 #include "common/machine.h"
@@ -16,6 +17,14 @@
  * files and 20 MiB. */
 #define RENDER_BYTES (64.0 * 0x1p20)
 #define RENDER_FACTOR 8.0
+/* And of files that were sent to it. A picture of an inserted mesh is resampled (relight/bake.h): 75 bytes for each of its
+ * pixels, up to 1.15 GiB a mesh (measured: squares with pictures of 1024, 2048 and 2890 pixels a side took 75, 298 and
+ * 588 MiB more than the room; one whose atlas is as large as may be, with all of colour, emission and roughness,
+ * 1148 MiB). How many pixels a file has is not known here: JPEG has 2 to 7 to the byte, PNG 0.3 to 2, both more where
+ * they are plain. By hand: 16. */
+#define PIXEL_BYTES 75.0
+#define PIXELS_PER_BYTE 16.0
+#define PICTURES_MOST (1.15 * 0x1p30) /* of a mesh; an environment's picture takes no more */
 #define HINT "It begins when others have ended. A smaller texture_size needs less memory."
 
 void admission_init(struct admission *a, uint64_t limit_bytes, uint64_t worker_limit_bytes) {
@@ -55,7 +64,46 @@ double admission_need(const struct admission *a, const char *text, const struct 
     return a->worker_limit_bytes > 0 ? fmin(bytes, (double)a->worker_limit_bytes) : bytes;
 }
 
-/* A render holds the room and its textures, which are larger there than in their files. */
+/* Whether the file may hold pictures that are compressed. */
+static bool has_pictures(const char *name) {
+    static const char *const endings[] = {".png",  ".jpg", ".jpeg", ".webp", ".avif",
+                                          ".heic", ".tif", ".tiff", ".glb",  ".gltf"};
+    const char *dot = strrchr(name, '.');
+    for (size_t i = 0; dot && i < sizeof endings / sizeof *endings; i++)
+        if (strcasecmp(dot, endings[i]) == 0)
+            return true;
+    return false;
+}
+
+/* How many of the settings name what pictures are for: a mesh or an environment. */
+static double count_pictured(const char *settings) {
+    double count = 0.0;
+    cJSON *json = cJSON_Parse(settings);
+    for (const cJSON *s = json ? json->child : NULL; s; s = s->next) {
+        size_t length = strlen(s->string);
+        bool is_insert = strncmp(s->string, "insert.", 7) == 0 && strcmp(s->string + length - 5, ".file") == 0;
+        count += is_insert || strcmp(s->string, "environment") == 0;
+    }
+    cJSON_Delete(json);
+    return count;
+}
+
+/* What the files take that were sent to a render. */
+static double need_of_files(const struct job *job) {
+    double pictures = 0.0, rest = 0.0;
+    cJSON *files = cJSON_Parse(job->files);
+    for (const cJSON *f = files ? files->child : NULL; f; f = f->next) {
+        const char *name = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(f, "name"));
+        double bytes = cJSON_GetNumberValue(cJSON_GetObjectItemCaseSensitive(f, "bytes"));
+        if (name && bytes > 0.0) /* NAN: it is not there yet */
+            *(has_pictures(name) ? &pictures : &rest) += bytes;
+    }
+    cJSON_Delete(files);
+    return RENDER_FACTOR * rest +
+           fmin(PIXEL_BYTES * PIXELS_PER_BYTE * pictures, PICTURES_MOST * count_pictured(job->settings));
+}
+
+/* A render holds the room and its textures, which are larger there than in their files, and what was sent to it. */
 static enum status need_of_render(const struct admission *a, struct store *store, const struct job *job, double *need,
                                   struct error *err) {
     struct output_row *rows = NULL;
@@ -70,7 +118,7 @@ static enum status need_of_render(const struct admission *a, struct store *store
         output_row_release(&rows[i]);
     }
     mem_free(rows);
-    *need = RENDER_BYTES + RENDER_FACTOR * bytes;
+    *need = RENDER_BYTES + RENDER_FACTOR * bytes + need_of_files(job);
     if (a->worker_limit_bytes > 0)
         *need = fmin(*need, (double)a->worker_limit_bytes);
     return status;

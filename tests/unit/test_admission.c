@@ -2,6 +2,7 @@
  * case; one that waits says why, and nothing behind it begins. */
 #include "server/job/admission.h"
 
+#include "server/store/job_files.h"
 #include "tests/unit/fault_rig.h"
 
 #define GIB 0x1p30
@@ -107,10 +108,54 @@ static void test_ask(void) {
     CHECK(ask(&a, ids[0], 0, 0.0) && a.total_bytes > 0.0 && !ask(&a, ids[0], 1, a.total_bytes));
 }
 
+#define HEX "0123456789abcdef0123456789abcdef0123456789abcdef0123456789abcdef"
+
+/* A render's need with one file of so many bytes, over that of the room alone. */
+static double more_with(int64_t source, const char *settings, const char *file, uint64_t bytes) {
+    struct admission a;
+    double need[2];
+    admission_init(&a, 0, 0);
+    for (int i = 0; i < 2; i++) {
+        struct job_new new = {.kind = JOB_RENDER,
+                              .source_id = source,
+                              .file = &file,
+                              .file_count = (size_t)i,
+                              .scene_id = SCENE_A,
+                              .name = "render",
+                              .labels = "{}",
+                              .settings = settings,
+                              .max_attempts = 2};
+        bool replayed, queued, may;
+        int64_t id;
+        OK(store_job_add(store, &new, 1000, &id, &replayed, &err));
+        if (i == 1)
+            OK(store_job_file_put(store, id, file, bytes, HEX, NULL, &queued, &err));
+        OK(admission_ask(&a, store, id, 1, 0.0, &may, &need[i], &err));
+    }
+    return need[1] - need[0];
+}
+
+/* Pictures of meshes that are put into a room are larger in memory than the room may be. */
+static void test_render(void) {
+    static const char insert[] = "{\"insert.1.file\":\"m.glb\"}",
+                      two[] = "{\"insert.1.file\":\"m.glb\",\"insert.2.file\":\"m.glb\"}";
+    int64_t source = add_job("{}", NULL);
+    int number;
+    OK(store_job_start(store, source, "process", &number, &err));
+    OK(store_output_put(store, source, number, EVENT_OUTPUT, JOB_SOURCE_OUTPUT, 100, HEX, "model/x", &err));
+    OK(store_job_succeed(store, source, number, "", &err));
+    CHECK_NEAR(more_with(source, insert, "m.glb", 100000), 1.2e8, 1.0); /* 1.6 megapixels of 75 bytes */
+    CHECK_NEAR(more_with(source, insert, "m.glb", 100000000), 1.15 * GIB, 1.0);
+    CHECK_NEAR(more_with(source, two, "m.glb", 100000000), 2.3 * GIB, 1.0);
+    CHECK_NEAR(more_with(source, "{\"environment\":\"sky.PNG\"}", "sky.PNG", 100000), 1.2e8, 1.0);
+    CHECK_NEAR(more_with(source, "{\"insert.1.file\":\"m.ply\"}", "m.ply", 1000000), 8e6, 1.0);
+}
+
 int main(void) {
     rig_start();
     test_need();
     test_ask();
+    test_render();
     rig_stop();
     return check_result();
 }
