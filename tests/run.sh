@@ -31,7 +31,7 @@ in_one_thread() {
     local threads='parallel|pthread|thread' headers
     headers=$({
         grep -lE "$threads" tests/*.h tests/*/*.h
-        grep -rlE --include='*.c' pthread_create common server client | sed 's/c$/h/'
+        grep -rlE --include='*.c' 'pthread_create|background_start' common server client | sed 's/c$/h/'
     } | tr '\n' '|')
     grep -LE "$threads|${headers%|}" tests/unit/test_*.c tests/gradient/test_*.c tests/render/test_*.c |
         sed 's|^tests/||; s|\.c$||' | tr '\n' ' '

@@ -1,10 +1,9 @@
 /* collector.c -- see collector.h. */
 #include "server/data/collector.h"
 
-#include <pthread.h>
 #include <stdlib.h>
-#include <time.h>
 
+#include "common/background.h"
 #include "common/clock.h"
 #include "common/file.h"
 #include "common/log.h"
@@ -17,10 +16,7 @@
 struct collector {
     const struct collector_config *config;
     double interval_sec;
-    pthread_t thread;
-    pthread_mutex_t mutex;
-    pthread_cond_t changed;
-    bool stopping; /* under the mutex */
+    struct background thread;
 };
 
 static const char *const kind_names[] = {[EXPIRED_UPLOAD] = "upload", [EXPIRED_JOB] = "job", [EXPIRED_SCENE] = "scene"};
@@ -126,24 +122,20 @@ enum status collector_sweep(struct store *store, struct folder *folder, struct e
 
 static void *run(void *user) {
     struct collector *c = user;
-    pthread_mutex_lock(&c->mutex);
-    while (!c->stopping) {
+    pthread_mutex_lock(&c->thread.mutex);
+    while (!atomic_load(&c->thread.stopping)) {
         struct error err;
-        struct timespec until;
-        pthread_mutex_unlock(&c->mutex);
+        pthread_mutex_unlock(&c->thread.mutex);
         c->config->maintain_uploads(c->config->uploads);
         if (collector_run(c->config, false, NULL, NULL, &err) != STATUS_OK)
             log_warning("cannot look for what has expired: %s", err.message);
         store_reserve_renew(c->config->store);
-        pthread_mutex_lock(&c->mutex);
-        clock_gettime(CLOCK_MONOTONIC, &until);
-        double seconds = (double)until.tv_sec + 1e-9 * (double)until.tv_nsec + c->interval_sec;
-        until.tv_sec = (time_t)seconds;
-        until.tv_nsec = (long)(1e9 * (seconds - (double)until.tv_sec));
-        while (!c->stopping && pthread_cond_timedwait(&c->changed, &c->mutex, &until) == 0)
+        pthread_mutex_lock(&c->thread.mutex);
+        double until_sec = clock_sec() + c->interval_sec;
+        while (!atomic_load(&c->thread.stopping) && background_wait_until(&c->thread, until_sec))
             ;
     }
-    pthread_mutex_unlock(&c->mutex);
+    pthread_mutex_unlock(&c->thread.mutex);
     return NULL;
 }
 
@@ -152,32 +144,17 @@ enum status collector_start(struct collector **out, const struct collector_confi
     struct collector *c = mem_calloc(1, sizeof *c);
     c->config = config;
     c->interval_sec = interval_sec;
-    pthread_mutex_init(&c->mutex, NULL);
-    pthread_condattr_t monotonic;
-    pthread_condattr_init(&monotonic);
-    pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
-    pthread_cond_init(&c->changed, &monotonic);
-    pthread_condattr_destroy(&monotonic);
-    int failed = pthread_create(&c->thread, NULL, run, c);
-    if (failed == 0) {
+    enum status status = background_start(&c->thread, run, c, "removes what has expired", err);
+    if (status == STATUS_OK)
         *out = c;
-        return STATUS_OK;
-    }
-    pthread_cond_destroy(&c->changed);
-    pthread_mutex_destroy(&c->mutex);
-    mem_free(c);
-    return error_set_errno(err, failed, "cannot start the thread that removes what has expired");
+    else
+        mem_free(c);
+    return status;
 }
 
 void collector_stop(struct collector *c) {
     if (!c)
         return;
-    pthread_mutex_lock(&c->mutex);
-    c->stopping = true;
-    pthread_cond_signal(&c->changed);
-    pthread_mutex_unlock(&c->mutex);
-    pthread_join(c->thread, NULL);
-    pthread_cond_destroy(&c->changed);
-    pthread_mutex_destroy(&c->mutex);
+    background_stop(&c->thread);
     mem_free(c);
 }

@@ -3,12 +3,12 @@
 #include "server/data/trash.h"
 
 #include <errno.h>
-#include <pthread.h>
 #include <stdatomic.h>
 #include <stdio.h>
 #include <string.h>
 #include <time.h>
 
+#include "common/background.h"
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
@@ -22,18 +22,9 @@ struct trash {
     void *user;
     long long started_ns;
     atomic_ullong number;
-    pthread_t thread;
-    pthread_mutex_t mutex; /* guards what follows; not held during disk operations */
-    pthread_cond_t changed;
-    bool has_work, is_working, stopping;
+    struct background thread; /* its mutex guards what follows; not held during disk operations */
+    bool has_work, is_working;
 };
-
-static bool is_stopping(struct trash *t) {
-    pthread_mutex_lock(&t->mutex);
-    bool stopping = t->stopping;
-    pthread_mutex_unlock(&t->mutex);
-    return stopping;
-}
 
 static void empty(struct trash *t) {
     struct error err;
@@ -42,7 +33,7 @@ static void empty(struct trash *t) {
     char *folder = layout_trash(t->data_dir);
     if (file_list(folder, &names, &count, &err) != STATUS_OK)
         log_warning("what is to be removed cannot be found: %s", err.message);
-    for (size_t i = 0; i < count && !is_stopping(t); i++) {
+    for (size_t i = 0; i < count && !atomic_load(&t->thread.stopping); i++) {
         char *path = file_join(folder, names[i]);
         if (strncmp(names[i], PREFIX, sizeof PREFIX - 1) == 0 && file_remove_tree(path, &err) != STATUS_OK)
             log_warning("%s is left until the next start: %s", path, err.message);
@@ -74,21 +65,21 @@ static enum status drop_temporary(const char *data_dir, struct error *err) {
 static void *run(void *user) {
     struct trash *t = user;
     pthread_setname_np(pthread_self(), "trash");
-    pthread_mutex_lock(&t->mutex);
-    while (!t->stopping) {
+    pthread_mutex_lock(&t->thread.mutex);
+    while (!atomic_load(&t->thread.stopping)) {
         if (!t->has_work) {
             t->is_working = false;
-            pthread_cond_broadcast(&t->changed);
-            pthread_cond_wait(&t->changed, &t->mutex);
+            pthread_cond_broadcast(&t->thread.changed);
+            pthread_cond_wait(&t->thread.changed, &t->thread.mutex);
             continue;
         }
         t->has_work = false;
         t->is_working = true;
-        pthread_mutex_unlock(&t->mutex);
+        pthread_mutex_unlock(&t->thread.mutex);
         empty(t);
-        pthread_mutex_lock(&t->mutex);
+        pthread_mutex_lock(&t->thread.mutex);
     }
-    pthread_mutex_unlock(&t->mutex);
+    pthread_mutex_unlock(&t->thread.mutex);
     return NULL;
 }
 
@@ -106,37 +97,26 @@ enum status trash_new(struct trash **out, const char *data_dir, void (*emptied)(
     t->user = user;
     t->started_ns = (long long)now.tv_sec * 1000000000 + now.tv_nsec;
     t->has_work = true;
-    pthread_mutex_init(&t->mutex, NULL);
-    pthread_cond_init(&t->changed, NULL);
-    int failed = pthread_create(&t->thread, NULL, run, t);
-    *out = failed ? NULL : t;
-    if (failed) {
-        pthread_cond_destroy(&t->changed);
-        pthread_mutex_destroy(&t->mutex);
+    status = background_start(&t->thread, run, t, "removes files", err);
+    if (status == STATUS_OK)
+        *out = t;
+    else
         mem_free(t);
-        return error_set_errno(err, failed, "cannot start the thread that removes files");
-    }
-    return STATUS_OK;
+    return status;
 }
 
 void trash_free(struct trash *t) {
     if (!t)
         return;
-    pthread_mutex_lock(&t->mutex);
-    t->stopping = true;
-    pthread_cond_broadcast(&t->changed);
-    pthread_mutex_unlock(&t->mutex);
-    pthread_join(t->thread, NULL);
-    pthread_cond_destroy(&t->changed);
-    pthread_mutex_destroy(&t->mutex);
+    background_stop(&t->thread);
     mem_free(t);
 }
 
 static void wake(struct trash *t) {
-    pthread_mutex_lock(&t->mutex);
+    pthread_mutex_lock(&t->thread.mutex);
     t->has_work = true;
-    pthread_cond_broadcast(&t->changed);
-    pthread_mutex_unlock(&t->mutex);
+    pthread_cond_broadcast(&t->thread.changed);
+    pthread_mutex_unlock(&t->thread.mutex);
 }
 
 enum status trash_take(struct trash *t, const char *path, struct error *err) {
@@ -157,15 +137,15 @@ enum status trash_take(struct trash *t, const char *path, struct error *err) {
 }
 
 bool trash_is_busy(struct trash *t) {
-    pthread_mutex_lock(&t->mutex);
+    pthread_mutex_lock(&t->thread.mutex);
     bool is_busy = t->has_work || t->is_working;
-    pthread_mutex_unlock(&t->mutex);
+    pthread_mutex_unlock(&t->thread.mutex);
     return is_busy;
 }
 
 void trash_wait(struct trash *t) {
-    pthread_mutex_lock(&t->mutex);
+    pthread_mutex_lock(&t->thread.mutex);
     while (t->has_work || t->is_working)
-        pthread_cond_wait(&t->changed, &t->mutex);
-    pthread_mutex_unlock(&t->mutex);
+        pthread_cond_wait(&t->thread.changed, &t->thread.mutex);
+    pthread_mutex_unlock(&t->thread.mutex);
 }

@@ -1,10 +1,7 @@
 /* courier.c -- see courier.h. */
 #include "server/executor/courier.h"
 
-#include <pthread.h>
-#include <signal.h>
-#include <stdatomic.h>
-
+#include "common/background.h"
 #include "common/buf.h"
 #include "common/mem.h"
 #include "server/executor/command.h"
@@ -16,12 +13,9 @@ struct list {
 };
 
 struct thread {
-    struct courier courier; /* first */
-    pthread_t thread;
-    pthread_mutex_t mutex; /* around all of the following */
-    pthread_cond_t called;
+    struct courier courier;       /* first */
+    struct background background; /* its mutex is around the lists */
     struct list asked, done;
-    atomic_bool stopping;
     double deadline_sec;
     void (*wake)(void *user);
     void *user;
@@ -61,38 +55,38 @@ static void run(struct errand *errand, double deadline_sec, const atomic_bool *s
 
 static void *work(void *user) {
     struct thread *t = user;
-    pthread_mutex_lock(&t->mutex);
-    while (!t->stopping) {
+    pthread_mutex_lock(&t->background.mutex);
+    while (!atomic_load(&t->background.stopping)) {
         struct errand *next = take(&t->asked);
         if (!next) {
-            pthread_cond_wait(&t->called, &t->mutex);
+            pthread_cond_wait(&t->background.changed, &t->background.mutex);
             continue;
         }
-        pthread_mutex_unlock(&t->mutex);
-        run(next, t->deadline_sec, &t->stopping);
-        pthread_mutex_lock(&t->mutex);
+        pthread_mutex_unlock(&t->background.mutex);
+        run(next, t->deadline_sec, &t->background.stopping);
+        pthread_mutex_lock(&t->background.mutex);
         put(&t->done, next);
-        pthread_mutex_unlock(&t->mutex);
+        pthread_mutex_unlock(&t->background.mutex);
         t->wake(t->user);
-        pthread_mutex_lock(&t->mutex);
+        pthread_mutex_lock(&t->background.mutex);
     }
-    pthread_mutex_unlock(&t->mutex);
+    pthread_mutex_unlock(&t->background.mutex);
     return NULL;
 }
 
 static void send(struct courier *courier, struct errand *errand) {
     struct thread *t = (struct thread *)(void *)courier;
-    pthread_mutex_lock(&t->mutex);
+    pthread_mutex_lock(&t->background.mutex);
     put(&t->asked, errand);
-    pthread_cond_signal(&t->called);
-    pthread_mutex_unlock(&t->mutex);
+    pthread_cond_signal(&t->background.changed);
+    pthread_mutex_unlock(&t->background.mutex);
 }
 
 static struct errand *receive(struct courier *courier) {
     struct thread *t = (struct thread *)(void *)courier;
-    pthread_mutex_lock(&t->mutex);
+    pthread_mutex_lock(&t->background.mutex);
     struct errand *first = take(&t->done);
-    pthread_mutex_unlock(&t->mutex);
+    pthread_mutex_unlock(&t->background.mutex);
     return first;
 }
 
@@ -100,16 +94,8 @@ struct courier *courier_thread_new(double deadline_sec, void (*wake)(void *user)
     struct thread *t = mem_calloc(1, sizeof *t);
     *t = (struct thread){
         .courier = {.send = send, .receive = receive}, .deadline_sec = deadline_sec, .wake = wake, .user = user};
-    pthread_mutex_init(&t->mutex, NULL);
-    pthread_cond_init(&t->called, NULL);
-    sigset_t all, before; /* signals are for the main thread */
-    sigfillset(&all);
-    pthread_sigmask(SIG_SETMASK, &all, &before);
-    int number = pthread_create(&t->thread, NULL, work, t);
-    pthread_sigmask(SIG_SETMASK, &before, NULL);
-    if (number == 0)
+    if (background_start(&t->background, work, t, "runs a site's commands", err) == STATUS_OK)
         return &t->courier;
-    error_set_errno(err, number, "cannot start a thread");
     mem_free(t);
     return NULL;
 }
@@ -118,18 +104,12 @@ void courier_thread_free(struct courier *courier) {
     struct thread *t = (struct thread *)(void *)courier;
     if (!t)
         return;
-    pthread_mutex_lock(&t->mutex);
-    t->stopping = true;
-    pthread_cond_signal(&t->called);
-    pthread_mutex_unlock(&t->mutex);
-    pthread_join(t->thread, NULL);
+    background_stop(&t->background);
     for (struct errand *e; (e = take(&t->asked)) != NULL;)
         errand_free(e);
     for (struct errand *e; (e = take(&t->done)) != NULL;)
         errand_free(e);
     mem_free(t->asked.item);
     mem_free(t->done.item);
-    pthread_mutex_destroy(&t->mutex);
-    pthread_cond_destroy(&t->called);
     mem_free(t);
 }

@@ -1,13 +1,13 @@
 /* readiness.c -- see readiness.h. */
 #include "server/http/readiness.h"
 
-#include <pthread.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
 #include <time.h>
 #include <unistd.h>
 
+#include "common/background.h"
 #include "common/clock.h"
 #include "common/file.h"
 #include "common/mem.h"
@@ -16,10 +16,8 @@
 struct readiness {
     struct store *store;
     const char *data_dir;
-    pthread_t thread;
-    pthread_mutex_t mutex; /* guards what follows; not held during the probe */
-    pthread_cond_t changed;
-    bool is_wanted, is_asking, stopping;
+    struct background thread; /* its mutex guards what follows; not held during the probe */
+    bool is_wanted, is_asking;
     double asked_sec;       /* when the probe under way began */
     unsigned long answered; /* number of finished probes */
     struct error answer;    /* result of the last one; STATUS_OK: all is well */
@@ -46,32 +44,32 @@ static enum status probe_disk(const struct readiness *r, struct error *err) {
 static void *run(void *user) {
     struct readiness *r = user;
     pthread_setname_np(pthread_self(), "readiness");
-    pthread_mutex_lock(&r->mutex);
-    while (!r->stopping) {
+    pthread_mutex_lock(&r->thread.mutex);
+    while (!atomic_load(&r->thread.stopping)) {
         struct error err = {0};
         uint64_t room = 0;
         if (!r->is_wanted) {
-            pthread_cond_wait(&r->changed, &r->mutex);
+            pthread_cond_wait(&r->thread.changed, &r->thread.mutex);
             continue;
         }
         r->is_wanted = false;
         r->is_asking = true;
         r->asked_sec = clock_sec();
-        pthread_mutex_unlock(&r->mutex);
+        pthread_mutex_unlock(&r->thread.mutex);
         enum status status = store_probe(r->store, &err);
         if (status == STATUS_OK)
             status = probe_disk(r, &err);
         if (status == STATUS_OK)
             status = file_free_bytes(r->data_dir, &room, &err);
-        pthread_mutex_lock(&r->mutex);
+        pthread_mutex_lock(&r->thread.mutex);
         err.status = status;
         r->answer = err;
         r->free_bytes = room;
         r->answered++;
         r->is_asking = false;
-        pthread_cond_broadcast(&r->changed);
+        pthread_cond_broadcast(&r->thread.changed);
     }
-    pthread_mutex_unlock(&r->mutex);
+    pthread_mutex_unlock(&r->thread.mutex);
     return NULL;
 }
 
@@ -79,45 +77,31 @@ enum status readiness_new(struct readiness **out, struct store *store, const cha
     struct readiness *r = mem_calloc(1, sizeof *r);
     r->store = store;
     r->data_dir = data_dir;
-    pthread_mutex_init(&r->mutex, NULL);
-    pthread_cond_init(&r->changed, NULL);
-    int failed = pthread_create(&r->thread, NULL, run, r);
-    *out = failed ? NULL : r;
-    if (failed) {
-        pthread_cond_destroy(&r->changed);
-        pthread_mutex_destroy(&r->mutex);
+    enum status status = background_start(&r->thread, run, r, "asks the disk", err);
+    *out = status == STATUS_OK ? r : NULL;
+    if (status != STATUS_OK)
         mem_free(r);
-        return error_set_errno(err, failed, "cannot start the thread that asks the disk");
-    }
-    return STATUS_OK;
+    return status;
 }
 
 void readiness_free(struct readiness *r) {
     if (!r)
         return;
-    pthread_mutex_lock(&r->mutex);
-    r->stopping = true;
-    pthread_cond_broadcast(&r->changed);
-    pthread_mutex_unlock(&r->mutex);
-    pthread_join(r->thread, NULL);
-    pthread_cond_destroy(&r->changed);
-    pthread_mutex_destroy(&r->mutex);
+    background_stop(&r->thread);
     mem_free(r);
 }
 
 enum status readiness_ask(struct readiness *r, uint64_t *free_bytes, struct error *err) {
-    struct timespec until;
-    clock_gettime(CLOCK_MONOTONIC, &until);
-    until.tv_sec += READINESS_WAIT_SEC;
-    pthread_mutex_lock(&r->mutex);
+    double until_sec = clock_sec() + READINESS_WAIT_SEC;
+    pthread_mutex_lock(&r->thread.mutex);
     bool is_late = r->is_asking && clock_sec() - r->asked_sec >= READINESS_WAIT_SEC;
     unsigned long before = r->answered;
     if (!r->is_asking && !r->is_wanted) {
         r->is_wanted = true;
-        pthread_cond_broadcast(&r->changed);
+        pthread_cond_broadcast(&r->thread.changed);
     }
-    while (!is_late && r->answered == before && !r->stopping)
-        is_late = pthread_cond_clockwait(&r->changed, &r->mutex, CLOCK_MONOTONIC, &until) != 0;
+    while (!is_late && r->answered == before && !atomic_load(&r->thread.stopping))
+        is_late = !background_wait_until(&r->thread, until_sec);
     enum status status = r->answer.status;
     if (is_late || r->answered == before)
         status = error_set(err, STATUS_UNAVAILABLE, "the disk of the data folder has not answered within %d s",
@@ -125,6 +109,6 @@ enum status readiness_ask(struct readiness *r, uint64_t *free_bytes, struct erro
     else if (status != STATUS_OK)
         *err = r->answer;
     *free_bytes = r->free_bytes;
-    pthread_mutex_unlock(&r->mutex);
+    pthread_mutex_unlock(&r->thread.mutex);
     return status;
 }

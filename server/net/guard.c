@@ -4,13 +4,12 @@
 #include <linux/sockios.h>
 #include <linux/tcp.h>
 #include <netinet/in.h>
-#include <pthread.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
-#include <time.h>
 
+#include "common/background.h"
 #include "common/clock.h"
 #include "common/mem.h"
 
@@ -30,13 +29,10 @@ struct guard {
     struct guard_limits limits;
     void (*tick)(void *user);
     void *user;
-    pthread_mutex_t mutex; /* guards everything below */
-    pthread_cond_t changed;
-    bool stopping;
+    struct background thread; /* its mutex guards everything below */
     struct guarded *first;
     size_t count;
     uint64_t shut_count;
-    pthread_t thread;
 };
 
 /* Bytes that the peer has acknowledged in all; false when none are outstanding, or the socket is not TCP. */
@@ -91,7 +87,7 @@ void guard_discard_unsent(struct guarded *c) {
 }
 
 void guard_look(struct guard *g, double now_sec) {
-    pthread_mutex_lock(&g->mutex);
+    pthread_mutex_lock(&g->thread.mutex);
     for (struct guarded *c = g->first; c; c = c->next) {
         if (c->is_shut || c->held_sec > 0.0 || !is_late(g, c, now_sec))
             continue;
@@ -101,29 +97,27 @@ void guard_look(struct guard *g, double now_sec) {
         g->shut_count++;
         shutdown(c->fd, SHUT_RDWR);
     }
-    pthread_mutex_unlock(&g->mutex);
+    pthread_mutex_unlock(&g->thread.mutex);
 }
 
 static void *run(void *user) {
     struct guard *g = user;
-    pthread_mutex_lock(&g->mutex);
-    while (!g->stopping) {
+    pthread_mutex_lock(&g->thread.mutex);
+    while (!atomic_load(&g->thread.stopping)) {
         if (g->count == 0) {
-            pthread_cond_wait(&g->changed, &g->mutex);
+            pthread_cond_wait(&g->thread.changed, &g->thread.mutex);
             continue;
         }
-        struct timespec until;
-        clock_gettime(CLOCK_MONOTONIC, &until);
-        until.tv_sec++;
-        while (!g->stopping && pthread_cond_timedwait(&g->changed, &g->mutex, &until) == 0)
+        double until_sec = clock_sec() + 1.0;
+        while (!atomic_load(&g->thread.stopping) && background_wait_until(&g->thread, until_sec))
             ; /* woken by a connection that came or went: the second is not over */
-        pthread_mutex_unlock(&g->mutex);
+        pthread_mutex_unlock(&g->thread.mutex);
         guard_look(g, clock_sec());
         if (g->tick)
             g->tick(g->user);
-        pthread_mutex_lock(&g->mutex);
+        pthread_mutex_lock(&g->thread.mutex);
     }
-    pthread_mutex_unlock(&g->mutex);
+    pthread_mutex_unlock(&g->thread.mutex);
     return NULL;
 }
 
@@ -133,33 +127,17 @@ enum status guard_new(struct guard **out, const struct guard_limits *limits, voi
     g->limits = *limits;
     g->tick = tick;
     g->user = user;
-    pthread_mutex_init(&g->mutex, NULL);
-    pthread_condattr_t monotonic;
-    pthread_condattr_init(&monotonic);
-    pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
-    pthread_cond_init(&g->changed, &monotonic);
-    pthread_condattr_destroy(&monotonic);
-    *out = g;
-    int failed = pthread_create(&g->thread, NULL, run, g);
-    if (failed == 0)
-        return STATUS_OK;
-    pthread_cond_destroy(&g->changed);
-    pthread_mutex_destroy(&g->mutex);
-    mem_free(g);
-    *out = NULL;
-    return error_set_errno(err, failed, "cannot start the thread that watches connections");
+    enum status status = background_start(&g->thread, run, g, "watches connections", err);
+    *out = status == STATUS_OK ? g : NULL;
+    if (status != STATUS_OK)
+        mem_free(g);
+    return status;
 }
 
 void guard_free(struct guard *g) {
     if (!g)
         return;
-    pthread_mutex_lock(&g->mutex);
-    g->stopping = true;
-    pthread_cond_signal(&g->changed);
-    pthread_mutex_unlock(&g->mutex);
-    pthread_join(g->thread, NULL);
-    pthread_cond_destroy(&g->changed);
-    pthread_mutex_destroy(&g->mutex);
+    background_stop(&g->thread);
     mem_free(g);
 }
 
@@ -168,19 +146,19 @@ struct guarded *guard_add(struct guard *g, int fd) {
     c->fd = fd;
     c->phase = GUARD_HEAD;
     c->since_sec = clock_sec();
-    pthread_mutex_lock(&g->mutex);
+    pthread_mutex_lock(&g->thread.mutex);
     c->next = g->first;
     if (g->first)
         g->first->previous = c;
     g->first = c;
     if (g->count++ == 0)
-        pthread_cond_signal(&g->changed);
-    pthread_mutex_unlock(&g->mutex);
+        pthread_cond_signal(&g->thread.changed);
+    pthread_mutex_unlock(&g->thread.mutex);
     return c;
 }
 
 void guard_remove(struct guard *g, struct guarded *c) {
-    pthread_mutex_lock(&g->mutex);
+    pthread_mutex_lock(&g->thread.mutex);
     if (c->next)
         c->next->previous = c->previous;
     if (c->previous)
@@ -188,47 +166,47 @@ void guard_remove(struct guard *g, struct guarded *c) {
     else
         g->first = c->next;
     g->count--;
-    pthread_mutex_unlock(&g->mutex);
+    pthread_mutex_unlock(&g->thread.mutex);
     mem_free(c);
 }
 
 void guard_enter(struct guard *g, struct guarded *c, enum guard_phase phase) {
-    pthread_mutex_lock(&g->mutex);
+    pthread_mutex_lock(&g->thread.mutex);
     c->phase = phase;
     c->phase_sec = c->since_sec = clock_sec();
     c->window_bytes = 0;
     c->has_backlog = false;
     c->held_sec = 0.0;
-    pthread_mutex_unlock(&g->mutex);
+    pthread_mutex_unlock(&g->thread.mutex);
 }
 
 void guard_hold(struct guard *g, struct guarded *c, bool is_held) {
     double now = clock_sec();
-    pthread_mutex_lock(&g->mutex);
+    pthread_mutex_lock(&g->thread.mutex);
     if (!is_held && c->held_sec > 0.0) {
         c->phase_sec += now - c->held_sec;
         c->since_sec += now - c->held_sec;
     }
     c->held_sec = is_held ? now : 0.0;
-    pthread_mutex_unlock(&g->mutex);
+    pthread_mutex_unlock(&g->thread.mutex);
 }
 
 void guard_body(struct guard *g, struct guarded *c, size_t bytes) {
-    pthread_mutex_lock(&g->mutex);
+    pthread_mutex_lock(&g->thread.mutex);
     c->window_bytes += bytes;
-    pthread_mutex_unlock(&g->mutex);
+    pthread_mutex_unlock(&g->thread.mutex);
 }
 
 size_t guard_count(struct guard *g) {
-    pthread_mutex_lock(&g->mutex);
+    pthread_mutex_lock(&g->thread.mutex);
     size_t count = g->count;
-    pthread_mutex_unlock(&g->mutex);
+    pthread_mutex_unlock(&g->thread.mutex);
     return count;
 }
 
 uint64_t guard_shut_count(struct guard *g) {
-    pthread_mutex_lock(&g->mutex);
+    pthread_mutex_lock(&g->thread.mutex);
     uint64_t count = g->shut_count;
-    pthread_mutex_unlock(&g->mutex);
+    pthread_mutex_unlock(&g->thread.mutex);
     return count;
 }

@@ -2,13 +2,14 @@
 #include "server/uploads/digests.h"
 
 #include <errno.h>
-#include <pthread.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
+#include "common/background.h"
+#include "common/clock.h"
 #include "common/log.h"
 #include "common/mem.h"
 #include "server/data/work_file.h"
@@ -19,13 +20,10 @@
 struct digests {
     struct store *store;
     const char *data_dir;
-    pthread_t thread;
-    atomic_bool stopping;
     atomic_ullong hashed_bytes;
-    pthread_mutex_t mutex; /* guards what follows */
-    pthread_cond_t changed;
-    bool has_work; /* a digest may have been requested since the last search */
-    bool is_idle;  /* nothing was found, or nothing can be done for now */
+    struct background thread; /* its mutex guards what follows */
+    bool has_work;            /* a digest may have been requested since the last search */
+    bool is_idle;             /* nothing was found, or nothing can be done for now */
 };
 
 /* --- one file ---------------------------------------------------------------------------- */
@@ -142,7 +140,7 @@ static bool compute(struct digests *d, int64_t job_id, const struct output_row *
     int fd;
     enum status status = work_file_open_output(d->data_dir, job_id, row->attempt, row->name, &fd, &err);
     if (status == STATUS_OK) {
-        status = digests_hash(fd, &d->stopping, version, hex, &err);
+        status = digests_hash(fd, &d->thread.stopping, version, hex, &err);
         close(fd);
     }
     *is_had = status == STATUS_OK;
@@ -155,19 +153,20 @@ static bool compute(struct digests *d, int64_t job_id, const struct output_row *
 
 /* Waits for a new request, or (retries) for a while; false when the daemon stops. */
 static bool wait_for_work(struct digests *d, bool retries) {
-    struct timespec until;
-    clock_gettime(CLOCK_MONOTONIC, &until);
-    until.tv_sec += RETRY_SEC;
-    pthread_mutex_lock(&d->mutex);
+    double until_sec = clock_sec() + RETRY_SEC;
+    pthread_mutex_lock(&d->thread.mutex);
     d->is_idle = !d->has_work || retries;
-    pthread_cond_broadcast(&d->changed);
-    int timed_out = 0;
-    while (!atomic_load(&d->stopping) && !timed_out && (retries || !d->has_work))
-        timed_out = retries ? pthread_cond_clockwait(&d->changed, &d->mutex, CLOCK_MONOTONIC, &until)
-                            : pthread_cond_wait(&d->changed, &d->mutex);
+    pthread_cond_broadcast(&d->thread.changed);
+    bool goes_on = true;
+    while (!atomic_load(&d->thread.stopping) && goes_on && (retries || !d->has_work)) {
+        if (retries)
+            goes_on = background_wait_until(&d->thread, until_sec);
+        else
+            pthread_cond_wait(&d->thread.changed, &d->thread.mutex);
+    }
     d->has_work = d->is_idle = false;
-    pthread_mutex_unlock(&d->mutex);
-    return !atomic_load(&d->stopping);
+    pthread_mutex_unlock(&d->thread.mutex);
+    return !atomic_load(&d->thread.stopping);
 }
 
 /* Hashes one output and enters the result, repeatedly if needed; false when the daemon stops. */
@@ -188,7 +187,7 @@ static void *run(void *user) {
     struct digests *d = user;
     bool goes_on = true;
     pthread_setname_np(pthread_self(), "digests");
-    while (goes_on && !atomic_load(&d->stopping)) {
+    while (goes_on && !atomic_load(&d->thread.stopping)) {
         struct output_row row;
         struct error err;
         int64_t job_id;
@@ -208,45 +207,33 @@ enum status digests_new(struct digests **out, struct store *store, const char *d
     struct digests *d = mem_calloc(1, sizeof *d);
     d->store = store;
     d->data_dir = data_dir;
-    pthread_mutex_init(&d->mutex, NULL);
-    pthread_cond_init(&d->changed, NULL);
-    int failed = pthread_create(&d->thread, NULL, run, d);
-    *out = failed ? NULL : d;
-    if (failed) {
-        pthread_cond_destroy(&d->changed);
-        pthread_mutex_destroy(&d->mutex);
+    enum status status = background_start(&d->thread, run, d, "hashes outputs", err);
+    *out = status == STATUS_OK ? d : NULL;
+    if (status != STATUS_OK)
         mem_free(d);
-        return error_set_errno(err, failed, "cannot start the thread that hashes outputs");
-    }
-    return STATUS_OK;
+    return status;
 }
 
 void digests_free(struct digests *d) {
     if (!d)
         return;
-    pthread_mutex_lock(&d->mutex);
-    atomic_store(&d->stopping, true);
-    pthread_cond_broadcast(&d->changed);
-    pthread_mutex_unlock(&d->mutex);
-    pthread_join(d->thread, NULL);
-    pthread_cond_destroy(&d->changed);
-    pthread_mutex_destroy(&d->mutex);
+    background_stop(&d->thread);
     mem_free(d);
 }
 
 void digests_wake(void *digests) {
     struct digests *d = digests;
-    pthread_mutex_lock(&d->mutex);
+    pthread_mutex_lock(&d->thread.mutex);
     d->has_work = true;
-    pthread_cond_broadcast(&d->changed);
-    pthread_mutex_unlock(&d->mutex);
+    pthread_cond_broadcast(&d->thread.changed);
+    pthread_mutex_unlock(&d->thread.mutex);
 }
 
 uint64_t digests_hashed_bytes(const struct digests *d) { return atomic_load(&d->hashed_bytes); }
 
 void digests_wait(struct digests *d) {
-    pthread_mutex_lock(&d->mutex);
+    pthread_mutex_lock(&d->thread.mutex);
     while (d->has_work || !d->is_idle)
-        pthread_cond_wait(&d->changed, &d->mutex);
-    pthread_mutex_unlock(&d->mutex);
+        pthread_cond_wait(&d->thread.changed, &d->thread.mutex);
+    pthread_mutex_unlock(&d->thread.mutex);
 }
