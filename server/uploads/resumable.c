@@ -129,9 +129,9 @@ static void give_space_back(struct resumables *r, const char *id) {
     upload_session_put(s);
 }
 
-/* Frees the reserved space of uploads that have not grown for idle_ms. */
-static enum status give_idle_space_back(struct resumables *r, struct error *err) {
-    int64_t since_ms = clock_unix_ms() - r->config.idle_ms;
+/* Visits all uploads that are not a scene. */
+static enum status each_upload(struct resumables *r, void (*visit)(struct resumables *r, const struct upload_row *row),
+                               struct error *err) {
     char cursor[128] = "";
     enum status status;
     do {
@@ -140,13 +140,19 @@ static enum status give_idle_space_back(struct resumables *r, struct error *err)
         char next[128];
         status = store_upload_list(r->config.store, NULL, "", cursor, 64, rows, &count, next, err);
         for (size_t i = 0; i < count; i++) {
-            if (!*rows[i].scene_id && rows[i].updated_ms < since_ms && holds_space(r, rows[i].id))
-                give_space_back(r, rows[i].id);
+            if (!*rows[i].scene_id)
+                visit(r, &rows[i]);
             upload_row_release(&rows[i]);
         }
         memcpy(cursor, next, sizeof cursor);
     } while (status == STATUS_OK && *cursor);
     return status;
+}
+
+/* Frees the reserved space of an upload that has not grown for idle_ms. */
+static void give_idle_space_back(struct resumables *r, const struct upload_row *row) {
+    if (row->updated_ms < clock_unix_ms() - r->config.idle_ms && holds_space(r, row->id))
+        give_space_back(r, row->id);
 }
 
 void resumables_maintain(struct resumables *r) {
@@ -161,7 +167,7 @@ void resumables_maintain(struct resumables *r) {
         upload_session_put(s);
     }
     struct error why;
-    if (give_idle_space_back(r, &why) != STATUS_OK)
+    if (each_upload(r, give_idle_space_back, &why) != STATUS_OK)
         log_warning("cannot look for idle uploads: %s", why.message);
 }
 
@@ -176,24 +182,13 @@ void resumables_free(struct resumables *r) {
     mem_free(r);
 }
 
-enum status resumables_recover(struct resumables *r, struct error *err) {
-    char cursor[128] = "";
-    enum status status;
-    do {
-        struct upload_row rows[64];
-        size_t count;
-        char next[128];
-        status = store_upload_list(r->config.store, NULL, "", cursor, 64, rows, &count, next, err);
-        for (size_t i = 0; i < count; i++) {
-            struct error why;
-            if (!*rows[i].scene_id && rows[i].received == rows[i].length && finish(r, rows[i].id, &why) != STATUS_OK)
-                log_warning("upload %s: %s", rows[i].id, why.message);
-            upload_row_release(&rows[i]);
-        }
-        memcpy(cursor, next, sizeof cursor);
-    } while (status == STATUS_OK && *cursor);
-    return status;
+static void finish_whole(struct resumables *r, const struct upload_row *row) {
+    struct error why;
+    if (row->received == row->length && finish(r, row->id, &why) != STATUS_OK)
+        log_warning("upload %s: %s", row->id, why.message);
 }
+
+enum status resumables_recover(struct resumables *r, struct error *err) { return each_upload(r, finish_whole, err); }
 
 /* --- one of them ------------------------------------------------------------------------- */
 
