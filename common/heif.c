@@ -205,16 +205,6 @@ static void convert_row(const struct heif_picture *p, const uint8_t *from, float
             to[i] = (float)(from[2 * i] | from[2 * i + 1] << 8) * scale;
 }
 
-/* Colours that were multiplied by alpha, in stored values, become those of the surface. */
-static void divide_by_alpha(struct image *image) {
-    size_t count = (size_t)image->width * image->height;
-    for (size_t i = 0; i < count; i++) {
-        float *pixel = image->pixel + 4 * i;
-        for (int c = 0; c < 3 && pixel[3] > 0.0f; c++)
-            pixel[c] = pixel[c] < pixel[3] ? pixel[c] / pixel[3] : 1.0f;
-    }
-}
-
 static enum status read_pixels(struct heif_picture *p, struct image *image, struct error *err) {
     int stride = 0;
     const uint8_t *plane = heif_image_get_plane_readonly(p->decoded, heif_channel_interleaved, &stride);
@@ -229,7 +219,7 @@ static enum status read_pixels(struct heif_picture *p, struct image *image, stru
     for (size_t y = 0; y < image->height; y++)
         convert_row(p, plane + y * (size_t)stride, image->pixel + y * row_floats, row_floats);
     if (p->has_alpha && heif_image_handle_is_premultiplied_alpha(p->handle))
-        divide_by_alpha(image);
+        image_divide_by_alpha(image, 1.0f);
     return STATUS_OK;
 }
 

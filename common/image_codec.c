@@ -54,6 +54,15 @@ void image_color_by_exif(const struct image_info *info, struct color *color) {
                  "its EXIF says that its colours are not those of sRGB, and no profile says what they are");
 }
 
+void image_divide_by_alpha(struct image *image, float most) {
+    size_t count = (size_t)image->width * image->height;
+    for (size_t i = 0; i < count; i++) {
+        float *pixel = image->pixel + 4 * i;
+        for (int c = 0; c < 3 && pixel[3] > 0.0f; c++)
+            pixel[c] = pixel[c] / pixel[3] > most ? most : pixel[c] / pixel[3]; /* NaN stays */
+    }
+}
+
 void image_convert(struct image *image, struct image_info *info, struct color *color) {
     size_t ignored = 0;
     float clip[3] = {IMAGE_CLIP_SHARE, IMAGE_CLIP_SHARE, IMAGE_CLIP_SHARE};

@@ -30,6 +30,9 @@ size_t image_source_read(struct image_source *source, uint64_t offset, void *buf
 /* Converts a picture with values in [0, 1] by *color and records it in *info; releases *color. */
 void image_convert(struct image *image, struct image_info *info, struct color *color);
 
+/* Colours (the first three of four channels) that were multiplied by alpha become those of the surface, up to `most`. */
+void image_divide_by_alpha(struct image *image, float most);
+
 /* Colour space from EXIF, for files without a better source. */
 void image_color_by_exif(const struct image_info *info, struct color *color);
 

@@ -2,6 +2,7 @@
  *
  * Strips and tiles are blocks of the picture, in which either the samples of a pixel follow each other or, in separate
  * planes, a block holds one sample of each. */
+#include <math.h>
 #include <string.h>
 
 #include "common/mem.h"
@@ -129,16 +130,6 @@ static void finish_grey(const struct tiff_reader *r, struct image *image) {
     }
 }
 
-/* Colours that were multiplied by alpha become those of the surface. */
-static void divide_by_alpha(struct image *image) {
-    size_t count = (size_t)image->width * image->height;
-    for (size_t i = 0; i < count; i++) {
-        float *pixel = image->pixel + 4 * i;
-        for (int c = 0; c < 3 && pixel[3] > 0.0f; c++)
-            pixel[c] /= pixel[3];
-    }
-}
-
 /* Palettes, few bits, subsampled YCbCr and such, in 8 bits, by the library. */
 static enum status read_converted(struct tiff_reader *r, struct image *image, struct error *err) {
     TIFFRGBAImage converter;
@@ -171,6 +162,6 @@ enum status tiff_read_pixels(struct tiff_reader *r, struct image *image, struct 
     if (r->color == TIFF_GREY)
         finish_grey(r, image);
     if (r->has_alpha && r->is_premultiplied)
-        divide_by_alpha(image);
+        image_divide_by_alpha(image, INFINITY);
     return STATUS_OK;
 }
