@@ -164,6 +164,13 @@ const struct listed_file *listing_find(const struct listing *l, const char *base
     return &l->file[at];
 }
 
+char *listing_find_any(const struct listing *l, const char *base, const char *const *names, size_t count) {
+    const struct listed_file *file = NULL;
+    for (size_t i = 0; i < count && !file; i++)
+        file = listing_find(l, base, names[i]);
+    return file ? mem_strdup(file->path) : NULL;
+}
+
 bool listing_has_folder(const struct listing *l, const char *base, const char *name) {
     char *inner = mem_printf("%s%s/", base, name);
     size_t at = lower_bound(l, inner, "");

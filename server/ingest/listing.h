@@ -38,6 +38,8 @@ void listing_release(struct listing *l);
 
 /* The file at base + name; NULL: there is none. */
 const struct listed_file *listing_find(const struct listing *l, const char *base, const char *name);
+/* The path of the first of the names that is there, the caller's; NULL: none is. */
+char *listing_find_any(const struct listing *l, const char *base, const char *const *names, size_t count);
 /* Whether any file lies in the folder base + name. */
 bool listing_has_folder(const struct listing *l, const char *base, const char *name);
 /* The folder that holds the folder `base`, the caller's; NULL for the root. */

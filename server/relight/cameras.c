@@ -9,6 +9,7 @@
 #include "common/mem.h"
 #include "server/ingest/transforms.h"
 #include "server/relight/files.h"
+#include "server/scene/coordinates.h"
 
 #define DEFAULT_PANORAMA_WIDTH 2048 /* pixels */
 
@@ -179,10 +180,8 @@ static struct quaternion quaternion_of(const float m[3][3]) {
 }
 
 static void rotation_of(const double q[4], float m[3][3]) {
-    double w = q[0], x = q[1], y = q[2], z = q[3];
-    const double r[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
-                            {2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
-                            {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}};
+    double r[3][3];
+    coordinates_rotation(q, r);
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++)
             m[i][j] = (float)r[i][j];

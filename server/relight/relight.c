@@ -10,7 +10,7 @@
 #include "common/mem.h"
 #include "server/export/pictures.h"
 #include "server/export/views_json.h"
-#include "server/ingest/mesh/ply.h"
+#include "server/ingest/mesh/mesh_file.h"
 #include "server/relight/cameras.h"
 #include "server/relight/denoise.h"
 #include "server/relight/environment.h"
@@ -306,7 +306,7 @@ static enum status run_open(struct relight_state *r, struct error *err) {
     char *scene = file_join(r->job->outputs, "scene.ply");
     enum status status = check_denoiser(r, err);
     if (status == STATUS_OK)
-        status = ply_read(scene, scene, MESH_MAX_TRIANGLES, &mesh, NULL, err);
+        status = mesh_file_read(scene, scene, MESH_MAX_TRIANGLES, &mesh, NULL, err);
     if (status == STATUS_OK)
         status = cameras_read(r->job, mesh.offset, &r->views, err);
     if (status == STATUS_OK)

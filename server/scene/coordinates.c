@@ -15,6 +15,13 @@ double coordinates_invert(const double m[3][4], double inverse[3][4]) {
     return det;
 }
 
+void coordinates_rotation(const double q[4], double r[3][3]) {
+    double w = q[0], x = q[1], y = q[2], z = q[3];
+    r[0][0] = 1 - 2 * (y * y + z * z), r[0][1] = 2 * (x * y - z * w), r[0][2] = 2 * (x * z + y * w);
+    r[1][0] = 2 * (x * y + z * w), r[1][1] = 1 - 2 * (x * x + z * z), r[1][2] = 2 * (y * z - x * w);
+    r[2][0] = 2 * (x * z - y * w), r[2][1] = 2 * (y * z + x * w), r[2][2] = 1 - 2 * (x * x + y * y);
+}
+
 void coordinates_product(const double a[3][4], const double b[3][4], double out[3][4]) {
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 4; j++)

@@ -14,6 +14,8 @@ struct coordinates {
 
 /* inverse = m^-1 for the affine m; returns the determinant of its linear part. */
 double coordinates_invert(const double m[3][4], double inverse[3][4]);
+/* Rotation matrix of the unit quaternion w x y z. */
+void coordinates_rotation(const double q[4], double r[3][3]);
 /* out = a b, first b. */
 void coordinates_product(const double a[3][4], const double b[3][4], double out[3][4]);
 

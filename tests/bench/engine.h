@@ -134,7 +134,7 @@ static inline void load(struct room *room, const char *name) {
     struct error err;
     memset(room, 0, sizeof *room);
     snprintf(path, sizeof path, "rooms/%s/mesh.ply", name);
-    room_must(ply_read(check_data(path), path, MESH_MAX_TRIANGLES, &room->mesh, NULL, &err), &err);
+    room_must(mesh_file_read(check_data(path), path, MESH_MAX_TRIANGLES, &room->mesh, NULL, &err), &err);
     struct mesh_report report;
     room_must(mesh_check(&room->mesh, path, &report, &err), &err);
     segments_from_object_id(&room->segments, &room->mesh);

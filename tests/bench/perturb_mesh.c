@@ -26,7 +26,7 @@
 
 #include "common/mem.h"
 #include "common/rng.h"
-#include "server/ingest/mesh/ply.h"
+#include "server/ingest/mesh/mesh_file.h"
 #include "server/scene/adjacency.h"
 #include "server/scene/mesh.h"
 
@@ -261,7 +261,7 @@ int main(int argc, char **argv) {
         fprintf(stderr, "perturb_mesh: built without libmeshoptimizer-dev: cannot decimate\n");
         return 77;
     }
-    if (!(edge > 0.0f) || ply_read(argv[1], argv[1], MESH_MAX_TRIANGLES, &mesh, NULL, &err) != STATUS_OK ||
+    if (!(edge > 0.0f) || mesh_file_read(argv[1], argv[1], MESH_MAX_TRIANGLES, &mesh, NULL, &err) != STATUS_OK ||
         !mesh.object_id) {
         fprintf(stderr, "perturb_mesh: %s: not a mesh with object_id, or EDGE is not positive\n", argv[1]);
         return 1;

@@ -32,7 +32,7 @@
 #include "server/evaluate/score.h"
 #include "server/evaluate/seen.h"
 #include "server/ingest/bundle.h"
-#include "server/ingest/mesh/ply.h"
+#include "server/ingest/mesh/mesh_file.h"
 #include "server/relight/recovered.h"
 #include "server/render/film.h"
 
@@ -93,7 +93,7 @@ static enum status load(struct comparison *c, const char *room, const char *out,
     if (status == STATUS_OK)
         status = accel_new(&c->accel, &c->room.mesh, c->pool, err);
     if (status == STATUS_OK)
-        status = ply_read(path, "scene.ply", MESH_MAX_TRIANGLES, &c->mesh, &report, err);
+        status = mesh_file_read(path, "scene.ply", MESH_MAX_TRIANGLES, &c->mesh, &report, err);
     if (status == STATUS_OK)
         status = recovered_load(out, &c->mesh, c->pool, &c->recovered, err);
     mem_free(path);

@@ -7,13 +7,13 @@
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     struct mesh mesh;
     struct error err = {.message = ""};
-    enum status status = gltf_parse(data, size, "case", NULL, 100000, &mesh, NULL, &err);
+    enum status status = gltf_parse(data, size, "case", NULL, 100000, &mesh, NULL, NULL, &err);
     MUST(status != STATUS_OK || mesh.triangle_count > 0);
     for (size_t i = 0; status == STATUS_OK && i < mesh.triangle_count; i++)
         MUST(!mesh.object_id || mesh.object_id[i] >= 0);
     must_be_mesh(status, &mesh, &err);
     struct mesh_look look = {0};
-    status = gltf_parse_look(data, size, "case", NULL, 100000, &mesh, &look, NULL, &err);
+    status = gltf_parse(data, size, "case", NULL, 100000, &mesh, &look, NULL, &err);
     must_be_look(status, &mesh, &look, &err);
     return 0;
 }

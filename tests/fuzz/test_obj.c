@@ -6,13 +6,13 @@
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     struct mesh mesh;
     struct error err = {.message = ""};
-    enum status status = obj_parse(data, size, "case", NULL, 100000, &mesh, NULL, &err);
+    enum status status = obj_parse(data, size, "case", NULL, 100000, &mesh, NULL, NULL, &err);
     MUST(status != STATUS_OK || mesh.triangle_count > 0);
     for (size_t i = 0; status == STATUS_OK && i < mesh.triangle_count; i++)
         MUST(!mesh.object_id || (mesh.object_id[i] >= 0 && mesh.object_id[i] <= (int64_t)mesh.face_count));
     must_be_mesh(status, &mesh, &err);
     struct mesh_look look = {0};
-    status = obj_parse_look(data, size, "case", NULL, 100000, &mesh, &look, NULL, &err);
+    status = obj_parse(data, size, "case", NULL, 100000, &mesh, &look, NULL, &err);
     must_be_look(status, &mesh, &look, &err);
     return 0;
 }

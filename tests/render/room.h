@@ -10,7 +10,7 @@
 #include "common/image.h"
 #include "common/json.h"
 #include "common/mem.h"
-#include "server/ingest/mesh/ply.h"
+#include "server/ingest/mesh/mesh_file.h"
 #include "server/render/world.h"
 #include "server/scene/camera.h"
 #include "tests/check.h"
@@ -122,7 +122,7 @@ static inline void room_load(struct room *room, const char *ply, const char *obj
                              const int *drop, int drop_count, const struct image *environment, int thread_count) {
     struct error err;
     memset(room, 0, sizeof *room);
-    room_must(ply_read(check_data(ply), ply, MESH_MAX_TRIANGLES, &room->mesh, NULL, &err), &err);
+    room_must(mesh_file_read(check_data(ply), ply, MESH_MAX_TRIANGLES, &room->mesh, NULL, &err), &err);
     for (int i = 0; i < drop_count; i++)
         room_drop_object(&room->mesh, drop[i]);
     room_make_tables(room);

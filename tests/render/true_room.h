@@ -11,7 +11,7 @@
 #include "common/file.h"
 #include "common/mem.h"
 #include "server/demo/paint.h"
-#include "server/ingest/mesh/ply.h"
+#include "server/ingest/mesh/mesh_file.h"
 #include "server/relight/cameras.h"
 #include "server/relight/recovered.h"
 #include "server/scene/surface.h"
@@ -254,7 +254,7 @@ static inline enum status true_room_init(struct true_room *t, const char *room, 
                                          struct parallel *pool, struct error *err) {
     char *scene = file_join(outputs, "scene.ply");
     *t = (struct true_room){0};
-    enum status status = ply_read(scene, scene, TRUE_ROOM_TRIANGLES, &t->mesh, NULL, err);
+    enum status status = mesh_file_read(scene, scene, TRUE_ROOM_TRIANGLES, &t->mesh, NULL, err);
     if (status == STATUS_OK)
         status = recovered_load(outputs, &t->mesh, pool, &t->recovered, err);
     if (status == STATUS_OK)

@@ -5,7 +5,7 @@
 #include <stdbool.h>
 
 #include "common/mem.h"
-#include "server/ingest/mesh/ply.h"
+#include "server/ingest/mesh/mesh_file.h"
 #include "server/scene/mesh.h"
 #include "server/scene/segment.h"
 #include "tests/check.h"
@@ -20,7 +20,7 @@ static inline bool room_load(const char *name, struct mesh *mesh) {
         return false;
     }
     struct error err = {0};
-    bool ok = ply_read(path, name, MESH_MAX_TRIANGLES, mesh, NULL, &err) == STATUS_OK &&
+    bool ok = mesh_file_read(path, name, MESH_MAX_TRIANGLES, mesh, NULL, &err) == STATUS_OK &&
               mesh_check(mesh, name, NULL, &err) == STATUS_OK;
     CHECK_THAT(ok, "%s", err.message);
     return ok;

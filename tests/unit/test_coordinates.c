@@ -48,7 +48,7 @@ static void test_far(void) {
     mesh_release(&mesh);
     static const char obj[] = "v 600000.001 4100000.002 105.003\nv 600004.5 4100000.002 105.003\n"
                               "v 600004.5 4100003.25 105.003\nf 1 2 3\n";
-    take(obj_parse(obj, strlen(obj), "a.obj", NULL, 9, &mesh, NULL, &err), &err);
+    take(obj_parse(obj, strlen(obj), "a.obj", NULL, 9, &mesh, NULL, NULL, &err), &err);
     CHECK(is_at(&mesh, 600002.0, 4100002.0, 0.0));
     check_corner(&mesh, 0, 600000.001, 4100000.002, 105.003, 1e-5);
     mesh_release(&mesh);
@@ -59,7 +59,7 @@ static void test_far(void) {
         "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"}],\"meshes\":[{"
         "\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}],\"nodes\":[{\"mesh\":0,\"translation\":[0.001,0.002,0]},"
         "{\"children\":[0],\"translation\":[600000,4100000,-5]}]}";
-    take(gltf_parse(gltf, strlen(gltf), "a.gltf", NULL, 9, &mesh, NULL, &err), &err);
+    take(gltf_parse(gltf, strlen(gltf), "a.gltf", NULL, 9, &mesh, NULL, NULL, &err), &err);
     CHECK(is_at(&mesh, 600001.0, 4100001.0, 0.0) || is_at(&mesh, 600000.0, 4100001.0, 0.0));
     check_corner(&mesh, 0, 600000.001, 4100000.002, -5.0, 1e-6);
     check_corner(&mesh, 1, 600001.001, 4100000.002, -5.0, 1e-6);
@@ -120,7 +120,7 @@ static void test_stated(void) {
     CHECK(is_at(&mesh, 600000.0, -4100000.0, 0.5) && mesh.position[0].x == 0.1f);
     mesh_release(&mesh);
     static const char obj[] = "# unbake offset 7 8 9\nv 0.1 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
-    take(obj_parse(obj, strlen(obj), "a.obj", NULL, 9, &mesh, NULL, &err), &err);
+    take(obj_parse(obj, strlen(obj), "a.obj", NULL, 9, &mesh, NULL, NULL, &err), &err);
     CHECK(is_at(&mesh, 7.0, 8.0, 9.0) && mesh.position[0].x == 0.1f);
     mesh_release(&mesh);
     double offset[3] = {1.0, 2.0, 3.0};

@@ -11,7 +11,7 @@
 #include "server/export/outputs.h"
 #include "server/export/pictures.h"
 #include "server/ingest/findings.h"
-#include "server/ingest/mesh/ply.h"
+#include "server/ingest/mesh/mesh_file.h"
 #include "server/ingest/transforms.h"
 #include "tests/check.h"
 
@@ -264,7 +264,7 @@ static void test_mesh(const char *dir, const struct mesh *wanted) {
     struct mesh mesh;
     struct error err;
     char *path = file_join(dir, "scene.ply");
-    enum status status = ply_read(path, "scene.ply", 1 << 20, &mesh, NULL, &err);
+    enum status status = mesh_file_read(path, "scene.ply", 1 << 20, &mesh, NULL, &err);
     CHECK_THAT(status == STATUS_OK, "%s", err.message);
     CHECK(mesh.triangle_count == wanted->triangle_count && mesh.normal != NULL);
     CHECK(memcmp(mesh.offset, wanted->offset, sizeof mesh.offset) == 0);

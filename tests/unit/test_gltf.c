@@ -1,5 +1,6 @@
 /* The glTF reader: what it takes, what it refuses and where it says the fault lies. */
 #include "server/ingest/mesh/gltf.h"
+#include "server/ingest/mesh/mesh_file.h"
 
 #include "common/buf.h"
 #include "common/file.h"
@@ -61,7 +62,7 @@ static void make_glb(struct buf *out, const char *json) {
 static enum status parse(const char *json, struct mesh *mesh, struct error *err) {
     struct buf file;
     make_glb(&file, json);
-    enum status status = gltf_parse(file.data, file.length, "room.glb", NULL, 1000, mesh, NULL, err);
+    enum status status = gltf_parse(file.data, file.length, "room.glb", NULL, 1000, mesh, NULL, NULL, err);
     buf_release(&file);
     return status;
 }
@@ -157,12 +158,12 @@ static void test_buffers(void) {
     const char *json = "{" ASSET ",\"buffers\":[{\"byteLength\":164,\"uri\":\"./a%20b.bin\"}]," VIEWS "," ACCESSORS
                        "," MESH(ALL) "," NODE "}";
     CHECK(file_replace(path, json, strlen(json), NULL) == STATUS_OK);
-    CHECK_THAT(gltf_read(path, "room.gltf", 1000, &mesh, NULL, &err) == STATUS_OK, "%s", err.message);
+    CHECK_THAT(mesh_file_read(path, "room.gltf", 1000, &mesh, NULL, &err) == STATUS_OK, "%s", err.message);
     CHECK(mesh.triangle_count == 2 && is(corner(&mesh, 1, 2), 1, 2, 3));
     mesh_release(&mesh);
-    CHECK(gltf_parse(json, strlen(json), "room.gltf", NULL, 1000, &mesh, NULL, &err) == STATUS_INPUT);
+    CHECK(gltf_parse(json, strlen(json), "room.gltf", NULL, 1000, &mesh, NULL, NULL, &err) == STATUS_INPUT);
     unlink(bin);
-    CHECK(gltf_read(path, "room.gltf", 1000, &mesh, NULL, &err) == STATUS_INPUT);
+    CHECK(mesh_file_read(path, "room.gltf", 1000, &mesh, NULL, &err) == STATUS_INPUT);
     CHECK_STRING(err.message, "room.gltf names the buffer a b.bin, which is not in the bundle");
     /* three points: 0 0 0, 1 0 0, 0 1 0 */
     json =
@@ -170,11 +171,11 @@ static void test_buffers(void) {
         "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA\"}],\"bufferViews\":[{\"buffer\":0,\"byteLength\":36}],"
         "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"}]," MESH(BARE) "," NODE
                                                                                                               "}";
-    CHECK_THAT(gltf_parse(json, strlen(json), "room.gltf", NULL, 1000, &mesh, NULL, &err) == STATUS_OK, "%s",
+    CHECK_THAT(gltf_parse(json, strlen(json), "room.gltf", NULL, 1000, &mesh, NULL, NULL, &err) == STATUS_OK, "%s",
                err.message);
     CHECK(is(corner(&mesh, 0, 1), 1, 0, 0) && is(corner(&mesh, 0, 2), 0, 1, 0));
     mesh_release(&mesh);
-    CHECK(gltf_read("/nowhere/room.glb", "room.glb", 9, &mesh, NULL, &err) == STATUS_NOT_FOUND);
+    CHECK(mesh_file_read("/nowhere/room.glb", "room.glb", 9, &mesh, NULL, &err) == STATUS_NOT_FOUND);
     buf_release(&data);
     mem_free(bin);
     mem_free(path);
@@ -293,17 +294,17 @@ static void test_container(void) {
     struct error err;
     make_glb(&file, WHOLE(MESH(ALL), NODE));
     for (size_t length = 0; length < file.length; length++) {
-        CHECK(gltf_parse(file.data, length, "room.glb", NULL, 1000, &mesh, NULL, &err) == STATUS_INPUT);
+        CHECK(gltf_parse(file.data, length, "room.glb", NULL, 1000, &mesh, NULL, NULL, &err) == STATUS_INPUT);
         mesh_release(&mesh);
     }
-    CHECK(gltf_parse(file.data, file.length, "room.glb", NULL, 1, &mesh, NULL, &err) == STATUS_LIMIT);
+    CHECK(gltf_parse(file.data, file.length, "room.glb", NULL, 1, &mesh, NULL, NULL, &err) == STATUS_LIMIT);
     file.data[12]++;
-    CHECK(gltf_parse(file.data, file.length, "room.glb", NULL, 1000, &mesh, NULL, &err) == STATUS_INPUT);
+    CHECK(gltf_parse(file.data, file.length, "room.glb", NULL, 1000, &mesh, NULL, NULL, &err) == STATUS_INPUT);
     file.data[15] = 127;
-    CHECK(gltf_parse(file.data, file.length, "room.glb", NULL, 1000, &mesh, NULL, &err) == STATUS_INPUT);
+    CHECK(gltf_parse(file.data, file.length, "room.glb", NULL, 1000, &mesh, NULL, NULL, &err) == STATUS_INPUT);
     CHECK(strstr(err.message, "chunk 0 is longer"));
     file.data[4] = 1;
-    CHECK(gltf_parse(file.data, file.length, "room.glb", NULL, 1000, &mesh, NULL, &err) == STATUS_INPUT);
+    CHECK(gltf_parse(file.data, file.length, "room.glb", NULL, 1000, &mesh, NULL, NULL, &err) == STATUS_INPUT);
     CHECK(strstr(err.message, "version 2"));
     buf_release(&file);
 }
@@ -314,7 +315,7 @@ static void test_large(void) {
     char *json = mem_calloc(size, 1);
     struct mesh mesh;
     struct error err;
-    CHECK(gltf_parse(json, size, "room.gltf", NULL, 1000, &mesh, NULL, &err) == STATUS_LIMIT);
+    CHECK(gltf_parse(json, size, "room.gltf", NULL, 1000, &mesh, NULL, NULL, &err) == STATUS_LIMIT);
     CHECK_STRING(err.message, "room.gltf: its JSON is larger than 67108864 bytes");
     mem_free(json);
 }

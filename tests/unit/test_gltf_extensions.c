@@ -5,6 +5,7 @@
 #include "common/mem.h"
 #include "server/ingest/bundle.h"
 #include "server/ingest/mesh/gltf.h"
+#include "server/ingest/mesh/mesh_file.h"
 #include "tests/check.h"
 
 #define ASSET "\"asset\":{\"version\":\"2.0\"}"
@@ -26,7 +27,7 @@ static enum status parse(const char *json, const void *bin, size_t size, struct 
     buf_append(&file, chunk, sizeof chunk);
     buf_append(&file, bin, size);
     buf_append(&file, "\0\0\0", tail);
-    enum status status = gltf_parse(file.data, file.length, "room.glb", NULL, 1000, mesh, &report, err);
+    enum status status = gltf_parse(file.data, file.length, "room.glb", NULL, 1000, mesh, NULL, &report, err);
     buf_release(&file);
     return status;
 }
@@ -274,7 +275,7 @@ static void test_captures(void) {
         snprintf(path, sizeof path, "%s/captures/%s/m.glb", root ? root : "../shared/data", table[i].name);
         if (access(path, R_OK) != 0)
             continue;
-        CHECK_THAT(gltf_read(path, "m.glb", 1000, &mesh, NULL, &err) == STATUS_OK, "%s", err.message);
+        CHECK_THAT(mesh_file_read(path, "m.glb", 1000, &mesh, NULL, &err) == STATUS_OK, "%s", err.message);
         CHECK_THAT(mesh.triangle_count == table[i].triangles, "%s: %zu", table[i].name, mesh.triangle_count);
         mesh_release(&mesh);
     }

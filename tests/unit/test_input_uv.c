@@ -31,7 +31,7 @@ static void take(const char *name, const char *text, struct mesh *mesh) {
     struct error err = {.message = ""};
     bool is_ply = strstr(name, ".ply") != NULL;
     enum status status = is_ply ? ply_parse(text, strlen(text), name, 99, mesh, NULL, &err)
-                                : obj_parse(text, strlen(text), name, NULL, 99, mesh, NULL, &err);
+                                : obj_parse(text, strlen(text), name, NULL, 99, mesh, NULL, NULL, &err);
     CHECK_THAT(status == STATUS_OK, "%s", err.message);
 }
 
@@ -108,7 +108,7 @@ static void test_gltf(void) {
         struct faces_report report;
         struct error err = {.message = ""};
         char *text = mem_printf(json, i == 2 ? 2 : 3, i == 1 ? turned : "");
-        CHECK_THAT(gltf_parse(text, strlen(text), "a.gltf", NULL, 9, &mesh, &report, &err) == STATUS_OK, "%s",
+        CHECK_THAT(gltf_parse(text, strlen(text), "a.gltf", NULL, 9, &mesh, NULL, &report, &err) == STATUS_OK, "%s",
                    err.message);
         CHECK(mesh.picture_count == 1 && mesh.triangle_count == 1);
         if (i == 0)

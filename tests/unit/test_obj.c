@@ -1,5 +1,6 @@
 /* The OBJ reader: what it takes, what it refuses and where it says the fault lies. */
 #include "server/ingest/mesh/obj.h"
+#include "server/ingest/mesh/mesh_file.h"
 
 #include "server/ingest/mesh/intern.h"
 #include "tests/check.h"
@@ -7,7 +8,7 @@
 #define SQUARE "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 
 static enum status parse(const char *text, struct mesh *mesh, struct faces_report *report, struct error *err) {
-    return obj_parse(text, strlen(text), "room.obj", NULL, 1000, mesh, report, err);
+    return obj_parse(text, strlen(text), "room.obj", NULL, 1000, mesh, NULL, report, err);
 }
 
 /* Comments, colours behind positions, indices from both ends, continued lines, all kinds of ends. */
@@ -125,11 +126,12 @@ static void test_limits(void) {
     struct mesh mesh;
     struct error err;
     static const char binary[] = SQUARE "f 1 2 3\n\0";
-    CHECK(obj_parse(binary, sizeof binary, "room.obj", NULL, 9, &mesh, NULL, &err) == STATUS_INPUT);
+    CHECK(obj_parse(binary, sizeof binary, "room.obj", NULL, 9, &mesh, NULL, NULL, &err) == STATUS_INPUT);
     CHECK(strstr(err.message, "not text"));
-    CHECK(obj_parse(SQUARE "f 1 2 3 4\n", sizeof SQUARE + 9, "room.obj", NULL, 1, &mesh, NULL, &err) == STATUS_LIMIT);
-    CHECK(obj_read("/nowhere/room.obj", "room.obj", 9, &mesh, NULL, &err) == STATUS_NOT_FOUND);
-    CHECK(obj_read("/dev/null", "room.obj", 9, &mesh, NULL, &err) == STATUS_INPUT);
+    CHECK(obj_parse(SQUARE "f 1 2 3 4\n", sizeof SQUARE + 9, "room.obj", NULL, 1, &mesh, NULL, NULL, &err) ==
+          STATUS_LIMIT);
+    CHECK(mesh_file_read("/nowhere/room.obj", "room.obj", 9, &mesh, NULL, &err) == STATUS_NOT_FOUND);
+    CHECK(mesh_file_read("/dev/null", "room.obj", 9, &mesh, NULL, &err) == STATUS_INPUT);
 }
 
 /* More than its points can be counted in: all of it is a hole but the beginning. */
@@ -142,7 +144,7 @@ static void test_large(void) {
     if (ftruncate(fd, (off_t)1 << 35) != 0)
         printf("no file of 32 GiB here, not even of holes\n");
     else
-        CHECK_THAT(obj_read(path, "room.obj", 9, &mesh, NULL, &err) == STATUS_LIMIT &&
+        CHECK_THAT(mesh_file_read(path, "room.obj", 9, &mesh, NULL, &err) == STATUS_LIMIT &&
                        strcmp(err.message, "room.obj is larger than 34359738352 bytes") == 0,
                    "%s", err.message);
     close(fd);
@@ -170,7 +172,7 @@ static void test_others(void) {
         snprintf(path, sizeof path, "%s/vectors/assimp/OBJ/%s", root ? root : "../shared/data", table[i].file);
         if (access(path, R_OK) != 0)
             continue;
-        CHECK_THAT(obj_read(path, table[i].file, 1 << 20, &mesh, NULL, &err) == STATUS_OK, "%s", err.message);
+        CHECK_THAT(mesh_file_read(path, table[i].file, 1 << 20, &mesh, NULL, &err) == STATUS_OK, "%s", err.message);
         CHECK_THAT(mesh.vertex_count == table[i].vertices && mesh.triangle_count == table[i].triangles &&
                        mesh.face_count == table[i].faces && (mesh.normal != NULL) == table[i].has_normals,
                    "%s", table[i].file);

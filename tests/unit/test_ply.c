@@ -1,5 +1,6 @@
 /* The PLY reader: what it takes, what it refuses and where it says the fault lies. */
 #include "server/ingest/mesh/ply.h"
+#include "server/ingest/mesh/mesh_file.h"
 
 #include "server/ingest/mesh/polygon.h"
 #include "tests/check.h"
@@ -222,7 +223,7 @@ static void test_large(void) {
     if (ftruncate(fd, (off_t)13 << 30) != 0)
         printf("no file of 13 GiB here, not even of holes\n");
     else
-        CHECK_THAT(ply_read(path, "mesh.ply", 9, &mesh, NULL, &err) == STATUS_LIMIT &&
+        CHECK_THAT(mesh_file_read(path, "mesh.ply", 9, &mesh, NULL, &err) == STATUS_LIMIT &&
                        strcmp(err.message, "mesh.ply has 4294967295 vertices, more than fit") == 0,
                    "%s", err.message);
     close(fd);
@@ -334,7 +335,7 @@ static void test_vectors(void) {
         }
         struct mesh mesh;
         struct error err = {.message = ""};
-        enum status status = ply_read(path, table[i].file, 1000000, &mesh, NULL, &err);
+        enum status status = mesh_file_read(path, table[i].file, 1000000, &mesh, NULL, &err);
         CHECK_THAT(status == (table[i].sentence ? STATUS_INPUT : STATUS_OK), "%s: %s", table[i].file, err.message);
         CHECK_THAT(mesh.vertex_count == table[i].vertices && mesh.triangle_count == table[i].triangles,
                    "%s: %zu vertices, %zu triangles", table[i].file, mesh.vertex_count, mesh.triangle_count);

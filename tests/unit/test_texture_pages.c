@@ -5,6 +5,7 @@
 #include "common/mem.h"
 #include "server/ingest/mesh/gltf.h"
 #include "server/ingest/mesh/obj.h"
+#include "server/ingest/mesh/mesh_file.h"
 #include "tests/check.h"
 
 #define TEXT(...) ((const char *const[]){__VA_ARGS__})
@@ -50,7 +51,7 @@ static struct faces_report report;
 
 static void take_obj(const char *text, const char *folder, struct mesh *mesh) {
     struct error err = {.message = ""};
-    enum status status = obj_parse(text, strlen(text), "a.obj", folder, 99, mesh, &report, &err);
+    enum status status = obj_parse(text, strlen(text), "a.obj", folder, 99, mesh, NULL, &report, &err);
     CHECK_THAT(status == STATUS_OK, "%s", err.message);
 }
 
@@ -114,7 +115,7 @@ static void test_obj(void) {
 
 static void take_gltf(const char *text, struct mesh *mesh) {
     struct error err = {.message = ""};
-    enum status status = gltf_parse(text, strlen(text), "a.gltf", NULL, 99, mesh, &report, &err);
+    enum status status = gltf_parse(text, strlen(text), "a.gltf", NULL, 99, mesh, NULL, &report, &err);
     CHECK_THAT(status == STATUS_OK, "%s", err.message);
 }
 
@@ -157,7 +158,7 @@ static void test_capture(void) {
     snprintf(path, sizeof path, "%s/captures/obj_atlas_pages/m.obj", root ? root : "../shared/data");
     if (access(path, R_OK) != 0)
         return;
-    CHECK_THAT(obj_read(path, "m.obj", 1 << 20, &mesh, &report, &err) == STATUS_OK, "%s", err.message);
+    CHECK_THAT(mesh_file_read(path, "m.obj", 1 << 20, &mesh, &report, &err) == STATUS_OK, "%s", err.message);
     CHECK(!mesh.object_id && report.note_count == 1);
     mesh_release(&mesh);
 }

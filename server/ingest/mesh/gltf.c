@@ -226,8 +226,8 @@ static void finish(struct gltf_reader *r) {
     take_notes(r);
 }
 
-enum status gltf_parse_look(const void *data, size_t size, const char *name, const char *folder, size_t triangle_limit,
-                            struct mesh *mesh, struct mesh_look *look, struct faces_report *report, struct error *err) {
+enum status gltf_parse(const void *data, size_t size, const char *name, const char *folder, size_t triangle_limit,
+                       struct mesh *mesh, struct mesh_look *look, struct faces_report *report, struct error *err) {
     *mesh = (struct mesh){0};
     struct gltf_reader r = {.look = look, .err = err};
     r.surface = (struct gltf_surface){.file = &r.file, .mesh = mesh, .is_look = look != NULL, .err = err};
@@ -260,28 +260,4 @@ enum status gltf_parse_look(const void *data, size_t size, const char *name, con
     mem_free(r.shown);
     mem_free(r.surface.faces);
     return status;
-}
-
-enum status gltf_parse(const void *data, size_t size, const char *name, const char *folder, size_t triangle_limit,
-                       struct mesh *mesh, struct faces_report *report, struct error *err) {
-    return gltf_parse_look(data, size, name, folder, triangle_limit, mesh, NULL, report, err);
-}
-
-enum status gltf_read_look(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
-                           struct mesh_look *look, struct faces_report *report, struct error *err) {
-    struct mapping file;
-    const char *slash = strrchr(path, '/');
-    char *folder = slash ? mem_strndup(path, (size_t)(slash - path)) : mem_strdup(".");
-    *mesh = (struct mesh){0};
-    enum status status = mapping_open(&file, path, name, "a glTF file", err);
-    if (status == STATUS_OK)
-        status = gltf_parse_look(file.data, file.size, name, folder, triangle_limit, mesh, look, report, err);
-    mapping_close(&file);
-    mem_free(folder);
-    return status;
-}
-
-enum status gltf_read(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
-                      struct faces_report *report, struct error *err) {
-    return gltf_read_look(path, name, triangle_limit, mesh, NULL, report, err);
 }

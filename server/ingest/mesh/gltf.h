@@ -16,17 +16,10 @@
 #include "server/ingest/mesh/look.h"
 #include "server/scene/mesh.h"
 
-/* As ply_read and ply_parse; `folder` contains the file's external buffers, NULL: none are allowed. */
-enum status gltf_read(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
-                      struct faces_report *report, struct error *err);
-enum status gltf_parse(const void *data, size_t size, const char *name, const char *folder, size_t triangle_limit,
-                       struct mesh *mesh, struct faces_report *report, struct error *err);
-
-/* The same with materials: mesh->object_id are their numbers in *look, and mesh->uv are as the file has them, without transforms of pictures. The look is the caller's
+/* As ply_parse; `folder` contains the file's external buffers, NULL: none are allowed.
+ * With `look`, which may be NULL: materials, too; mesh->object_id are then their numbers in *look. It is the caller's
  * (look_release), also after a failure. */
-enum status gltf_read_look(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
-                           struct mesh_look *look, struct faces_report *report, struct error *err);
-enum status gltf_parse_look(const void *data, size_t size, const char *name, const char *folder, size_t triangle_limit,
-                            struct mesh *mesh, struct mesh_look *look, struct faces_report *report, struct error *err);
+enum status gltf_parse(const void *data, size_t size, const char *name, const char *folder, size_t triangle_limit,
+                       struct mesh *mesh, struct mesh_look *look, struct faces_report *report, struct error *err);
 
 #endif

@@ -8,7 +8,6 @@
 #include "common/mem.h"
 #include "server/ingest/mesh/gltf_meshopt.h"
 
-#define MAX_BYTES ((double)((uint64_t)1 << 40))
 #define MAX_ZEROS ((uint64_t)1 << 26) /* elements of a sparse accessor without a view to start from */
 
 static uint32_t word_at(const uint8_t *at) {
@@ -35,17 +34,10 @@ static enum status open_plain_view(const struct gltf_file *g, size_t v, const ch
                                    struct error *err) {
     const cJSON *view = g->views.item[v];
     char where[48];
-    bool found;
     size_t b;
     uint64_t offset, size;
     snprintf(where, sizeof where, "bufferViews[%zu]", v);
-    enum status status = gltf_index(g, view, "buffer", where, &g->buffers, &found, &b, err);
-    if (status == STATUS_OK && !found)
-        status = error_set(err, STATUS_INPUT, "%s: %s has no buffer", g->name, where);
-    if (status == STATUS_OK)
-        status = gltf_whole(g, view, "byteOffset", "bufferViews", v, 0.0, 0.0, MAX_BYTES, &offset, err);
-    if (status == STATUS_OK)
-        status = gltf_whole(g, view, "byteLength", "bufferViews", v, -1.0, 0.0, MAX_BYTES, &size, err);
+    enum status status = gltf_buffer_part(g, view, where, v, 0.0, &b, &offset, &size, err);
     if (status != STATUS_OK)
         return status;
     if (offset + size > g->buffer[b].size)
@@ -80,7 +72,7 @@ static enum status open_view(struct gltf_file *g, const cJSON *object, const cha
         status = gltf_whole(g, view, "byteStride", "bufferViews", v, (double)bytes->stride, (double)element, 256.0,
                             &bytes->stride, err);
     if (status == STATUS_OK)
-        status = gltf_whole(g, object, "byteOffset", where, index, 0.0, 0.0, MAX_BYTES, &offset, err);
+        status = gltf_whole(g, object, "byteOffset", where, index, 0.0, 0.0, GLTF_MAX_BYTES, &offset, err);
     if (status != STATUS_OK)
         return status;
     if (offset > bytes->size)

@@ -214,3 +214,17 @@ const cJSON *gltf_extension(const cJSON *object, const char *extension) {
     const cJSON *extensions = cJSON_GetObjectItemCaseSensitive(object, "extensions");
     return cJSON_GetObjectItemCaseSensitive(extensions, extension);
 }
+
+enum status gltf_buffer_part(const struct gltf_file *g, const cJSON *object, const char *where, size_t view,
+                             double least, size_t *buffer, uint64_t *offset, uint64_t *length, struct error *err) {
+    static const char list[] = "bufferViews";
+    bool found;
+    enum status status = gltf_index(g, object, "buffer", where, &g->buffers, &found, buffer, err);
+    if (status == STATUS_OK && !found)
+        status = error_set(err, STATUS_INPUT, "%s: %s has no buffer", g->name, where);
+    if (status == STATUS_OK)
+        status = gltf_whole(g, object, "byteOffset", list, view, 0.0, 0.0, GLTF_MAX_BYTES, offset, err);
+    if (status == STATUS_OK)
+        status = gltf_whole(g, object, "byteLength", list, view, -1.0, least, GLTF_MAX_BYTES, length, err);
+    return status;
+}

@@ -9,7 +9,6 @@
 
 #include "common/mem.h"
 
-#define MAX_BYTES ((double)((uint64_t)1 << 40))
 #define MAX_STRIDE 256
 /* Unpacked bytes per compressed one, at most: a group of 16 equal bytes takes 2 bits, a triangle of 12 bytes one. */
 #define MAX_RATIO 64
@@ -47,17 +46,10 @@ static enum status read_packed(const struct gltf_file *g, size_t view, const cJS
     static const char *const mode[] = {"ATTRIBUTES", "TRIANGLES", "INDICES"};
     static const char *const filter[] = {"NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL"};
     char where[64];
-    bool found;
     size_t b;
     uint64_t offset, length;
     snprintf(where, sizeof where, "bufferViews[%zu].%s", view, extension->string);
-    enum status status = gltf_index(g, extension, "buffer", where, &g->buffers, &found, &b, err);
-    if (status == STATUS_OK && !found)
-        status = error_set(err, STATUS_INPUT, "%s: %s has no buffer", g->name, where);
-    if (status == STATUS_OK)
-        status = gltf_whole(g, extension, "byteOffset", "bufferViews", view, 0.0, 0.0, MAX_BYTES, &offset, err);
-    if (status == STATUS_OK)
-        status = gltf_whole(g, extension, "byteLength", "bufferViews", view, -1.0, 1.0, MAX_BYTES, &length, err);
+    enum status status = gltf_buffer_part(g, extension, where, view, 1.0, &b, &offset, &length, err);
     if (status == STATUS_OK)
         status = gltf_whole(g, extension, "byteStride", "bufferViews", view, -1.0, 1.0, MAX_STRIDE, &p->stride, err);
     if (status == STATUS_OK)

@@ -7,6 +7,7 @@
 
 #include "common/mem.h"
 #include "server/ingest/mesh/gltf_accessor.h"
+#include "server/scene/coordinates.h"
 
 struct affine affine_multiply(const struct affine *a, const struct affine *b) {
     struct affine c;
@@ -47,13 +48,9 @@ static enum status read_numbers(const struct gltf_file *g, size_t node, const ch
 
 /* Scaled, then turned by the unit quaternion x y z w, then moved. */
 static struct affine compose(const double move[3], const double q[4], const double scale[3]) {
-    double x = q[0], y = q[1], z = q[2], w = q[3];
-    const double turn[3][3] = {
-        {1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)},
-        {2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)},
-        {2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)},
-    };
+    double turn[3][3];
     struct affine t;
+    coordinates_rotation((const double[4]){q[3], q[0], q[1], q[2]}, turn);
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 4; j++)
             t.m[i][j] = j < 3 ? turn[i][j] * scale[j] : move[i];

@@ -1,57 +1,80 @@
 /* mesh_file.c -- see mesh_file.h. */
 #include "server/ingest/mesh/mesh_file.h"
 
+#include <string.h>
 #include <strings.h>
 
 #include "common/mem.h"
+#include "server/ingest/mapping.h"
 #include "server/ingest/mesh/gltf.h"
 #include "server/ingest/mesh/obj.h"
 #include "server/ingest/path.h"
 #include "server/ingest/mesh/ply.h"
 #include "server/ingest/mesh/positions.h"
 
-typedef enum status mesh_reader(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
+typedef enum status mesh_parser(const void *data, size_t size, const char *name, const char *folder,
+                                size_t triangle_limit, struct mesh *mesh, struct mesh_look *look,
                                 struct faces_report *report, struct error *err);
 
-static const struct {
-    const char *extension;
-    mesh_reader *read;
+/* A PLY says nothing of its surfaces. */
+static enum status parse_ply(const void *data, size_t size, const char *name, const char *folder, size_t triangle_limit,
+                             struct mesh *mesh, struct mesh_look *look, struct faces_report *report,
+                             struct error *err) {
+    (void)folder;
+    enum status status = ply_parse(data, size, name, triangle_limit, mesh, report, err);
+    if (look) {
+        mem_free(mesh->object_id);
+        mesh->object_id = NULL;
+    }
+    return status;
+}
+
+static const struct mesh_format {
+    const char *extension, *kind; /* kind: as for mapping_open */
+    mesh_parser *parse;
 } formats[] = {
-    {"ply", ply_read},
-    {"obj", obj_read},
-    {"glb", gltf_read},
-    {"gltf", gltf_read},
+    {"ply", "a PLY file", parse_ply},
+    {"obj", "an OBJ file", obj_parse},
+    {"glb", "a glTF file", gltf_parse},
+    {"gltf", "a glTF file", gltf_parse},
 };
 
 /* NULL: none. */
-static mesh_reader *reader_of(const char *name) {
+static const struct mesh_format *format_of(const char *name) {
     const char *extension = path_extension(name);
     for (size_t i = 0; i < sizeof formats / sizeof *formats; i++)
         if (strcasecmp(extension, formats[i].extension) == 0)
-            return formats[i].read;
+            return &formats[i];
     return NULL;
 }
 
-bool mesh_file_is_known(const char *name) { return reader_of(name) != NULL; }
+bool mesh_file_is_known(const char *name) { return format_of(name) != NULL; }
+
+static enum status read_mesh(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
+                             struct mesh_look *look, struct faces_report *report, struct error *err) {
+    const struct mesh_format *format = format_of(name);
+    const char *slash = strrchr(path, '/');
+    char *folder = slash ? mem_strndup(path, (size_t)(slash - path)) : mem_strdup(".");
+    struct mapping file;
+    format = format ? format : &formats[0];
+    *mesh = (struct mesh){0};
+    enum status status = mapping_open(&file, path, name, format->kind, err);
+    if (status == STATUS_OK)
+        status = format->parse(file.data, file.size, name, folder, triangle_limit, mesh, look, report, err);
+    mapping_close(&file);
+    mem_free(folder);
+    return status;
+}
 
 enum status mesh_file_read(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
                            struct faces_report *report, struct error *err) {
-    mesh_reader *read = reader_of(name);
-    return (read ? read : ply_read)(path, name, triangle_limit, mesh, report, err);
+    return read_mesh(path, name, triangle_limit, mesh, NULL, report, err);
 }
 
 enum status mesh_file_read_look(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
                                 struct mesh_look *look, struct faces_report *report, struct error *err) {
-    mesh_reader *read = reader_of(name);
     *look = (struct mesh_look){0};
-    if (read == gltf_read)
-        return gltf_read_look(path, name, triangle_limit, mesh, look, report, err);
-    if (read == obj_read)
-        return obj_read_look(path, name, triangle_limit, mesh, look, report, err);
-    enum status status = ply_read(path, name, triangle_limit, mesh, report, err);
-    mem_free(mesh->object_id);
-    mesh->object_id = NULL;
-    return status;
+    return read_mesh(path, name, triangle_limit, mesh, look, report, err);
 }
 
 static void warn_of_place(const char *name, const struct mesh *mesh, const struct faces_report *report,
@@ -93,9 +116,9 @@ enum status mesh_file_count_faces(const char *path, const char *name, uint64_t *
 
 enum status mesh_file_has_faces(const char *path, const char *name, bool *has, struct error *err) {
     uint64_t count = 0;
-    mesh_reader *read = reader_of(name);
+    const struct mesh_format *format = format_of(name);
     *has = true;
-    if (read && read != ply_read)
+    if (format && format->parse != parse_ply)
         return STATUS_OK;
     enum status status = ply_count_faces(path, name, &count, err);
     *has = status != STATUS_OK || count > 0;

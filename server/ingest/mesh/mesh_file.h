@@ -15,7 +15,9 @@
 /* Whether the name has an extension of a supported format. */
 bool mesh_file_is_known(const char *name);
 
-/* As ply_read; unknown extensions are read as PLY. */
+/* Reads `path` into *mesh, the caller's (mesh_release). Vertex indices are in range; geometry is not checked (see
+ * mesh_check). STATUS_LIMIT for more than triangle_limit triangles. Unknown extensions are read as PLY. `name` is for
+ * messages; report may be NULL. */
 enum status mesh_file_read(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
                            struct faces_report *report, struct error *err);
 

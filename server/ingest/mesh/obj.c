@@ -288,8 +288,8 @@ static enum status check_whole(const struct obj_reader *r) {
     return error_hint(r->err, "a mesh of triangles or polygons is needed, not a point cloud or curves");
 }
 
-enum status obj_parse_look(const void *data, size_t size, const char *name, const char *folder, size_t triangle_limit,
-                           struct mesh *mesh, struct mesh_look *look, struct faces_report *report, struct error *err) {
+enum status obj_parse(const void *data, size_t size, const char *name, const char *folder, size_t triangle_limit,
+                      struct mesh *mesh, struct mesh_look *look, struct faces_report *report, struct error *err) {
     *mesh = (struct mesh){0};
     if (size > MAX_BYTES)
         return error_set(err, STATUS_LIMIT, "%s is larger than %zu bytes", name, MAX_BYTES);
@@ -320,28 +320,4 @@ enum status obj_parse_look(const void *data, size_t size, const char *name, cons
     mem_free(r->faces);
     mem_free(r);
     return status;
-}
-
-enum status obj_parse(const void *data, size_t size, const char *name, const char *folder, size_t triangle_limit,
-                      struct mesh *mesh, struct faces_report *report, struct error *err) {
-    return obj_parse_look(data, size, name, folder, triangle_limit, mesh, NULL, report, err);
-}
-
-enum status obj_read_look(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
-                          struct mesh_look *look, struct faces_report *report, struct error *err) {
-    struct mapping file;
-    const char *slash = strrchr(path, '/');
-    char *folder = slash ? mem_strndup(path, (size_t)(slash - path)) : mem_strdup(".");
-    *mesh = (struct mesh){0};
-    enum status status = mapping_open(&file, path, name, "an OBJ file", err);
-    if (status == STATUS_OK)
-        status = obj_parse_look(file.data, file.size, name, folder, triangle_limit, mesh, look, report, err);
-    mapping_close(&file);
-    mem_free(folder);
-    return status;
-}
-
-enum status obj_read(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
-                     struct faces_report *report, struct error *err) {
-    return obj_read_look(path, name, triangle_limit, mesh, NULL, report, err);
 }

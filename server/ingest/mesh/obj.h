@@ -16,17 +16,11 @@
 #include "server/ingest/mesh/look.h"
 #include "server/scene/mesh.h"
 
-/* As ply_read and ply_parse; `folder` has the file's library of materials, NULL: none. Damage is STATUS_INPUT with the line of the file. */
-enum status obj_read(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
-                     struct faces_report *report, struct error *err);
-enum status obj_parse(const void *data, size_t size, const char *name, const char *folder, size_t triangle_limit,
-                      struct mesh *mesh, struct faces_report *report, struct error *err);
-
-/* The same with materials: mesh->object_id are their numbers in *look, and mesh->uv are as the file has them, without transforms of pictures. The look is the caller's
+/* As ply_parse; `folder` has the file's library of materials, NULL: none. Damage is STATUS_INPUT with the line
+ * of the file.
+ * With `look`, which may be NULL: materials, too; mesh->object_id are then their numbers in *look. It is the caller's
  * (look_release), also after a failure. */
-enum status obj_read_look(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
-                          struct mesh_look *look, struct faces_report *report, struct error *err);
-enum status obj_parse_look(const void *data, size_t size, const char *name, const char *folder, size_t triangle_limit,
-                           struct mesh *mesh, struct mesh_look *look, struct faces_report *report, struct error *err);
+enum status obj_parse(const void *data, size_t size, const char *name, const char *folder, size_t triangle_limit,
+                      struct mesh *mesh, struct mesh_look *look, struct faces_report *report, struct error *err);
 
 #endif

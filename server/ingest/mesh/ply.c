@@ -298,22 +298,9 @@ enum status ply_parse(const void *data, size_t size, const char *name, size_t tr
     return status;
 }
 
-#define KIND "a PLY file"
-
-enum status ply_read(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
-                     struct faces_report *report, struct error *err) {
-    struct mapping file;
-    *mesh = (struct mesh){0};
-    enum status status = mapping_open(&file, path, name, KIND, err);
-    if (status == STATUS_OK)
-        status = ply_parse(file.data, file.size, name, triangle_limit, mesh, report, err);
-    mapping_close(&file);
-    return status;
-}
-
 enum status ply_count_faces(const char *path, const char *name, uint64_t *count, struct error *err) {
     struct mapping file;
-    enum status status = mapping_open(&file, path, name, KIND, err);
+    enum status status = mapping_open(&file, path, name, "a PLY file", err);
     if (status != STATUS_OK)
         return status;
     struct ply_header *header = mem_alloc(sizeof *header);

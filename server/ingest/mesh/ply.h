@@ -15,12 +15,8 @@
 #include "server/ingest/mesh/faces.h"
 #include "server/scene/mesh.h"
 
-/* Reads `path` into *mesh, the caller's (mesh_release). Vertex indices are in range; geometry is not checked (see
- * mesh_check). STATUS_LIMIT for more than triangle_limit triangles. `name` is for messages; report may be NULL. */
-enum status ply_read(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
-                     struct faces_report *report, struct error *err);
-
-/* The same from memory. */
+/* Reads the file's content into *mesh, the caller's (mesh_release). Vertex indices are in range; geometry is not checked
+ * (see mesh_check). STATUS_LIMIT for more than triangle_limit triangles. `name` is for messages; report may be NULL. */
 enum status ply_parse(const void *data, size_t size, const char *name, size_t triangle_limit, struct mesh *mesh,
                       struct faces_report *report, struct error *err);
 

@@ -18,12 +18,7 @@
 
 static char *recognise(const struct listing *l, const char *base) {
     static const char *const names[] = {"bundle.out", "bundle/bundle.out", "bundle.rd.out"};
-    for (int i = 0; i < 3; i++) {
-        const struct listed_file *file = listing_find(l, base, names[i]);
-        if (file)
-            return mem_strdup(file->path);
-    }
-    return NULL;
+    return listing_find_any(l, base, names, 3);
 }
 
 /* Takes `count` numbers of the text, which moves on; false at its end or where it holds anything else. */
@@ -42,11 +37,12 @@ static bool take(const char **text, size_t count, double *value) {
 static enum status read_list(const struct source_place *place, char **text, struct error *err) {
     static const char *const names[] = {"list.txt", "list.orig.txt", "bundle/list.txt", "bundle.out.list.txt",
                                         "list_tmp.txt"};
+    char *path = listing_find_any(place->listing, place->base, names, sizeof names / sizeof *names);
     *text = NULL;
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
-        const struct listed_file *file = listing_find(place->listing, place->base, names[i]);
-        if (file)
-            return listing_text(place->listing, file->path, MAX_LIST_BYTES, text, err);
+    if (path) {
+        enum status status = listing_text(place->listing, path, MAX_LIST_BYTES, text, err);
+        mem_free(path);
+        return status;
     }
     error_set(err, STATUS_INPUT, "%s: there is no list.txt beside it, which names the photographs", place->found);
     return error_hint(err, "list.txt holds the name of a photograph a line, in the order of the cameras");
@@ -102,9 +98,7 @@ static enum status read_cameras(const char *text, const char *names, struct fram
             status = add_camera(list, v, line, i, err);
         mem_free(line);
     }
-    if (unposed_count > 0)
-        findings_warning(list->findings, "%s: %zu photographs have no pose and are not used", list->name,
-                         unposed_count);
+    frame_list_warn_unposed(list, unposed_count);
     return status;
 }
 

@@ -7,6 +7,7 @@
 
 #include "common/mem.h"
 #include "server/ingest/path.h"
+#include "server/scene/coordinates.h"
 
 /* --- frames ----------------------------------------------------------------------------------- */
 
@@ -71,6 +72,11 @@ enum status frame_list_settle(struct frame_list *in, const char *path, enum stat
     return status;
 }
 
+void frame_list_warn_unposed(const struct frame_list *in, size_t count) {
+    if (count > 0)
+        findings_warning(in->findings, "%s: %zu photographs have no pose and are not used", in->name, count);
+}
+
 void frame_list_finish(const struct frame_list *in) {
     if (in->lost_count > 0)
         findings_warning(in->findings, "%s: %zu poses are not finite and were left out", in->name, in->lost_count);
@@ -103,10 +109,7 @@ struct lens lens_pinhole(double width, double height, double fx, double fy, doub
 
 void rotation_from_quaternion(double w, double x, double y, double z, double r[3][3]) {
     double n = 1.0 / sqrt(w * w + x * x + y * y + z * z);
-    w *= n, x *= n, y *= n, z *= n;
-    r[0][0] = 1 - 2 * (y * y + z * z), r[0][1] = 2 * (x * y - z * w), r[0][2] = 2 * (x * z + y * w);
-    r[1][0] = 2 * (x * y + z * w), r[1][1] = 1 - 2 * (x * x + z * z), r[1][2] = 2 * (y * z - x * w);
-    r[2][0] = 2 * (x * z - y * w), r[2][1] = 2 * (y * z + x * w), r[2][2] = 1 - 2 * (x * x + y * y);
+    coordinates_rotation((const double[4]){w * n, x * n, y * n, z * n}, r);
 }
 
 void rotation_from_axis_angle(const double v[3], double r[3][3]) {

@@ -27,6 +27,8 @@ enum status frame_list_add(struct frame_list *in, double m[3][4], const struct l
 enum status frame_list_settle(struct frame_list *in, const char *path, enum status status, const struct error *own,
                               double m[3][4], const struct lens *lens, const char *file, const char *place,
                               struct error *err);
+/* Warns of photographs that the file names without a pose; 0: of none. */
+void frame_list_warn_unposed(const struct frame_list *in, size_t count);
 /* Warns of what was counted. */
 void frame_list_finish(const struct frame_list *in);
 /* Sorts by the photographs' paths, for files that have them in no order. */

@@ -212,8 +212,7 @@ static enum status read(const struct source_place *place, struct frames *t, stru
         status = read_cameras(chunk, xml_child(chunk, "cameras"), &list, &counts, &own);
     xml_free(root);
     frame_list_finish(&list);
-    if (counts.unposed_count > 0)
-        findings_warning(f, "%s: %zu photographs have no pose and are not used", place->found, counts.unposed_count);
+    frame_list_warn_unposed(&list, counts.unposed_count);
     if (counts.left_out_px > LEFT_OUT_TOLD_PX)
         findings_warning(f,
                          "%s: b2 (skew), p3 and p4 are not modelled, which moves the photographs' corners by %.2g "

@@ -12,12 +12,7 @@
 
 static char *recognise(const struct listing *l, const char *base) {
     static const char *const names[] = {"sfm_data.json", "reconstruction/sfm_data.json", "sfm_data_extrinsics.json"};
-    for (int i = 0; i < 3; i++) {
-        const struct listed_file *file = listing_find(l, base, names[i]);
-        if (file)
-            return mem_strdup(file->path);
-    }
-    return NULL;
+    return listing_find_any(l, base, names, 3);
 }
 
 /* A file and where in its arrays the last view's pose and lens were. */
@@ -117,8 +112,7 @@ static enum status read(const struct source_place *place, struct frames *t, stru
     }
     cJSON_Delete(tree);
     frame_list_finish(&list);
-    if (in.unposed_count > 0)
-        findings_warning(f, "%s: %zu photographs have no pose and are not used", place->found, in.unposed_count);
+    frame_list_warn_unposed(&list, in.unposed_count);
     photo_folder_settle(place->listing, place->base, false, t, f);
     return findings_settle(f, place->found, status, &own, err);
 }

@@ -19,12 +19,7 @@
 
 static char *recognise(const struct listing *l, const char *base) {
     static const char *const names[] = {"opensfm/" GEOREFERENCED, "opensfm/" PLAIN, GEOREFERENCED, PLAIN};
-    for (int i = 0; i < 4; i++) {
-        const struct listed_file *file = listing_find(l, base, names[i]);
-        if (file)
-            return mem_strdup(file->path);
-    }
-    return NULL;
+    return listing_find_any(l, base, names, 4);
 }
 
 static double number(const cJSON *camera, const char *key, double fallback) {

@@ -13,6 +13,7 @@
 #include "server/ingest/source/frame_list.h"
 #include "server/ingest/source/photo_folder.h"
 #include "server/ingest/source/values.h"
+#include "server/scene/coordinates.h"
 
 static const char *const folders[2][2] = {{"keyframes/corrected_cameras", "keyframes/corrected_images"},
                                           {"keyframes/cameras", "keyframes/images"}};
@@ -43,19 +44,10 @@ static enum status read_alignment(const struct source_place *place, double m[4][
     return findings_settle(f, file->path, status, &own, err);
 }
 
-/* m = a * m, both affine. */
-static void turn(double a[4][4], double m[3][4]) {
-    double out[3][4];
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 4; j++)
-            out[i][j] = a[i][0] * m[0][j] + a[i][1] * m[1][j] + a[i][2] * m[2][j] + (j == 3 ? a[i][3] : 0.0);
-    memcpy(m, out, sizeof out);
-}
-
 /* One frame; its faults are problems. */
 static enum status read_frame(const struct source_place *place, const char *path, double alignment[4][4],
                               struct frame_list *list, struct error *err) {
-    double m[3][4];
+    double stored[3][4], m[3][4];
     cJSON *tree;
     struct error own;
     const char *name = path_base(path);
@@ -63,9 +55,9 @@ static enum status read_frame(const struct source_place *place, const char *path
     for (int i = 0; i < 12; i++) {
         char key[16];
         snprintf(key, sizeof key, "t_%d%d", i / 4, i % 4);
-        m[i / 4][i % 4] = json_member(tree, key);
+        stored[i / 4][i % 4] = json_member(tree, key);
     }
-    turn(alignment, m);
+    coordinates_product((const double(*)[4])alignment, (const double(*)[4])stored, m);
     struct lens lens = lens_pinhole(json_member(tree, "width"), json_member(tree, "height"), json_member(tree, "fx"),
                                     json_member(tree, "fy"), json_member(tree, "cx"), json_member(tree, "cy"));
     char *file = mem_printf("%.*s", (int)(path_extension(name) - name - 1), name);

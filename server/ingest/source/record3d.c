@@ -12,12 +12,7 @@
 static char *recognise(const struct listing *l, const char *base) {
     static const char *const names[] = {"metadata", "metadata.json"};
     bool has_photographs = listing_has_folder(l, base, "rgb") || listing_has_folder(l, base, "rgbd");
-    for (int i = 0; i < 2 && has_photographs; i++) {
-        const struct listed_file *file = listing_find(l, base, names[i]);
-        if (file)
-            return mem_strdup(file->path);
-    }
-    return NULL;
+    return has_photographs ? listing_find_any(l, base, names, 2) : NULL;
 }
 
 /* The lens of a frame: its own, or that of all. */
