@@ -14,6 +14,7 @@
 #include <string.h>
 
 #include "common/error.h"
+#include "common/parallel.h"
 
 #define IMAGE_MAX_SIDE 65536
 #define IMAGE_MAX_PIXELS ((size_t)1 << 29)
@@ -153,9 +154,10 @@ enum status image_write_exr(const char *path, const struct image *image, enum im
 struct image_note {
     const char *name, *text; /* UTF-8 */
 };
-/* The same with attributes note[count] of type string. */
+/* The same with attributes note[count] of type string, compressed by the threads of a pool; NULL: by the caller's. */
 enum status image_write_exr_noted(const char *path, const struct image *image, enum image_exr_type type, bool tiled,
-                                  const struct image_note *note, size_t note_count, struct error *err);
+                                  const struct image_note *note, size_t note_count, struct parallel *pool,
+                                  struct error *err);
 
 /* Writes an 8-bit sRGB PNG of the first three channels (or the one there is, as grey), values
  * times `scale`, clamped to [0, 1], converted from linear. Non-finite values become magenta. */

@@ -11,6 +11,15 @@
 #include "common/mem.h"
 #include "common/png_memory.h"
 
+/* sRGB bytes of linear values, without a power for each: `least` has the least value of each byte, found by bisection, so
+ * that bytes are those of image_linear_to_srgb; `guess` has the byte of the first value of each of 64 steps to an octave,
+ * from which least[] is one or two comparisons away. */
+enum { STEP_BITS = 17, LOWEST = 127 - 13, STEPS = 13 << (23 - STEP_BITS) }; /* below 2^-13 all are 0 */
+struct bytes_of_linear {
+    float least[257];
+    uint8_t guess[STEPS];
+};
+
 struct writer {
     const char *path;
     FILE *file;
@@ -18,6 +27,7 @@ struct writer {
     enum status status;
     png_structp png;
     png_infop png_info;
+    struct bytes_of_linear bytes;
     uint8_t *row;
 };
 
@@ -42,13 +52,50 @@ static void write_bytes(png_structp png, png_bytep data, size_t length) {
 
 static void flush_bytes(png_structp png) { (void)png; /* fclose does */ }
 
-static uint8_t to_byte(float linear) {
+static uint8_t to_byte_by_power(float value) { return (uint8_t)(image_linear_to_srgb(value) * 255.0f + 0.5f); }
+
+static float float_of(uint32_t bits) {
+    float value;
+    memcpy(&value, &bits, sizeof value);
+    return value;
+}
+
+static void bytes_init(struct bytes_of_linear *b) {
+    const uint32_t one = 127u << 23;
+    for (uint32_t byte = 1; byte < 256; byte++) {
+        uint32_t below = 0, above = one; /* to_byte_by_power is less than the byte, and not less */
+        while (above - below > 1) {
+            uint32_t middle = below + (above - below) / 2;
+            if (to_byte_by_power(float_of(middle)) < byte)
+                below = middle;
+            else
+                above = middle;
+        }
+        b->least[byte] = float_of(above);
+    }
+    b->least[0] = 0.0f;
+    b->least[256] = INFINITY;
+    for (uint32_t i = 0; i < STEPS; i++)
+        b->guess[i] = to_byte_by_power(float_of(((uint32_t)LOWEST << 23) + (i << STEP_BITS)));
+}
+
+static uint8_t to_byte(const struct bytes_of_linear *b, float linear) {
     float value = linear > 0 ? fminf(linear, 1) : 0; /* not a number: 0 */
-    return (uint8_t)(image_linear_to_srgb(value) * 255.0f + 0.5f);
+    uint32_t bits, byte;
+    memcpy(&bits, &value, sizeof bits);
+    if (bits < (uint32_t)LOWEST << 23)
+        return 0;
+    if (value >= 1.0f)
+        return 255;
+    byte = b->guess[(bits - ((uint32_t)LOWEST << 23)) >> STEP_BITS];
+    while (value >= b->least[byte + 1])
+        byte++;
+    return (uint8_t)byte;
 }
 
 /* One row of `out_count` channels: 3, or 1 for a grey picture. */
-static void fill_row(const struct image *image, uint32_t y, uint32_t out_count, float scale, uint8_t *row) {
+static void fill_row(const struct bytes_of_linear *b, const struct image *image, uint32_t y, uint32_t out_count,
+                     float scale, uint8_t *row) {
     const float *pixel = image->pixel + (size_t)y * image->width * image->channel_count;
     uint32_t step = image->channel_count < 3 ? 0 : 1; /* grey: all from the first channel */
     for (uint32_t x = 0; x < image->width; x++, pixel += image->channel_count, row += out_count) {
@@ -56,7 +103,7 @@ static void fill_row(const struct image *image, uint32_t y, uint32_t out_count, 
         for (uint32_t c = 0; c < out_count; c++) {
             float value = pixel[c * step] * scale;
             finite = finite && isfinite(value);
-            row[c] = to_byte(value);
+            row[c] = to_byte(b, value);
         }
         if (!finite)
             memcpy(row, "\xff\x00\xff", out_count);
@@ -81,7 +128,7 @@ static void write_picture(struct writer *w, const struct image *image, float sca
     png_write_info(w->png, w->png_info);
     w->row = mem_array(image->width, 3);
     for (uint32_t y = 0; y < image->height; y++) {
-        fill_row(image, y, colour ? 3 : 1, scale, w->row);
+        fill_row(&w->bytes, image, y, colour ? 3 : 1, scale, w->row);
         png_write_row(w->png, w->row);
     }
     png_write_end(w->png, NULL);
@@ -95,6 +142,7 @@ static bool is_regular(FILE *file) {
 enum status image_write_png(const char *path, const struct image *image, float scale, struct error *err) {
     struct writer w = {.path = path, .err = err};
     struct writer *volatile kept = &w;
+    bytes_init(&w.bytes);
     w.file = fopen(path, "wbe");
     if (!w.file)
         return error_set_errno(err, errno, "cannot create %s", path);
@@ -124,6 +172,7 @@ struct checker {
     enum status status;
     png_structp png;
     png_infop png_info;
+    struct bytes_of_linear bytes;
     uint8_t *found, *wanted; /* a row each */
 };
 
@@ -152,7 +201,7 @@ static void compare_rows(struct checker *c, const struct image *image, float sca
     c->found = mem_alloc(row_bytes);
     c->wanted = mem_alloc(row_bytes);
     for (uint32_t y = 0; y < image->height; y++) {
-        fill_row(image, y, channel_count, scale, c->wanted);
+        fill_row(&c->bytes, image, y, channel_count, scale, c->wanted);
         png_read_row(c->png, c->found, NULL);
         if (memcmp(c->found, c->wanted, row_bytes) == 0)
             continue;
@@ -165,6 +214,7 @@ static void compare_rows(struct checker *c, const struct image *image, float sca
 enum status image_check_png(const char *path, const struct image *image, float scale, struct error *err) {
     struct checker c = {.err = err};
     struct checker *volatile kept = &c;
+    bytes_init(&c.bytes);
     enum status status = image_source_open(&c.source, path, err);
     if (status != STATUS_OK)
         return status;

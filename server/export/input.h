@@ -77,7 +77,7 @@ struct export_input {
     const struct export_camera *camera; /* of all photographs */
     double luminance_per_unit;          /* cd/m2 of radiance 1; 0: unknown */
     struct export_options options;
-    struct parallel *pool;            /* for uv_bake.h */
+    struct parallel *pool;            /* may be NULL where there is no input's own layout */
     const struct export_input *baked; /* set by outputs.c: with atlas, inverse and materials in the input's own layout;
                                        * NULL: not made */
 };

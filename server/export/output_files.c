@@ -30,8 +30,8 @@ enum status output_files_list(struct output_files *f, const char *type, const ch
     return announce_file(f, type, name, content_type, err);
 }
 
-enum status output_files_image(struct output_files *f, const char *type, const char *name, const struct image *image,
-                               enum output_format format, const char *unit, const char *about, struct error *err) {
+static enum status write_image(const struct output_files *f, const char *name, const struct image *image,
+                               enum output_format format, const char *unit, struct parallel *pool, struct error *err) {
     struct image_note note[OUTPUT_NOTES_MAX + 1];
     char *path = file_join(f->dir, name), *temporary = mem_printf("%s.part", path);
     enum status status;
@@ -41,15 +41,75 @@ enum status output_files_image(struct output_files *f, const char *type, const c
         status = image_write_png(temporary, image, 1.0f, err);
     else
         status = image_write_exr_noted(temporary, image, format == OUTPUT_EXR_HALF ? IMAGE_HALF : IMAGE_FLOAT, true,
-                                       note, f->note_count + 1, err);
+                                       note, f->note_count + 1, pool, err);
     if (status == STATUS_OK)
         status = file_put_in_place(temporary, path, err);
     else
         unlink(temporary);
-    if (status == STATUS_OK)
-        status = output_files_list(f, type, name, format == OUTPUT_PNG ? MIME_PNG : MIME_EXR, about, err);
     mem_free(temporary);
     mem_free(path);
+    return status;
+}
+
+enum status output_files_image(struct output_files *f, const char *type, const char *name, const struct image *image,
+                               enum output_format format, const char *unit, const char *about, struct error *err) {
+    enum status status = write_image(f, name, image, format, unit, f->pool, err);
+    if (status == STATUS_OK)
+        status = output_files_list(f, type, name, format == OUTPUT_PNG ? MIME_PNG : MIME_EXR, about, err);
+    return status;
+}
+
+struct picture_job {
+    const struct output_files *files;
+    const struct output_picture *picture;
+    output_make *make;
+    const void *user;
+    size_t first;         /* of those that are written now */
+    enum status *status;  /* [count] */
+    struct error *errors; /* [count] */
+};
+
+static void write_picture(void *user, size_t index, int thread) {
+    const struct picture_job *job = user;
+    size_t i = job->first + index;
+    struct image image;
+    (void)thread;
+    job->make(job->user, i, &image);
+    job->status[i] = write_image(job->files, job->picture[i].name, &image, OUTPUT_PNG, NULL, NULL, &job->errors[i]);
+    image_release(&image);
+}
+
+/* Announces the pictures up to the first that could not be written. */
+static enum status list_pictures(struct output_files *f, const char *type, const struct picture_job *job, size_t count,
+                                 struct error *err) {
+    enum status status = STATUS_OK;
+    for (size_t i = job->first; i < job->first + count && status == STATUS_OK; i++) {
+        status = job->status[i];
+        if (status == STATUS_OK)
+            status = output_files_list(f, type, job->picture[i].name, MIME_PNG, job->picture[i].about, err);
+        else if (err)
+            *err = job->errors[i];
+    }
+    return status;
+}
+
+enum status output_files_pictures(struct output_files *f, const char *type, size_t count,
+                                  const struct output_picture *picture, size_t bytes, output_make *make,
+                                  const void *user, struct error *err) {
+    struct picture_job job = {.files = f, .picture = picture, .make = make, .user = user};
+    size_t group = bytes < OUTPUT_PICTURES_BYTES ? OUTPUT_PICTURES_BYTES / (bytes + 1) : 1;
+    struct parallel *alone = f->pool ? NULL : parallel_new(1);
+    enum status status = STATUS_OK;
+    job.status = mem_calloc(count + 1, sizeof *job.status);
+    job.errors = mem_calloc(count + 1, sizeof *job.errors);
+    for (; job.first < count && status == STATUS_OK; job.first += group) {
+        size_t now = count - job.first < group ? count - job.first : group;
+        parallel_for(alone ? alone : f->pool, now, write_picture, &job);
+        status = list_pictures(f, type, &job, now, err);
+    }
+    mem_free(job.errors);
+    mem_free(job.status);
+    parallel_free(alone);
     return status;
 }
 

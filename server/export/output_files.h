@@ -10,6 +10,7 @@
 #include "common/error.h"
 #include "common/image.h"
 #include "common/json.h"
+#include "common/parallel.h"
 
 /* Called after each file is complete under its final name; `type` is EVENT_PREVIEW or EVENT_OUTPUT, `name` is
  * relative to the folder. A failure ends the export. NULL: no announcements. */
@@ -18,7 +19,8 @@ typedef enum status export_announce(void *user, const char *type, const char *na
 
 #define OUTPUT_NOTES_MAX 3
 struct output_files {
-    const char *dir; /* borrowed */
+    const char *dir;       /* borrowed */
+    struct parallel *pool; /* NULL: the caller's thread alone; borrowed */
     export_announce *announce;
     void *user;
     cJSON *written;  /* array of {"name", "content_type", "about"}; NULL: not listed. The caller's, as the next */
@@ -33,6 +35,21 @@ enum output_format { OUTPUT_PNG, OUTPUT_EXR_HALF, OUTPUT_EXR_FLOAT };
  * NULL in a PNG's. */
 enum status output_files_image(struct output_files *f, const char *type, const char *name, const struct image *image,
                                enum output_format format, const char *unit, const char *about, struct error *err);
+
+/* A picture of several. */
+struct output_picture {
+    char name[64];
+    const char *about;
+};
+/* Makes picture `index`, to be released by the caller. May be called by several threads at once. */
+typedef void output_make(const void *user, size_t index, struct image *image);
+
+/* Makes and writes picture[count] as PNG files, several at a time: as many as have OUTPUT_PICTURES_BYTES of pixels
+ * together where each has `bytes` at most. They are listed and announced in their order. */
+#define OUTPUT_PICTURES_BYTES ((size_t)256 << 20)
+enum status output_files_pictures(struct output_files *f, const char *type, size_t count,
+                                  const struct output_picture *picture, size_t bytes, output_make *make,
+                                  const void *user, struct error *err);
 
 /* Writes data[length], reads it back and announces it; lists it unless `about` is NULL. */
 enum status output_files_bytes(struct output_files *f, const char *name, const char *content_type, const void *data,

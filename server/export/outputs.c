@@ -196,19 +196,29 @@ static enum status put_cameras(struct export *e, struct error *err) {
 
 static void comparison_file(char name[64], size_t i) { snprintf(name, 64, "compare/%03zu.png", i); }
 
+static void make_comparison(const void *user, size_t index, struct image *image) {
+    const struct export *e = user;
+    picture_comparison(&e->input->comparison[index], image);
+}
+
 static enum status put_comparisons(struct export *e, struct error *err) {
-    size_t count = e->input->comparison_count;
-    enum status status = count ? output_files_folder(&e->files, "compare", err) : STATUS_OK;
-    for (size_t i = 0; i < count && status == STATUS_OK; i++) {
-        struct image image;
-        char name[64];
-        comparison_file(name, i);
-        picture_comparison(&e->input->comparison[i], &image);
-        status = output_files_image(&e->files, EVENT_OUTPUT, name, &image, OUTPUT_PNG, NULL,
-                                    "held-out photograph, its re-render, their difference", err);
-        image_release(&image);
+    size_t count = e->input->comparison_count, pixels = 0;
+    if (count == 0)
+        return STATUS_OK;
+    struct output_picture *picture = mem_array(count, sizeof *picture);
+    for (size_t i = 0; i < count; i++) {
+        const struct image *photograph = e->input->comparison[i].photograph;
+        size_t here = (size_t)photograph->width * photograph->height;
+        pixels = here > pixels ? here : pixels;
+        picture[i].about = "held-out photograph, its re-render, their difference";
+        comparison_file(picture[i].name, i);
     }
-    return count > 0 && status == STATUS_OK ? put_views(e, err) : status;
+    enum status status = output_files_folder(&e->files, "compare", err);
+    if (status == STATUS_OK)
+        status = output_files_pictures(&e->files, EVENT_OUTPUT, count, picture, 3 * pixels * 3 * sizeof(float),
+                                       make_comparison, e, err);
+    mem_free(picture);
+    return status == STATUS_OK ? put_views(e, err) : status;
 }
 
 /* --- the report --------------------------------------------------------------------------- */
@@ -285,7 +295,7 @@ static enum status put_early_mesh(struct export *e, struct error *err) {
 
 enum status export_preview(const char *dir, const struct export_input *input, export_announce *announce, void *user,
                            struct error *err) {
-    struct export e = {.input = input, .files = {.dir = dir, .announce = announce, .user = user}};
+    struct export e = {.input = input, .files = {.dir = dir, .pool = input->pool, .announce = announce, .user = user}};
     enum status status = put_early_mesh(&e, err);
     return status == STATUS_OK ? put_previews(&e, err) : status;
 }
@@ -298,6 +308,7 @@ enum status export_outputs(const char *dir, const struct export_input *input, ex
                            struct error *err) {
     struct export e = {.input = input,
                        .files = {.dir = dir,
+                                 .pool = input->pool,
                                  .announce = announce,
                                  .user = user,
                                  .written = cJSON_CreateArray(),

@@ -43,19 +43,30 @@ static bool knows_deviation(const struct export_input *in) {
     return false;
 }
 
+struct previews {
+    const struct export_input *input;
+    enum picture_kind kind[KIND_COUNT];
+};
+
+static void make_preview(const void *user, size_t index, struct image *image) {
+    const struct previews *previews = user;
+    picture_preview(previews->input, previews->kind[index], image);
+}
+
 enum status texture_files_preview(struct output_files *files, const struct export_input *in, struct error *err) {
-    enum status status = STATUS_OK;
-    for (size_t k = 0; k < KIND_COUNT && status == STATUS_OK; k++) {
-        struct image image;
-        char name[64];
+    struct previews previews = {.input = in};
+    struct output_picture picture[KIND_COUNT];
+    size_t count = 0;
+    for (size_t k = 0; k < KIND_COUNT; k++) {
         if (kinds[k].kind == PICTURE_CONFIDENCE && !knows_deviation(in))
             continue;
-        snprintf(name, sizeof name, "preview/%s.png", kinds[k].stem);
-        picture_preview(in, kinds[k].kind, &image);
-        status = output_files_image(files, EVENT_PREVIEW, name, &image, OUTPUT_PNG, NULL, kinds[k].about, err);
-        image_release(&image);
+        snprintf(picture[count].name, sizeof picture[count].name, "preview/%s.png", kinds[k].stem);
+        picture[count].about = kinds[k].about;
+        previews.kind[count++] = kinds[k].kind;
     }
-    return status;
+    return output_files_pictures(files, EVENT_PREVIEW, count, picture,
+                                 (size_t)EXPORT_PREVIEW_SIZE * EXPORT_PREVIEW_SIZE * 3 * sizeof(float), make_preview,
+                                 &previews, err);
 }
 
 size_t texture_files_list(const char *dir, const struct export_input *in,

@@ -189,7 +189,7 @@ static enum status put(struct output *o, const char *name, enum file_form form, 
     enum image_exr_type type = form == FORM_HALF ? IMAGE_HALF : IMAGE_FLOAT;
     enum status status = form == FORM_PNG
                              ? image_write_png(temporary, image, 1.0f, err)
-                             : image_write_exr_noted(temporary, image, type, false, &note, o->note ? 1 : 0, err);
+                             : image_write_exr_noted(temporary, image, type, false, &note, o->note ? 1 : 0, NULL, err);
     if (status == STATUS_OK)
         status = file_put_in_place(temporary, path, err);
     else

@@ -147,11 +147,37 @@ static void check_edge(enum image_exr_type type) {
     image_release(&image);
 }
 
+/* A picture of more chunks than are encoded before some are written: the same bytes on any number of threads. */
+static void check_threads(bool tiled) {
+    struct image image;
+    struct buf alone, three;
+    struct parallel *pool = parallel_new(3);
+    const struct image_note note = {"units", "none"};
+    image_init_rgb(&image, tiled ? 1100 : 40, tiled ? 1030 : 4200);
+    for (size_t i = 0; i < (size_t)image.width * image.height * CHANNELS; i++)
+        image.pixel[i] = i % 7 == 0 ? rng_to_float((uint32_t)rng_key(5, i, 0)) : 0.25f;
+    for (int type = IMAGE_HALF; type <= IMAGE_FLOAT; type++) {
+        buf_init(&alone, SIZE_MAX);
+        buf_init(&three, SIZE_MAX);
+        CHECK(image_write_exr_noted(scratch, &image, (enum image_exr_type)type, tiled, &note, 1, NULL, &err) == 0);
+        CHECK(file_read(scratch, &alone, &err) == STATUS_OK);
+        CHECK(image_write_exr_noted(scratch, &image, (enum image_exr_type)type, tiled, &note, 1, pool, &err) == 0);
+        CHECK(file_read(scratch, &three, &err) == STATUS_OK);
+        CHECK(alone.length == three.length && memcmp(alone.data, three.data, alone.length) == 0);
+        buf_release(&alone);
+        buf_release(&three);
+    }
+    parallel_free(pool);
+    image_release(&image);
+}
+
 int main(void) {
     int fd = mkstemp(scratch);
     close(fd);
     check_edge(IMAGE_HALF);
     check_edge(IMAGE_FLOAT);
+    check_threads(false);
+    check_threads(true);
     unlink(scratch);
     return check_result();
 }

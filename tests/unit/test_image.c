@@ -2,6 +2,7 @@
  * same files (ImageMagick 6.9, Pillow 12, OpenEXR's Python module 3.4), round trips through our
  * writers, order of channels, windows, limits and the sentences of refusals. */
 #include "common/image.h"
+#include "common/rng.h"
 
 #include <dirent.h>
 #include <stdint.h>
@@ -188,6 +189,33 @@ static void exr_kinds(void) {
 
 /* ------------------------------------------------------------------------- PNG and JPEG */
 
+/* Bytes of a PNG are those of the sRGB function, beside each step from a byte to the next and between. */
+static void png_bytes(void) {
+    enum { BESIDE = 64 };
+    struct image image, back;
+    size_t wrong = 0;
+    image_init_rgb(&image, 2 * BESIDE, 256);
+    for (uint32_t byte = 0; byte < 256; byte++) {
+        float step = image_srgb_to_linear(((float)byte + 0.5f) / 255.0f), up = step, down = step;
+        for (uint32_t i = 0; i < BESIDE; i++) {
+            float *pixel = image.pixel + ((size_t)byte * image.width + 2 * i) * 3;
+            pixel[0] = up = nextafterf(up, INFINITY);
+            pixel[1] = down = nextafterf(down, 0.0f);
+            for (uint64_t k = 2; k < 6; k++)
+                pixel[k] = 1.1f * powf(rng_to_float((uint32_t)rng_key(byte, i, k)), 2.4f);
+        }
+    }
+    CHECK(image_write_png(scratch, &image, 1.0f, &err) == STATUS_OK);
+    CHECK(image_read_stored(scratch, &back, &err) == STATUS_OK);
+    for (size_t i = 0; i < (size_t)image.width * image.height * 3; i++) {
+        float value = fminf(image.pixel[i], 1.0f);
+        wrong += back.pixel[i] * 255.0f != floorf(image_linear_to_srgb(value) * 255.0f + 0.5f);
+    }
+    CHECK_THAT(wrong == 0, "%zu", wrong);
+    image_release(&back);
+    image_release(&image);
+}
+
 static void png_round_trip(void) {
     struct image image, back;
     struct image_info info;
@@ -359,6 +387,7 @@ int main(void) {
     exr_same_bytes();
     exr_disk_full();
     exr_kinds();
+    png_bytes();
     png_round_trip();
     jpeg();
     cut_short("tests/data/image/exif_little.jpg");
