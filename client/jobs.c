@@ -59,6 +59,11 @@ static void put_kind(struct table *t, size_t column, const cJSON *job) {
         table_set(t, column, COLOUR_NONE, "%s %lld", member_text(job, "kind"), (long long)source);
 }
 
+static const char *stage_of(const cJSON *job) {
+    bool waits = strncmp(member_text(job, "reason"), JOB_WAITING_IN, sizeof JOB_WAITING_IN - 1) == 0;
+    return waits ? "waiting" : member_text(job, "stage");
+}
+
 static void print_jobs(struct client *c, const cJSON *items) {
     static const char *const headings[] = {">job", "state", ">done",     "~stage",  "~>left",
                                            ">age", "?kind", "~>expires", "~?owner", "name"};
@@ -74,7 +79,7 @@ static void print_jobs(struct client *c, const cJSON *items) {
         table_set(&t, 0, COLOUR_NONE, "%.0f", member_number(job, "id", 0.0));
         table_set(&t, 1, state_colour(state), "%s", state);
         table_set(&t, 2, COLOUR_NONE, "%.0f%%", percent_done(job));
-        table_set(&t, 3, COLOUR_NONE, "%s", running ? member_text(job, "stage") : "");
+        table_set(&t, 3, COLOUR_NONE, "%s", running ? stage_of(job) : "");
         if (running && eta >= 0.0) {
             char left[16];
             format_duration(left, eta);
@@ -233,7 +238,7 @@ static void print_job(struct client *c, const cJSON *job, const cJSON *outputs) 
     if (strcmp(member_text(job, "state"), JOB_STATE_RUNNING) == 0) {
         format_duration(left, member_number(job, "eta_sec", -1.0));
         snprintf(text, sizeof text, "%s, %.0f%%, %s left", member_text(job, "stage"), percent_done(job), left);
-        field_print(c, "stage", text);
+        field_print(c, "stage", *member_text(job, "stage") ? text : "");
     }
     const cJSON *parts = cJSON_GetObjectItemCaseSensitive(job, "parts");
     if (cJSON_IsObject(parts)) {

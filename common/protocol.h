@@ -29,6 +29,7 @@
 #define JOB_STATE_SUCCEEDED "succeeded"
 #define JOB_STATE_FAILED "failed"
 #define JOB_STATE_CANCELLED "cancelled"
+#define JOB_WAITING_IN "waiting in " /* so begins the reason of one that is running and waits in a cluster's queue */
 
 /* Kinds of jobs. */
 #define JOB_KIND_RECONSTRUCT "reconstruct"

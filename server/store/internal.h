@@ -160,7 +160,7 @@ enum status store_fence(struct store *store, int64_t job_id, int attempt, struct
 /* remote.c, for remote_node.c; inside a transaction, or under the mutex. */
 struct remote_row; /* remote.h */
 enum status remote_row_read(struct store *store, int64_t job_id, int number, struct remote_row *row, struct error *err);
-/* The job waits no more: it shows no reason. */
+/* The job waits no more: it shows no reason, and runs from now on. */
 enum status remote_tell_begun(struct store *store, int64_t job_id, struct error *err);
 /* remote_writers.c, for both; under the mutex: requests that write outputs of an attempt at this moment. */
 size_t remote_writer_count(const struct store *store, int64_t job_id, int number);

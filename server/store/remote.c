@@ -156,8 +156,13 @@ static enum status tell_job(struct store *store, int64_t job_id, const char *rea
     return status == STATUS_OK && sql_changes(&store->sql) > 0 ? transition_tell(store, &now, reason, "", err) : status;
 }
 
+/* The wait in the site's queue is none of the job's running time. One that is split began with its first attempt. */
 enum status remote_tell_begun(struct store *store, int64_t job_id, struct error *err) {
-    return tell_job(store, job_id, "", err);
+    enum status status = sql_run(&store->sql, err,
+                                 "UPDATE jobs SET revision = revision + 1, started_ms = ? WHERE id = ?"
+                                 " AND NOT EXISTS (SELECT 1 FROM parts WHERE job_id = jobs.id)",
+                                 "ii", store_now_ms(), job_id);
+    return status == STATUS_OK ? tell_job(store, job_id, "", err) : status;
 }
 
 enum status store_remote_explain(struct store *store, int64_t job_id, int number, const char *reason,
@@ -175,7 +180,7 @@ enum status store_remote_explain(struct store *store, int64_t job_id, int number
     bool is_same = row.external_reason[0] && strcmp(row.external_reason, reason[0] ? reason : "-") == 0;
     if (status != STATUS_OK || row.phase >= REMOTE_CLAIMED || is_same)
         return store_end(store, status, STORE_NOTHING_CHANGED, err);
-    snprintf(text, sizeof text, "waiting in %s%s%.120s", row.executor, reason[0] ? ": " : "", reason);
+    snprintf(text, sizeof text, JOB_WAITING_IN "%s%s%.120s", row.executor, reason[0] ? ": " : "", reason);
     status =
         sql_run(&store->sql, err, "UPDATE remote SET external_reason = ? WHERE job_id = ? AND part = 0 AND number = ?",
                 "tin", reason[0] ? reason : "-", job_id, number);

@@ -252,7 +252,7 @@ static void test_kills(int lives) {
     int64_t job = 0;
     bool is_done = true;
     int of_job = 0;
-    for (int i = 0; i < lives || !is_done; i++, of_job++) {
+    for (int i = 0; (i < lives || !is_done) && check_failed_count == 0; i++, of_job++) {
         if (is_done)
             job = rig_job(&rig), of_job = 0;
         begin(&a, job, 1 + i % 2, ITERATIONS);

@@ -172,6 +172,7 @@ if [ "$kills" -eq 3 ]; then
         sleep 0.1
     done
     case $(shown 2 .reason) in "waiting in slurm: "*) ;; *) fail "the reason of a job that waits is \"$(shown 2 .reason)\"" ;; esac
+    "$build/unbake" list | grep -q '^ *2  running .* waiting ' || fail "the list does not say that it waits: $("$build/unbake" list)"
     "$build/unbake" cancel 2 >/dev/null 2>&1 || fail "cancel"
     for _ in $(seq 200); do
         [ -z "$(job_of_slurm)" ] && [ "$(shown 2 .state)" = cancelled ] && break

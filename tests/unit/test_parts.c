@@ -2,7 +2,9 @@
  * what an older data folder, a restart and a user's wishes do to them. */
 #include <math.h>
 #include <string.h>
+#include <unistd.h>
 
+#include "server/store/remote.h"
 #include "server/store/store.h"
 #include "tests/unit/store_rig.h"
 
@@ -88,6 +90,21 @@ static void test_ranges(void) {
     check_job(id, JOB_CANCELLED, 0, "");
 }
 
+/* A part begins on another machine: the job has run since it was split. */
+static void claim(int64_t id, int attempt) {
+    struct job before, after;
+    struct remote_row row = {.job_id = id, .number = attempt, .executor = "slurm", .name = "name", .lease_sec = 60};
+    const struct remote_key key = {id, attempt, DIGEST, "aa"};
+    OK(store_job_get(store, id, &before, &err));
+    OK(store_remote_begin(store, &row, DIGEST, &err));
+    usleep(5000);
+    OK(store_remote_claim(store, &key, "node7", &row, &err));
+    OK(store_job_get(store, id, &after, &err));
+    CHECK(before.started_ms > 0 && after.started_ms == before.started_ms);
+    job_release(&before);
+    job_release(&after);
+}
+
 /* Its parts run anywhere its user wants, itself here; whoever waits for a place waits for its parts too. */
 static void test_turns(void) {
     int64_t id = add_render(), wanted = 0;
@@ -98,6 +115,7 @@ static void test_turns(void) {
     CHECK(wanted == 2);
     int first = start(id, 1), second = start(id, 2);
     CHECK(next(" slurm ") == 0);
+    claim(id, second);
     OK(store_job_succeed(store, id, first, "", &err));
     check_job(id, JOB_RUNNING, 1, "");
     CHECK(next(NULL) == 0); /* the whole waits for the last of them */

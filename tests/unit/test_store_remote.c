@@ -56,7 +56,9 @@ static void check_life(struct store *store) {
     OK(store_remote_explain(store, key.job_id, key.number, "Priority", &err));
     OK(store_job_get(store, key.job_id, &job, &err));
     CHECK(job.revision == revision);
+    int64_t started_ms = job.started_ms;
     job_release(&job);
+    usleep(5000); /* in the queue, which is no running time */
 
     uint64_t changes = store_remote_changes(store);
     OK(store_remote_claim(store, &key, "node7", &row, &err));
@@ -64,6 +66,14 @@ static void check_life(struct store *store) {
     CHECK(row.claimed_ms >= row.begun_ms && row.begun_ms > 0 && store_remote_changes(store) > changes);
     OK(store_job_get(store, key.job_id, &job, &err));
     CHECK(job.state == JOB_RUNNING && !job.reason[0]);
+    CHECK(started_ms > 0 && job.started_ms >= started_ms + 5 && job.started_ms >= row.claimed_ms);
+    CHECK(job.revision > revision);
+    started_ms = job.started_ms;
+    job_release(&job);
+    usleep(5000);
+    OK(store_remote_claim(store, &key, "node7", &row, &err)); /* its reply was lost */
+    OK(store_job_get(store, key.job_id, &job, &err));
+    CHECK(job.started_ms == started_ms);
     job_release(&job);
     OK(store_remote_submitted(store, key.job_id, key.number, "4711", &err)); /* its reply came late */
     OK(store_remote_get(store, key.job_id, key.number, &row, &err));
@@ -75,7 +85,7 @@ static void check_life(struct store *store) {
     OK(store_remote_report(store, &key, 3, "three\n", 2.0, &reply, &err));
     CHECK(count_lines(store, &key, "one\ntwo\nthree\n") == 3);
     OK(store_remote_get(store, key.job_id, key.number, &row, &err));
-    CHECK(row.last_seq == 3 && row.cpu_sec == 2.5 && row.heard_count == 4);
+    CHECK(row.last_seq == 3 && row.cpu_sec == 2.5 && row.heard_count == 5);
     struct remote_end end = {.way = "exit", .code = 0, .words = "bye"};
     OK(store_remote_end(store, &key, 4, &end, 3.0, &err));
     OK(store_remote_get(store, key.job_id, key.number, &row, &err));
