@@ -371,8 +371,7 @@ static void test_full_disk(bool all) {
 static void test_lost_answers(unsigned seed) {
     struct remote_attempt a = {.lease_sec = 60};
     struct proxy proxy;
-    proxy_start(&proxy, listener_port(rig.listener), 1, seed);
-    proxy.one_in_turned = 3;
+    proxy_start(&proxy, listener_port(rig.listener), 1, 3, seed);
     port = proxy.port;
     begin(&a, rig_job(&rig), 2, ITERATIONS);
     a.pid = start_node(&a);

@@ -123,10 +123,10 @@ static inline void *proxy_accept(void *user) {
     return NULL;
 }
 
-static inline void proxy_start(struct proxy *p, int to, unsigned one_in, unsigned seed) {
+static inline void proxy_start(struct proxy *p, int to, unsigned one_in, unsigned one_in_turned, unsigned seed) {
     struct sockaddr_in own = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
     socklen_t size = sizeof own;
-    *p = (struct proxy){.to = to, .one_in = one_in};
+    *p = (struct proxy){.to = to, .one_in = one_in, .one_in_turned = one_in_turned};
     atomic_store(&p->random, seed);
     p->listener = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
     if (bind(p->listener, (struct sockaddr *)&own, sizeof own) != 0 || listen(p->listener, 64) != 0 ||
