@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "common/buf.h"
+#include "common/kept_pixels.h"
 #include "common/mem.h"
 #include "server/check/estimate.h"
 #include "server/scene/adjacency.h"
@@ -170,19 +171,20 @@ static void tell_bytes(double bytes, struct buf *text) {
 }
 
 /* Warns, with the texture size that would do. */
-static void warn_of_memory(cJSON *facts, const struct scene *scene, double side, double bytes, double limit) {
+static void warn_of_memory(cJSON *facts, const struct scene *scene, double kept, double side, double bytes,
+                           double limit) {
     struct buf text;
     double smaller = side;
-    while (smaller / 2.0 >= SIDE_LEAST && estimate_memory_bytes(scene, smaller) > limit)
+    while (smaller / 2.0 >= SIDE_LEAST && estimate_memory_bytes(scene, kept, smaller) > limit)
         smaller = floor(smaller / 2.0);
     buf_init(&text, 1024);
     buf_printf(&text, "a job with texture_size=%.0f will not fit the memory: it takes about ", side);
     tell_bytes(bytes, &text);
     buf_puts(&text, " of ");
     tell_bytes(limit, &text);
-    if (estimate_memory_bytes(scene, smaller) <= limit) {
+    if (estimate_memory_bytes(scene, kept, smaller) <= limit) {
         buf_printf(&text, "; texture_size=%.0f takes ", smaller);
-        tell_bytes(estimate_memory_bytes(scene, smaller), &text);
+        tell_bytes(estimate_memory_bytes(scene, kept, smaller), &text);
     } else {
         buf_puts(&text, "; fewer triangles or photographs take less");
     }
@@ -192,7 +194,8 @@ static void warn_of_memory(cJSON *facts, const struct scene *scene, double side,
 
 static void add_job(cJSON *facts, cJSON *table, const struct scene *scene, const struct settings *settings,
                     double memory_limit, struct parallel *pool, struct buf *text) {
-    double side = settings_number(settings, "texture_size"), bytes = estimate_memory_bytes(scene, side);
+    double side = settings_number(settings, "texture_size"), kept = kept_pixels(settings, side);
+    double bytes = estimate_memory_bytes(scene, kept, side);
     double sec = estimate_time_sec(scene, settings, pool);
     tell_bytes(bytes, text);
     buf_printf(text, " with texture_size=%.0f", side);
@@ -210,9 +213,11 @@ static void add_job(cJSON *facts, cJSON *table, const struct scene *scene, const
     json_add_number(facts, "memory_bytes", floor(bytes));
     json_add_number(facts, "memory_texture_size", side);
     json_add_number(facts, "memory_texel_bytes", ESTIMATE_TEXEL_BYTES);
+    json_add_number(facts, "memory_kept_pixels", kept);
+    json_add_number(facts, "memory_whole_bytes", floor(estimate_memory_bytes(scene, 0.0, side)));
     json_add_number(facts, "time_sec", sec);
     if (memory_limit > 0.0 && bytes > memory_limit)
-        warn_of_memory(facts, scene, side, bytes, memory_limit);
+        warn_of_memory(facts, scene, kept, side, bytes, memory_limit);
 }
 
 void check_table_add(cJSON *facts, const struct scene_check *room, const struct settings *settings, double memory_limit,

@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "common/spill.h"
+#include "server/scene/photograph_reduce.h"
 #include "server/state/pace.h"
 
 #define MIB 1048576.0
@@ -12,16 +13,17 @@
 #define UV_BYTES 24.0           /* of a triangle of a mesh with texture coordinates */
 #define PIXEL_BYTES 25.0        /* 11 to 13 of a photograph with what is found of it, 14 while detail is solved */
 
-/* A job may keep them all (photograph_megapixels). */
-static double file_pixels(const struct photograph *photo) {
+/* Of which `most` may be kept, 0: all. */
+static double pixels_of(const struct photograph *photo, double most) {
     struct camera camera = photograph_file_camera(photo);
-    return (double)camera.width * (double)camera.height;
+    uint32_t step = camera_step_to(&camera, most);
+    return (double)(camera.width / step) * (double)(camera.height / step);
 }
 
-double estimate_memory_bytes(const struct scene *scene, double side) {
+double estimate_memory_bytes(const struct scene *scene, double kept, double side) {
     double pixels = 0.0;
     for (size_t i = 0; i < scene->photograph_count; i++)
-        pixels += file_pixels(&scene->photograph[i]);
+        pixels += pixels_of(&scene->photograph[i], kept);
     double pixel_bytes = PIXEL_BYTES * pixels;
     if (scene->spill)
         pixel_bytes = fmin(pixel_bytes, (double)spill_memory_bytes(scene->spill));

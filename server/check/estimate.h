@@ -13,9 +13,10 @@
 
 #define ESTIMATE_TEXEL_BYTES 102.0 /* a texel of the square, of the memory below */
 
-/* Bytes at the peak, with textures of `side` texels a side. Pixels beyond the budget of the scene's spill lie on the
+/* Bytes at the peak, with textures of `side` texels a side and at most `kept` pixels of a photograph (common/kept_pixels.h;
+ * 0: all). Pixels beyond the budget of the scene's spill lie on the
  * disk. */
-double estimate_memory_bytes(const struct scene *scene, double side);
+double estimate_memory_bytes(const struct scene *scene, double kept, double side);
 
 /* Seconds with as many threads as the pool has; that of time_limit_sec where it is set and less. */
 double estimate_time_sec(const struct scene *scene, const struct settings *settings, struct parallel *pool);

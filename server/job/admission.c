@@ -8,6 +8,7 @@
 
 #include "common/json.h"
 #include "common/machine.h"
+#include "common/kept_pixels.h"
 #include "common/mem.h"
 #include "common/settings.h"
 #include "server/job/memory.h"
@@ -31,36 +32,56 @@ void admission_init(struct admission *a, uint64_t limit_bytes, uint64_t worker_l
     *a = (struct admission){.limit_bytes = limit_bytes, .worker_limit_bytes = worker_limit_bytes, .told_id = -1};
 }
 
-/* Texels a side of the textures that the next attempt makes; `fallback` where its settings cannot be read. */
-static double side_of(const struct job *job, double fallback) {
+/* What the check of a scene foretells (check/check_table.h). */
+struct foretold {
+    double bytes, texel_bytes;
+    double side;        /* texels of the textures that `bytes` are for */
+    double kept;        /* pixels of a photograph that they are for; 0: all */
+    double whole_bytes; /* where all are kept */
+};
+
+static bool read_foretold(const char *text, struct foretold *f) {
+    cJSON *facts = cJSON_Parse(text);
+    *f = (struct foretold){0};
+    bool is_foretold =
+        facts && json_number(facts, "memory_bytes", "facts", 0.0, &f->bytes, NULL) == STATUS_OK &&
+        json_number(facts, "memory_texel_bytes", "facts", 0.0, &f->texel_bytes, NULL) == STATUS_OK &&
+        json_number(facts, "memory_texture_size", "facts", 0.0, &f->side, NULL) == STATUS_OK &&
+        json_number(facts, "memory_kept_pixels", "facts", 0.0, &f->kept, NULL) == STATUS_OK &&
+        json_number(facts, "memory_whole_bytes", "facts", f->bytes, &f->whole_bytes, NULL) == STATUS_OK &&
+        f->bytes > 0.0;
+    cJSON_Delete(facts);
+    return is_foretold;
+}
+
+/* For the textures that the next attempt makes and the pixels that it keeps; as foretold where its settings cannot be
+ * read. */
+static double bytes_for(const struct job *job, const struct foretold *f) {
     struct settings settings;
     struct buf what;
     int threads = 1;
+    double bytes = f->bytes;
     cJSON *given = cJSON_Parse(job->settings);
     buf_init(&what, 4096);
     cJSON *reduced = memory_reduce(job->kind, given, job->memory_step, &threads, &what);
     settings_init(&settings);
-    double side = settings_apply(&settings, reduced, NULL, NULL) == STATUS_OK
-                      ? settings_number(&settings, "texture_size")
-                      : fallback;
+    if (settings_apply(&settings, reduced, NULL, NULL) == STATUS_OK) {
+        double side = settings_number(&settings, "texture_size"), kept = kept_pixels(&settings, side);
+        bool keeps_more = f->kept > 0.0 && (kept == 0.0 || kept > f->kept);
+        bytes = (keeps_more ? f->whole_bytes : f->bytes) + f->texel_bytes * (side * side - f->side * f->side);
+    }
     settings_release(&settings);
     cJSON_Delete(reduced);
     cJSON_Delete(given);
     buf_release(&what);
-    return side;
+    return fmax(bytes, 0.0);
 }
 
 double admission_need(const struct admission *a, const char *text, const struct job *job) {
-    double bytes = 0.0, texel_bytes = 0.0, side = 0.0;
-    cJSON *facts = cJSON_Parse(text);
-    bool is_foretold = facts && json_number(facts, "memory_bytes", "facts", 0.0, &bytes, NULL) == STATUS_OK &&
-                       json_number(facts, "memory_texel_bytes", "facts", 0.0, &texel_bytes, NULL) == STATUS_OK &&
-                       json_number(facts, "memory_texture_size", "facts", 0.0, &side, NULL) == STATUS_OK && bytes > 0.0;
-    cJSON_Delete(facts);
-    if (!is_foretold)
+    struct foretold foretold;
+    if (!read_foretold(text, &foretold))
         return 0.0;
-    double wanted = side_of(job, side);
-    bytes = fmax(bytes + texel_bytes * (wanted * wanted - side * side), 0.0);
+    double bytes = bytes_for(job, &foretold);
     return a->worker_limit_bytes > 0 ? fmin(bytes, (double)a->worker_limit_bytes) : bytes;
 }
 

@@ -6,8 +6,6 @@
 #include "common/image.h"
 #include "common/mem.h"
 
-#define USUAL_SIDE 2048.0 /* texels, for which photograph_megapixels is told */
-
 uint32_t camera_step_to(const struct camera *camera, double most) {
     double width = (double)camera->width, height = (double)camera->height;
     if (most <= 0.0)
@@ -16,11 +14,6 @@ uint32_t camera_step_to(const struct camera *camera, double most) {
 }
 
 uint32_t camera_step(const struct camera *camera) { return camera_step_to(camera, REDUCED_MAX_PIXELS); }
-
-double photograph_kept_pixels(const struct settings *settings) {
-    double side = settings_number(settings, "texture_size") / USUAL_SIDE;
-    return 1e6 * settings_number(settings, "photograph_megapixels") * fmax(side * side, 1.0);
-}
 
 struct camera camera_reduced(const struct camera *camera, uint32_t step) {
     struct camera reduced = *camera;

@@ -5,7 +5,6 @@
 #ifndef UNBAKE_SCENE_PHOTOGRAPH_REDUCE_H
 #define UNBAKE_SCENE_PHOTOGRAPH_REDUCE_H
 
-#include "common/settings.h"
 #include "server/scene/photograph.h"
 
 /* Cells at the most: a photograph up to 1440 x 1080 has one a pixel. */
@@ -16,9 +15,6 @@ uint32_t camera_step(const struct camera *camera);
 
 /* The same for cells of which there are `most` at the most; 0: as many as pixels. */
 uint32_t camera_step_to(const struct camera *camera, double most);
-
-/* Pixels that a job keeps of one photograph, by its settings photograph_megapixels and texture_size; 0: all. */
-double photograph_kept_pixels(const struct settings *settings);
 
 /* The camera whose pixels are `step` x `step` of this one's; columns and rows that fill no pixel are left out. `step` is
  * 1 or more, and at most the smaller side. */

@@ -9,6 +9,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "common/kept_pixels.h"
 #include "common/parallel.h"
 #include "server/gather/probes.h"
 #include "server/scene/photograph_reduce.h"
@@ -98,7 +99,7 @@ static void plan_all(const struct pace *p, const struct scene *scene) {
     plan_init(p->plan, settings_number(p->settings, "time_limit_sec"));
     for (size_t i = 0; i < scene->photograph_count; i++) {
         struct camera c = photograph_file_camera(&scene->photograph[i]);
-        double step = (double)camera_step_to(&c, photograph_kept_pixels(p->settings));
+        double step = (double)camera_step_to(&c, kept_pixels(p->settings, side(p)));
         pixels += (double)c.width * (double)c.height / (step * step);
     }
     if (held_out == 0.0 && every > 0.0)

@@ -3,12 +3,12 @@
 
 #include <string.h>
 
+#include "common/kept_pixels.h"
 #include "common/mem.h"
 #include "server/ingest/bundle.h"
 #include "server/ingest/photo_color.h"
 #include "server/ingest/photos.h"
 #include "server/ingest/pixels.h"
-#include "server/scene/photograph_reduce.h"
 #include "server/scene/select.h"
 #include "server/worker/pixel_memory.h"
 
@@ -67,7 +67,7 @@ enum status load_scene(const struct order *order, struct progress *progress, str
     struct bundle_limits limits = bundle_default_limits();
     pixels_use(spill, &limits);
     limits.later_bytes = PHOTOGRAPH_LATER_BYTES;
-    limits.kept_pixels = photograph_kept_pixels(settings);
+    limits.kept_pixels = kept_pixels(settings, settings_number(settings, "texture_size"));
     struct reading reading;
     const char *transforms = settings_text(settings, "transforms");
     enum status status = reading_parse(order->reading, &reading, err);

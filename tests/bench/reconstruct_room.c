@@ -10,11 +10,11 @@
 
 #include "common/clock.h"
 #include "common/file.h"
+#include "common/kept_pixels.h"
 #include "common/log.h"
 #include "common/mem.h"
 #include "server/ingest/bundle.h"
 #include "server/ingest/pixels.h"
-#include "server/scene/photograph_reduce.h"
 #include "server/worker/results.h"
 #include "server/worker/working_time.h"
 #include "tests/bench/cores.h"
@@ -143,7 +143,7 @@ static enum status run(int argc, char **argv, struct error *err) {
         pixels_use(spill, &limits);
     limits.later_bytes = PHOTOGRAPH_LATER_BYTES;
     if (status == STATUS_OK)
-        limits.kept_pixels = photograph_kept_pixels(&settings);
+        limits.kept_pixels = kept_pixels(&settings, settings_number(&settings, "texture_size"));
     struct reading reading = reading_default();
     reading.transforms = mem_strdup(settings_text(&settings, "transforms"));
     cJSON *problems = cJSON_CreateArray(); /* err has the first */

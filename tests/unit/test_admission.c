@@ -35,6 +35,13 @@ static void test_need(void) {
                                           "{\"memory_bytes\":1e9,\"memory_texture_size\":[]}"};
     for (size_t i = 0; i < sizeof unknown / sizeof *unknown; i++)
         CHECK(need_of(unknown[i], "{}", 0, 0) == 0.0);
+    static const char reduced[] =
+        "{\"memory_bytes\":1073741824,\"memory_texture_size\":2048,\"memory_texel_bytes\":100,"
+        "\"memory_kept_pixels\":3.2e6,\"memory_whole_bytes\":4294967296}";
+    CHECK_NEAR(need_of(reduced, "{}", 0, 0), GIB, 0.5);
+    CHECK_NEAR(need_of(reduced, "{\"quality\":\"draft\"}", 0, 0), GIB, 0.5);
+    CHECK_NEAR(need_of(reduced, "{\"quality\":\"fine\"}", 0, 0), 4.0 * GIB, 0.5);
+    CHECK_NEAR(need_of(reduced, "{\"photograph_megapixels\":6}", 0, 0), 4.0 * GIB, 0.5);
     CHECK_NEAR(need_of("{\"memory_bytes\":1e9}", "{}", 0, 0), 1e9, 0.5); /* of a version that did not tell more */
 }
 

@@ -48,12 +48,17 @@ int main(void) {
     double side = cJSON_GetObjectItem(facts, "memory_texture_size")->valuedouble,
            texel_bytes = cJSON_GetObjectItem(facts, "memory_texel_bytes")->valuedouble;
     CHECK_NEAR(cJSON_GetObjectItem(facts, "memory_bytes")->valuedouble + texel_bytes * (500.0 * 500.0 - side * side),
-               estimate_memory_bytes(&room.scene, 500.0), 1.0);
+               estimate_memory_bytes(&room.scene, 0.0, 500.0), 1.0);
     CHECK(cJSON_GetArraySize(cJSON_GetObjectItem(facts, "warnings")) == 0);
+    CHECK_NEAR(cJSON_GetObjectItem(facts, "memory_whole_bytes")->valuedouble,
+               cJSON_GetObjectItem(facts, "memory_bytes")->valuedouble, 0.0);
+    CHECK_NEAR(estimate_memory_bytes(&room.scene, 0.0, 500.0) -
+                   estimate_memory_bytes(&room.scene, 96.0 * 72.0 / 4.0, 500.0),
+               25.0 * 0.75 * 16 * 96 * 72, 1.0);
     cJSON_Delete(facts);
 
     room.scene.mesh.triangle_count -= 2; /* of the box at the wall: a side is open */
-    facts = facts_with(&room, estimate_memory_bytes(&room.scene, 1100.0), rig.pool);
+    facts = facts_with(&room, estimate_memory_bytes(&room.scene, 0.0, 1100.0), rig.pool);
     CHECK_STRING(value_of(facts, "holes and rims"), "1 border, 2 m in all");
     const cJSON *warnings = cJSON_GetObjectItem(facts, "warnings");
     const char *warning = cJSON_GetStringValue(cJSON_GetArrayItem(warnings, 0));

@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "common/image.h"
+#include "common/kept_pixels.h"
 #include "common/mem.h"
 #include "tests/check.h"
 
@@ -109,7 +110,7 @@ static void test_kept(void) {
         cJSON *given = cJSON_Parse(of[i].settings);
         settings_init(&settings);
         CHECK(settings_apply(&settings, given, NULL, &err) == STATUS_OK);
-        CHECK_NEAR(photograph_kept_pixels(&settings), of[i].pixels, 1.0);
+        CHECK_NEAR(kept_pixels(&settings, settings_number(&settings, "texture_size")), of[i].pixels, 1.0);
         settings_release(&settings);
         cJSON_Delete(given);
     }
