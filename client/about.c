@@ -10,13 +10,13 @@
 #include "common/render_settings.h"
 #include "common/settings.h"
 
-const struct client_option version_options[] = {
+const struct command_option version_options[] = {
     {"verbose", 'v', OPTION_FLAG, NULL, "all libraries, a line each"},
     FORMAT_OPTION,
     {0},
 };
 
-const struct client_option settings_options[] = {
+const struct command_option settings_options[] = {
     {"kind", 'k', OPTION_TEXT, "KIND", "of which jobs: reconstruct (the default) or render"},
     FORMAT_OPTION,
     {0},

@@ -9,7 +9,7 @@
 #include "common/mem.h"
 #include "common/protocol.h"
 
-const struct client_option check_options[] = {
+const struct command_option check_options[] = {
     ROOM_OPTIONS(OPTION_TEXT),
     {"pictures", 0, OPTION_TEXT, "DIR", "keep the pictures of the check there: the mesh over photographs, a plan"},
     FORMAT_OPTION,
@@ -148,7 +148,7 @@ int check_set_run(struct client *c, const struct options *o) {
     enum status status = STATUS_OK;
     if (o->word_count < 2)
         status = error_set(&err, STATUS_INPUT, "missing argument SCENE");
-    for (const struct client_option *own = collection_options; own->name && status == STATUS_OK; own++)
+    for (const struct command_option *own = collection_options; own->name && status == STATUS_OK; own++)
         if (options_flag(o, own->name))
             status = error_set(&err, STATUS_INPUT, "--%s does not go with `scenes set`", own->name);
     if (status == STATUS_OK)

@@ -6,7 +6,7 @@
 #include <stdint.h>
 
 #include "client/format.h"
-#include "client/options.h"
+#include "common/options.h"
 #include "client/terminal.h"
 #include "common/error.h"
 #include "common/json.h"
@@ -46,14 +46,14 @@ struct command {
     const char *details;   /* for --help; "" if the summary says all */
     const char *examples;  /* lines, each ending in a newline */
     size_t words_min, words_max;
-    const struct client_option *options; /* ends with a NULL name */
+    const struct command_option *options; /* ends with a NULL name */
     int (*run)(struct client *c, const struct options *o);
 };
 
 /* In the order of the help; *count entries. */
 const struct command *command_table(size_t *count);
 /* The options that every command takes. */
-extern const struct client_option command_shared_options[];
+extern const struct command_option command_shared_options[];
 const struct command *command_find(const char *name);
 /* Whether it asks no server: c->request is NULL then. */
 bool command_is_local(const struct command *command);
@@ -62,7 +62,7 @@ extern const struct command_exit {
     int status;
     const char *meaning;
 } command_exit_statuses[];
-const char *command_option_help(const struct client_option *option);
+const char *command_option_help(const struct command_option *option);
 extern const char *const command_job_states[], *const command_job_kinds[]; /* end with NULL */
 /* Writes the help of the program (command NULL) or of one command. */
 void command_help(const struct command *command, FILE *out);

@@ -8,7 +8,7 @@
 #include "common/mem.h"
 #include "common/nearest.h"
 
-const struct client_option collection_options[] = {
+const struct command_option collection_options[] = {
     {"limit", 'n', OPTION_WHOLE, "N", "list at most so many (20); 0: all"},
     {"dry-run", 0, OPTION_FLAG, NULL, "with rm: only say what would be removed"},
     KEEPING_OPTIONS,

@@ -13,7 +13,7 @@ struct collection {
     const char *further; /* an action that only this command has, elsewhere; NULL: none */
 };
 
-extern const struct client_option collection_options[];
+extern const struct command_option collection_options[];
 
 /* Runs such a command. */
 int collection_run(struct client *c, const struct options *o, const struct collection *what);

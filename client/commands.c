@@ -11,9 +11,9 @@
 
 #define ANY_NUMBER ((size_t)-1)
 
-static const struct client_option no_options[] = {{0}};
+static const struct command_option no_options[] = {{0}};
 
-const struct client_option command_shared_options[] = {
+const struct command_option command_shared_options[] = {
     {"server", 0, OPTION_TEXT, "URL|NAME",
      "where unbaked listens, or a name of ~/.config/unbake/config; else $UNBAKE_SERVER, else that file's, else " PROTOCOL_DEFAULT_SERVER},
     {"ca", 0, OPTION_TEXT, "FILE", "certificates (PEM) to trust for https; else $UNBAKE_CA, else the system's"},
@@ -163,19 +163,8 @@ bool command_is_local(const struct command *command) {
     return command->run == servers_run || command->run == manual_run;
 }
 
-const char *command_option_help(const struct client_option *option) {
-    return option->help ? option->help : render_settings_find(option->name, NULL)->help;
-}
-
-static void print_options(const struct client_option *option, FILE *out) {
-    for (; option->name; option++) {
-        char left[64], letter[5] = "    ";
-        if (option->letter)
-            snprintf(letter, sizeof letter, "-%c, ", option->letter);
-        snprintf(left, sizeof left, "%s--%s%s%s", letter, option->name, option->value ? " " : "",
-                 option->value ? option->value : "");
-        fprintf(out, "  %-22s %s\n", left, command_option_help(option));
-    }
+const char *command_option_help(const struct command_option *option) {
+    return render_settings_find(option->name, NULL)->help;
 }
 
 const struct command_exit command_exit_statuses[] = {
@@ -216,8 +205,8 @@ void command_help(const struct command *command, FILE *out) {
         if (*command->details)
             fprintf(out, "\n%s", command->details);
         fprintf(out, "\nexamples:\n%s\noptions:\n", command->examples);
-        print_options(command->options, out);
-        print_options(command_shared_options, out);
+        options_print(command->options, command_option_help, out);
+        options_print(command_shared_options, command_option_help, out);
         return;
     }
     fputs("unbake takes the light out of a scanned room; `unbaked` does the work.\n\n"
@@ -228,7 +217,7 @@ void command_help(const struct command *command, FILE *out) {
     fputs("\nA JOB is a number, or `last` for the newest. `unbake COMMAND --help` has the options and\n"
           "an example of each command. Every command takes:\n",
           out);
-    print_options(command_shared_options, out);
+    options_print(command_shared_options, command_option_help, out);
     fputs("\n", out);
     print_exit_statuses(out);
 }

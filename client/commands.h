@@ -5,44 +5,44 @@
 #include "client/client.h"
 
 /* submit.c */
-extern const struct client_option submit_options[];
+extern const struct command_option submit_options[];
 int submit_run(struct client *c, const struct options *o);
 
 /* compare.c */
-extern const struct client_option compare_options[];
+extern const struct command_option compare_options[];
 int compare_run(struct client *c, const struct options *o);
 
 /* check.c */
-extern const struct client_option check_options[];
+extern const struct command_option check_options[];
 int check_run(struct client *c, const struct options *o);
 int check_set_run(struct client *c, const struct options *o); /* `scenes set` */
 
 /* render.c */
-extern const struct client_option render_options[], evaluate_options[];
+extern const struct command_option render_options[], evaluate_options[];
 int render_run(struct client *c, const struct options *o);
 int evaluate_run(struct client *c, const struct options *o);
 
 /* watch.c */
-extern const struct client_option watch_options[], logs_options[];
+extern const struct command_option watch_options[], logs_options[];
 int watch_run(struct client *c, const struct options *o);
 int logs_run(struct client *c, const struct options *o);
 /* Follows a job to its end. `all`: from its first event on, not from now. */
 int watch_job(struct client *c, int64_t job, bool all);
 
 /* wait.c */
-extern const struct client_option wait_options[];
+extern const struct command_option wait_options[];
 int wait_run(struct client *c, const struct options *o);
 
 /* open.c */
-extern const struct client_option open_options[];
+extern const struct command_option open_options[];
 int open_run(struct client *c, const struct options *o);
 
 /* servers.c */
-extern const struct client_option servers_options[];
+extern const struct command_option servers_options[];
 int servers_run(struct client *c, const struct options *o);
 
 /* jobs.c */
-extern const struct client_option list_options[], show_options[], retry_options[], rm_options[];
+extern const struct command_option list_options[], show_options[], retry_options[], rm_options[];
 int list_run(struct client *c, const struct options *o);
 int show_run(struct client *c, const struct options *o);
 int cancel_run(struct client *c, const struct options *o);
@@ -53,12 +53,12 @@ int retry_run(struct client *c, const struct options *o);
 int rm_run(struct client *c, const struct options *o);
 
 /* edit.c */
-extern const struct client_option edit_options[], extend_options[];
+extern const struct command_option edit_options[], extend_options[];
 int edit_run(struct client *c, const struct options *o);
 int extend_run(struct client *c, const struct options *o);
 
 /* get.c */
-extern const struct client_option get_options[];
+extern const struct command_option get_options[];
 int get_run(struct client *c, const struct options *o);
 /* All outputs of a job into the folder `dir`. */
 int get_job(struct client *c, int64_t job, const char *dir);
@@ -69,7 +69,7 @@ bool get_name_is_safe(const char *name);
 int scenes_run(struct client *c, const struct options *o);
 
 /* uploads.c */
-extern const struct client_option collect_options[];
+extern const struct command_option collect_options[];
 int uploads_run(struct client *c, const struct options *o);
 int collect_run(struct client *c, const struct options *o);
 
@@ -85,7 +85,7 @@ int manual_run(struct client *c, const struct options *o);
  * its default. */
 void setting_values(struct buf *out, const cJSON *setting);
 void setting_default(struct buf *out, const cJSON *setting);
-extern const struct client_option settings_options[], version_options[];
+extern const struct command_option settings_options[], version_options[];
 int settings_run(struct client *c, const struct options *o);
 int version_run(struct client *c, const struct options *o);
 

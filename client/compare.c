@@ -10,7 +10,7 @@
 #include "common/mem.h"
 #include "common/protocol.h"
 
-const struct client_option compare_options[] = {FORMAT_OPTION, {0}};
+const struct command_option compare_options[] = {FORMAT_OPTION, {0}};
 
 /* Figures of the outputs, as "member" or "object.member"; of one output in a row. */
 static const struct job_figure {

@@ -7,7 +7,7 @@
 #include "client/retention.h"
 #include "common/mem.h"
 
-const struct client_option edit_options[] = {
+const struct command_option edit_options[] = {
     {"name", 'n', OPTION_TEXT, "NAME", "what people will call the job"},
     {"priority", 'p', OPTION_WHOLE, "N", "-100 to 100, larger goes first"},
     {"label", 'l', OPTION_LIST, "KEY=VALUE", "a label of your own; they replace all that were there"},
@@ -19,7 +19,7 @@ const struct client_option edit_options[] = {
     {"before", 0, OPTION_TEXT, "JOB", "before that job, and with its priority"},
     {0},
 };
-const struct client_option extend_options[] = {
+const struct command_option extend_options[] = {
     {"iterations", 'i', OPTION_WHOLE, "N", "so many more, for a job with that limit"},
     {"looks", 0, OPTION_WHOLE, "N", "so many more observations at each part of the texture"},
     {"time", 't', OPTION_SECONDS, "SEC", "so much more working time, for all others"},

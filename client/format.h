@@ -2,7 +2,7 @@
 #ifndef UNBAKE_CLIENT_FORMAT_H
 #define UNBAKE_CLIENT_FORMAT_H
 
-#include "client/options.h"
+#include "common/options.h"
 
 #define FORMAT_OPTION                                                                                                  \
     { "format", 'o', OPTION_TEXT, "FORMAT", "text (for people), json, or jsonl: one object a line" }

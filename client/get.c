@@ -27,7 +27,7 @@
 #define PATIENCE_SEC 60.0
 #define VERSIONS_MAX 5 /* give up on a file that changes more often during the download */
 
-const struct client_option get_options[] = {
+const struct command_option get_options[] = {
     {"output", 'o', OPTION_TEXT, "DIR", "where the files go; it is made if need be (job-JOB)"},
     {0},
 };

@@ -10,7 +10,7 @@
 #include "common/nearest.h"
 #include "common/protocol.h"
 
-const struct client_option list_options[] = {
+const struct command_option list_options[] = {
     {"state", 's', OPTION_TEXT, "STATE", "only jobs that are queued, running, paused, succeeded, ..."},
     {"kind", 'k', OPTION_TEXT, "KIND", "only jobs of that kind: reconstruct, render or evaluate"},
     {"label", 'l', OPTION_TEXT, "KEY[=VALUE]", "only jobs with that label"},
@@ -19,13 +19,13 @@ const struct client_option list_options[] = {
     {0},
 };
 
-const struct client_option show_options[] = {FORMAT_OPTION, {0}};
+const struct command_option show_options[] = {FORMAT_OPTION, {0}};
 
-const struct client_option retry_options[] = {
+const struct command_option retry_options[] = {
     {"from", 0, OPTION_TEXT, "STAGE", "do that stage and all after it anew"},
     {0},
 };
-const struct client_option rm_options[] = {
+const struct command_option rm_options[] = {
     {"dry-run", 0, OPTION_FLAG, NULL, "only say what would be removed"},
     {0},
 };

@@ -9,17 +9,6 @@
 #include "common/render_settings.h"
 #include "common/settings.h"
 
-static void option_list(const struct client_option *option) {
-    for (; option->name; option++) {
-        char word[64];
-        if (option->letter)
-            snprintf(word, sizeof word, "-%c, --%s", option->letter, option->name);
-        else
-            snprintf(word, sizeof word, "--%s", option->name);
-        manual_item(stdout, word, option->value, command_option_help(option));
-    }
-}
-
 /* Takes settings. */
 static void setting_list(cJSON *settings) {
     const cJSON *setting;
@@ -47,13 +36,13 @@ static void page_1(void) {
     manual_text(stdout, "unbake sends rooms to unbaked(8), follows its jobs and fetches what comes out. A JOB is a "
                         "number, or `last` for the newest. Results go to stdout, progress and messages to stderr.\n");
     manual_section(stdout, "OPTIONS OF EVERY COMMAND");
-    option_list(command_shared_options);
+    manual_options(stdout, command_shared_options, command_option_help);
     manual_section(stdout, "COMMANDS");
     for (size_t i = 0; i < count; i++) {
         manual_subsection(stdout, table[i].name, table[i].arguments);
         manual_sentence(stdout, table[i].summary);
         manual_text(stdout, table[i].details);
-        option_list(table[i].options);
+        manual_options(stdout, table[i].options, command_option_help);
         manual_example(stdout, table[i].examples);
     }
     manual_section(stdout, "SETTINGS");
@@ -83,11 +72,6 @@ static void page_1(void) {
     manual_text(stdout, "unbaked(8), unbaked.conf(5)\n");
 }
 
-static void option_words(const struct client_option *option) {
-    for (; option->name; option++)
-        completion_word(stdout, "--", option->name);
-}
-
 static void completion(bool zsh) {
     size_t count;
     const struct command *table = command_table(&count);
@@ -96,8 +80,8 @@ static void completion(bool zsh) {
     completion_begin(stdout, "unbake", zsh);
     for (size_t i = 0; i < count; i++) {
         completion_words(stdout, table[i].name);
-        option_words(table[i].options);
-        option_words(command_shared_options);
+        completion_options(stdout, table[i].options);
+        completion_options(stdout, command_shared_options);
         completion_words_end(stdout);
     }
     completion_words(stdout, "*");

@@ -4,7 +4,7 @@
 #ifndef UNBAKE_CLIENT_MATRIX_H
 #define UNBAKE_CLIENT_MATRIX_H
 
-#include "client/options.h"
+#include "common/options.h"
 #include "common/buf.h"
 #include "common/json.h"
 

@@ -7,7 +7,7 @@
 #include "client/outcome.h"
 #include "common/mem.h"
 
-const struct client_option open_options[] = {
+const struct command_option open_options[] = {
     {"print", 'p', OPTION_FLAG, NULL, "only print the address"},
     {0},
 };

@@ -23,7 +23,7 @@
 
 static const char *const shortcuts[] = {"view", "size", "lights", "remove", "environment", "spp", NULL};
 
-const struct client_option render_options[] = {
+const struct command_option render_options[] = {
     {"set", 's', OPTION_LIST, "KEY=VALUE", "a setting; `unbake settings --kind render` lists them"},
     {"view", 0, OPTION_TEXT, "VIEWS", NULL},
     {"size", 0, OPTION_TEXT, "WxH", NULL},
@@ -43,7 +43,7 @@ const struct client_option render_options[] = {
     {0},
 };
 
-const struct client_option evaluate_options[] = {
+const struct command_option evaluate_options[] = {
     {"scene", 0, OPTION_TEXT, "SCENE", "the scene with the truth; else that of the reconstruction"},
     {"name", 'n', OPTION_TEXT, "NAME", "what people will call the job; else that of the reconstruction"},
     NEW_JOB_OPTIONS,

@@ -190,7 +190,7 @@ enum status servers_find(const struct servers *s, const char *word, const char *
 
 /* --- the command --------------------------------------------------------------------------- */
 
-const struct client_option servers_options[] = {FORMAT_OPTION, {0}};
+const struct command_option servers_options[] = {FORMAT_OPTION, {0}};
 
 /* "file", "kept" by `unbake login`, "none"; "unreadable" where the file must not be used. */
 static const char *token_of(const struct server_entry *e, const char *url) {

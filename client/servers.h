@@ -15,7 +15,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#include "client/options.h"
+#include "common/options.h"
 #include "common/error.h"
 
 struct server_entry {

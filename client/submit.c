@@ -19,7 +19,7 @@
 #include "common/protocol.h"
 #include "common/settings.h"
 
-const struct client_option submit_options[] = {
+const struct command_option submit_options[] = {
     {"name", 'n', OPTION_TEXT, "NAME", "what people will call the job; else the room's name"},
     {"set", 's', OPTION_LIST, "KEY=VALUE", "a setting; `unbake settings` lists them"},
     {"matrix", 'm', OPTION_LIST, "KEY=A,B,...",

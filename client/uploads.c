@@ -4,7 +4,7 @@
 #include "client/retention.h"
 #include "client/table.h"
 
-const struct client_option collect_options[] = {
+const struct command_option collect_options[] = {
     {"dry-run", 0, OPTION_FLAG, NULL, "only say what would be removed"},
     FORMAT_OPTION,
     {0},

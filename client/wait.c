@@ -13,7 +13,7 @@
 #define ROUND_SEC 2.0      /* between two rounds of questions, once nothing has ended for a while */
 #define PATIENCE_SEC 600.0 /* for which a server may be away that has answered once, as `watch` has it */
 
-const struct client_option wait_options[] = {
+const struct command_option wait_options[] = {
     {"any", 0, OPTION_FLAG, NULL, "until the first of them has ended, not all"},
     {"timeout", 't', OPTION_SECONDS, "SEC", "at most so long; then ends with 9"},
     {0},

@@ -22,12 +22,12 @@
 #define REDRAW_SEC 0.2
 #define PLAIN_SEC 10.0
 
-const struct client_option watch_options[] = {
+const struct command_option watch_options[] = {
     {"all", 'a', OPTION_FLAG, NULL, "begin with what happened before, not with the present"},
     {"exec", 0, OPTION_TEXT, "CMD", "when the job has ended, run that by sh with $UNBAKE_JOB and $UNBAKE_STATE"},
     {0},
 };
-const struct client_option logs_options[] = {
+const struct command_option logs_options[] = {
     {"follow", 'f', OPTION_FLAG, NULL, "print the log's events until the job ends"},
     {0},
 };

@@ -84,6 +84,17 @@ void manual_item(FILE *out, const char *word, const char *value, const char *tex
     fputs("\n", out);
 }
 
+void manual_options(FILE *out, const struct command_option *table, option_help *help_of) {
+    for (; table && table->name; table++) {
+        char word[64];
+        if (table->letter)
+            snprintf(word, sizeof word, "-%c, --%s", table->letter, table->name);
+        else
+            snprintf(word, sizeof word, "--%s", table->name);
+        manual_item(out, word, table->value, table->help ? table->help : help_of(table));
+    }
+}
+
 void manual_example(FILE *out, const char *lines) {
     if (!*lines)
         return;
@@ -108,6 +119,11 @@ void completion_begin(FILE *out, const char *program, bool zsh) {
 void completion_words(FILE *out, const char *pattern) { fprintf(out, "    %s) words=\"", pattern); }
 
 void completion_word(FILE *out, const char *word, const char *after) { fprintf(out, "%s%s ", word, after); }
+
+void completion_options(FILE *out, const struct command_option *table) {
+    for (; table && table->name; table++)
+        completion_word(out, "--", table->name);
+}
 
 void completion_words_end(FILE *out) { fputs("\" ;;\n", out); }
 

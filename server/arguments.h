@@ -1,11 +1,13 @@
-/* arguments.h -- the command line of `unbaked COMMAND`, read by a table of flags. Help, manual page and the shells'
- * completion are made from the same table. Messages go to stderr. */
+/* arguments.h -- how the commands of `unbaked` begin: their command line, read by a table (common/options.h), and the numbers
+ * in it. Messages go to stderr. */
 #ifndef UNBAKE_SERVER_ARGUMENTS_H
 #define UNBAKE_SERVER_ARGUMENTS_H
 
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+
+#include "common/options.h"
 
 /* Exit status of wrong usage. */
 #define EXIT_USAGE 2
@@ -14,37 +16,15 @@
  * arguments are wrong. */
 enum { COMMAND_HELP = 256, COMMAND_MISUSED };
 
-struct flag {
-    const char *name;  /* "--config"; NULL ends a table */
-    const char *value; /* name of its value in the help; NULL: it takes none */
-    const char *help;
-};
-
 #define COMMAND_HELP_FLAG                                                                                              \
-    { "--help", NULL, "print this help" }
+    { "help", 0, OPTION_FLAG, NULL, "print this help" }
 
-#define WORDS_MAX 8
+/* Reads argv[1...]. False, with a message, where options_parse finds a fault. The caller's (options_release) in any
+ * case. */
+bool arguments_read(struct options *o, int argc, char **argv, const struct command_option *table);
 
-struct arguments {
-    const char *words[WORDS_MAX]; /* what is no flag; borrowed from argv, as are the values */
-    size_t word_count;
-    struct {
-        const struct flag *flag;
-        const char *value; /* NULL where it takes none */
-    } given[64];
-    size_t given_count;
-};
-
-/* Reads argv[1...]; "--name value" and "--name=value" are the same. False, with a message, for an unknown flag, a
- * missing or unexpected value, or too many words. */
-bool arguments_read(struct arguments *a, int argc, char **argv, const struct flag *flags);
-
-bool arguments_have(const struct arguments *a, const char *flag);
-/* The last value given, or `fallback`. */
-const char *arguments_value(const struct arguments *a, const char *flag, const char *fallback);
-
-/* A flag whose value is a number from `low` to `high`, stored through the one pointer that is not NULL; whole for the
- * first two. */
+/* An option whose value is a number from `low` to `high`, stored through the one pointer that is not NULL; whole for
+ * the first two. */
 struct number_flag {
     const char *name;
     double low, high;
@@ -53,12 +33,12 @@ struct number_flag {
     float *real;
 };
 
-/* Stores the numbers of the flags that were given. False, with a message, where a value is no such number. */
-bool arguments_numbers(const struct arguments *a, const struct number_flag *flags, size_t count);
+/* Stores the numbers of the options that were given. False, with a message, where a value is no such number. */
+bool arguments_numbers(const struct options *o, const struct number_flag *flags, size_t count);
 
-/* How a command that takes word_count words begins: reads argv, then the numbers. -1: go on; else what the command
- * returns: EXIT_USAGE, after a message, COMMAND_HELP or COMMAND_MISUSED. */
-int arguments_begin(struct arguments *a, int argc, char **argv, const struct flag *flags,
+/* How a command that takes word_count words begins: reads argv, then the numbers. -1: go on; *o is the caller's
+ * (options_release). Else what the command returns: EXIT_USAGE, after a message, COMMAND_HELP or COMMAND_MISUSED. */
+int arguments_begin(struct options *o, int argc, char **argv, const struct command_option *table,
                     const struct number_flag *numbers, size_t number_count, size_t word_count);
 
 #endif

@@ -98,14 +98,6 @@ const struct server_command *commands_find(const char *name) {
     return NULL;
 }
 
-static void print_flags(const struct flag *flags, FILE *out) {
-    for (; flags && flags->name; flags++) {
-        char *left = mem_printf("%s%s%s", flags->name, flags->value ? " " : "", flags->value ? flags->value : "");
-        fprintf(out, "  %-22s %s\n", left, flags->help);
-        mem_free(left);
-    }
-}
-
 static void print_commands_and_options(FILE *out) {
     size_t count;
     const struct config_option *options = config_table(&count);
@@ -127,7 +119,7 @@ void commands_help(const struct server_command *command, FILE *out) {
         fprintf(out, "\n%s", command->details);
     if (command->flags)
         fputs("\n", out);
-    print_flags(command->flags, out);
+    options_print(command->flags, NULL, out);
     if (is_daemon)
         print_commands_and_options(out);
     if (*command->example)

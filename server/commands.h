@@ -13,7 +13,7 @@ struct server_command {
     const char *summary;   /* one line */
     const char *details;   /* for the manual; "" if the summary says all */
     const char *example;
-    const struct flag *flags; /* NULL: it reads its words by itself */
+    const struct command_option *flags; /* NULL: it reads its words by itself */
     /* argv[0] is the command's name. An exit status, COMMAND_HELP or COMMAND_MISUSED. */
     int (*run)(int argc, char **argv);
 };
@@ -29,6 +29,6 @@ int manual_command(int argc, char **argv);
 
 /* main.c */
 int daemon_command(int argc, char **argv);
-extern const struct flag daemon_flags[];
+extern const struct command_option daemon_flags[];
 
 #endif

@@ -18,13 +18,13 @@
 #define DEFAULT "default" /* where an option is from that was not set */
 
 #define TEXT(name, value, help)                                                                                        \
-    { #name, OPTION_TEXT, "", 0, 0, value, help, offsetof(struct config, name) }
+    { #name, CONFIG_TEXT, "", 0, 0, value, help, offsetof(struct config, name) }
 #define INT(name, unit, low, high, value, help)                                                                        \
-    { #name, OPTION_INT, unit, low, high, value, help, offsetof(struct config, name) }
+    { #name, CONFIG_INT, unit, low, high, value, help, offsetof(struct config, name) }
 #define REAL(name, unit, low, high, value, help)                                                                       \
-    { #name, OPTION_REAL, unit, low, high, value, help, offsetof(struct config, name) }
+    { #name, CONFIG_REAL, unit, low, high, value, help, offsetof(struct config, name) }
 #define BOOL(name, value, help)                                                                                        \
-    { #name, OPTION_BOOL, "", 0, 1, value, help, offsetof(struct config, name) }
+    { #name, CONFIG_BOOL, "", 0, 1, value, help, offsetof(struct config, name) }
 
 static const struct config_option table[] = {
     TEXT(data_dir, "/var/lib/unbaked",
@@ -146,7 +146,7 @@ static double read_number(const char *text) {
 static void set_number(struct config *c, const struct config_option *option, const char *value, const char *where,
                        struct buf *problems) {
     double number = read_number(value);
-    bool is_whole = option->type == OPTION_INT;
+    bool is_whole = option->type == CONFIG_INT;
     if (!(number >= option->minimum && number <= option->maximum) || (is_whole && number != floor(number)))
         buf_printf(problems, "%s: %s must be a %snumber from %.15g to %.15g%s%s, not \"%s\"\n", where, option->name,
                    is_whole ? "whole " : "", option->minimum, option->maximum, *option->unit ? " " : "", option->unit,
@@ -178,9 +178,9 @@ void config_set(struct config *c, const char *name, const char *value, const cha
     char **origin = &c->where[option - table];
     mem_free(*origin);
     *origin = mem_strdup(where);
-    if (option->type == OPTION_BOOL) {
+    if (option->type == CONFIG_BOOL) {
         set_bool(c, option, value, where, problems);
-    } else if (option->type != OPTION_TEXT) {
+    } else if (option->type != CONFIG_TEXT) {
         set_number(c, option, value, where, problems);
     } else {
         char **text = member(c, option);
@@ -203,7 +203,7 @@ void config_init(struct config *c) {
 void config_release(struct config *c) {
     for (size_t i = 0; i < TABLE_COUNT; i++) {
         mem_free(c->where[i]);
-        if (table[i].type == OPTION_TEXT)
+        if (table[i].type == CONFIG_TEXT)
             mem_free(*(char **)member(c, &table[i]));
     }
 }

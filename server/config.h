@@ -12,7 +12,7 @@
 #include "common/buf.h"
 #include "common/error.h"
 
-enum option_type { OPTION_TEXT, OPTION_INT, OPTION_REAL, OPTION_BOOL };
+enum option_type { CONFIG_TEXT, CONFIG_INT, CONFIG_REAL, CONFIG_BOOL };
 
 struct config_option {
     const char *name;

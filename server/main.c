@@ -43,13 +43,13 @@ static void print_version(void) {
         printf("%s %s\n", list[i].name, list[i].version);
 }
 
-const struct flag daemon_flags[] = {
+const struct command_option daemon_flags[] = {
     INVOCATION_FLAGS,
-    {"--listen", "ADDRESS:PORT", "the same as --set listen=ADDRESS:PORT; port 0 takes a free one"},
-    {"--port-file", "FILE", "write the port to FILE once connections are accepted"},
-    {"--check-config", NULL, "say what is wrong with the configuration, and do no more"},
-    {"--version", NULL, "versions of the daemon and of its libraries"},
-    {"--help", NULL, "print this help"},
+    {"listen", 0, OPTION_TEXT, "ADDRESS:PORT", "the same as --set listen=ADDRESS:PORT; port 0 takes a free one"},
+    {"port-file", 0, OPTION_TEXT, "FILE", "write the port to FILE once connections are accepted"},
+    {"check-config", 0, OPTION_FLAG, NULL, "say what is wrong with the configuration, and do no more"},
+    {"version", 0, OPTION_FLAG, NULL, "versions of the daemon and of its libraries"},
+    {"help", 0, OPTION_FLAG, NULL, "print this help"},
     {0},
 };
 
@@ -295,22 +295,22 @@ int daemon_command(int argc, char **argv) {
     struct invocation in;
     int code = invocation_read(&in, argc, argv, daemon_flags, NULL);
     if (code < 0 && in.arguments.word_count > 0) {
-        if (commands_find(in.arguments.words[0]))
-            fprintf(stderr, "unbaked: the command comes before its options: unbaked %s ...\n", in.arguments.words[0]);
+        if (commands_find(in.arguments.word[0]))
+            fprintf(stderr, "unbaked: the command comes before its options: unbaked %s ...\n", in.arguments.word[0]);
         else
             fprintf(stderr, "unbaked: unknown command \"%s\"; unbaked --help lists the commands\n",
-                    in.arguments.words[0]);
+                    in.arguments.word[0]);
         code = EXIT_USAGE;
-    } else if (code < 0 && invocation_has(&in, "--help")) {
+    } else if (code < 0 && invocation_has(&in, "help")) {
         code = COMMAND_HELP;
-    } else if (code < 0 && invocation_has(&in, "--version")) {
+    } else if (code < 0 && invocation_has(&in, "version")) {
         print_version();
         code = EXIT_SUCCESS;
-    } else if (code < 0 && invocation_has(&in, "--check-config")) {
+    } else if (code < 0 && invocation_has(&in, "check-config")) {
         code = EXIT_SUCCESS;
     }
     if (code < 0)
-        code = run_daemon(&in.config, invocation_value(&in, "--port-file", NULL));
+        code = run_daemon(&in.config, invocation_value(&in, "port-file", NULL));
     invocation_release(&in);
     return code;
 }

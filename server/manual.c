@@ -7,11 +7,6 @@
 #include "common/protocol.h"
 #include "server/commands.h"
 
-static void flag_list(const struct flag *flags) {
-    for (; flags && flags->name; flags++)
-        manual_item(stdout, flags->name, flags->value, flags->help);
-}
-
 static void page_8(void) {
     size_t count;
     const struct server_command *table = commands_table(&count);
@@ -25,13 +20,13 @@ static void page_8(void) {
                         "restarts. unbake(1) is its client.\n");
     manual_text(stdout, table[0].details);
     manual_section(stdout, "OPTIONS");
-    flag_list(table[0].flags);
+    manual_options(stdout, table[0].flags, NULL);
     manual_section(stdout, "COMMANDS");
     for (size_t i = 1; i < count; i++) {
         manual_subsection(stdout, table[i].name, table[i].arguments);
         manual_sentence(stdout, table[i].summary);
         manual_text(stdout, table[i].details);
-        flag_list(table[i].flags);
+        manual_options(stdout, table[i].flags, NULL);
         manual_example(stdout, table[i].example);
     }
     manual_section(stdout, "EXIT STATUS");
@@ -56,10 +51,10 @@ static void page_5(void) {
     manual_section(stdout, "OPTIONS");
     for (size_t i = 0; i < count; i++) {
         char range[160] = "", text[800];
-        if (table[i].type == OPTION_INT || table[i].type == OPTION_REAL)
+        if (table[i].type == CONFIG_INT || table[i].type == CONFIG_REAL)
             snprintf(range, sizeof range, " %.15g to %.15g%s%s.", table[i].minimum, table[i].maximum,
                      *table[i].unit ? " " : "", table[i].unit);
-        else if (table[i].type == OPTION_BOOL)
+        else if (table[i].type == CONFIG_BOOL)
             snprintf(range, sizeof range, " yes or no.");
         snprintf(text, sizeof text, "%s%s Default: %s", table[i].help, range,
                  *table[i].default_text ? table[i].default_text : "empty");
@@ -85,8 +80,7 @@ static void completion(bool zsh) {
     completion_begin(stdout, "unbaked", zsh);
     for (size_t i = count; i-- > 0;) { /* the daemon, whose pattern is *, comes last */
         completion_words(stdout, i > 0 ? table[i].name : "*");
-        for (const struct flag *f = table[i].flags; f && f->name; f++)
-            completion_word(stdout, f->name, "");
+        completion_options(stdout, table[i].flags);
         for (size_t k = 1; i == 0 && k < count; k++)
             completion_word(stdout, table[k].name, "");
         completion_words_end(stdout);

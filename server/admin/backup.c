@@ -28,8 +28,8 @@
 
 #define ROUNDS_MAX 5
 
-const struct flag backup_flags[] = {
-    {"--with-outputs", NULL, "the files of scenes and jobs too; FILE is a folder then"},
+const struct command_option backup_flags[] = {
+    {"with-outputs", 0, OPTION_FLAG, NULL, "the files of scenes and jobs too; FILE is a folder then"},
     INVOCATION_FLAGS,
     COMMAND_HELP_FLAG,
     {0},
@@ -341,11 +341,11 @@ int backup_command(int argc, char **argv) {
     bool is_damaged = false;
     int code = command_begin(CONFIG_FILE_DEFAULT, &in, argc, argv, backup_flags, 1, 1);
     if (code < 0) {
-        enum status status = check_new(in.arguments.words[0], &err);
-        if (status == STATUS_OK && invocation_has(&in, "--with-outputs"))
-            status = backup_all(in.config.data_dir, in.arguments.words[0], &is_damaged, &err);
+        enum status status = check_new(in.arguments.word[0], &err);
+        if (status == STATUS_OK && invocation_has(&in, "with-outputs"))
+            status = backup_all(in.config.data_dir, in.arguments.word[0], &is_damaged, &err);
         else if (status == STATUS_OK)
-            status = backup_database(in.config.data_dir, in.arguments.words[0], &err);
+            status = backup_database(in.config.data_dir, in.arguments.word[0], &err);
         code = status != STATUS_OK ? command_failed(&err) : is_damaged ? EXIT_FAILURE : EXIT_SUCCESS;
     }
     invocation_release(&in);

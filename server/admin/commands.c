@@ -17,17 +17,18 @@
 #include "common/mem.h"
 #include "server/admin/admin.h"
 
-const struct flag token_flags[] = {
-    {"--role", "ROLE", "of a new token: viewer, user (the default) or admin"},
-    {"--expires", "WHEN",
+const struct command_option token_flags[] = {
+    {"role", 0, OPTION_TEXT, "ROLE", "of a new token: viewer, user (the default) or admin"},
+    {"expires", 0, OPTION_TEXT, "WHEN",
      "of a new token: after 30d or 12h, or on a day such as 2027-01-31, at its end in UTC (never)"},
-    {"--json", NULL, "print JSON"},
+    {"json", 0, OPTION_FLAG, NULL, "print JSON"},
     INVOCATION_FLAGS,
     COMMAND_HELP_FLAG,
     {0},
 };
-const struct flag usage_flags[] = {{"--json", NULL, "print JSON"}, INVOCATION_FLAGS, COMMAND_HELP_FLAG, {0}};
-const struct flag check_config_flags[] = {INVOCATION_FLAGS, COMMAND_HELP_FLAG, {0}};
+const struct command_option usage_flags[] = {
+    {"json", 0, OPTION_FLAG, NULL, "print JSON"}, INVOCATION_FLAGS, COMMAND_HELP_FLAG, {0}};
+const struct command_option check_config_flags[] = {INVOCATION_FLAGS, COMMAND_HELP_FLAG, {0}};
 
 int command_failed(const struct error *err) {
     fprintf(stderr, "unbaked: %s\n", err->message);
@@ -36,10 +37,10 @@ int command_failed(const struct error *err) {
     return err->status == STATUS_INPUT ? EXIT_USAGE : EXIT_FAILURE;
 }
 
-int command_begin(const char *file, struct invocation *in, int argc, char **argv, const struct flag *flags,
+int command_begin(const char *file, struct invocation *in, int argc, char **argv, const struct command_option *flags,
                   size_t words_min, size_t words_max) {
     int code = invocation_read(in, argc, argv, flags, file);
-    if (code < 0 && invocation_has(in, "--help"))
+    if (code < 0 && invocation_has(in, "help"))
         return COMMAND_HELP;
     if (code < 0 && (in->arguments.word_count < words_min || in->arguments.word_count > words_max))
         return COMMAND_MISUSED;
@@ -56,7 +57,7 @@ static int ask(int code, struct invocation *in, cJSON *request, void print(const
     int fd;
     if (code < 0 && admin_call(in->config.data_dir, request, &reply, &fd, &err) != STATUS_OK) {
         code = command_failed(&err);
-    } else if (code < 0 && invocation_has(in, "--json")) {
+    } else if (code < 0 && invocation_has(in, "json")) {
         char *text = json_text(reply);
         printf("%s\n", text);
         mem_free(text);
@@ -129,7 +130,7 @@ int token_command(int argc, char **argv) {
     struct invocation in;
     cJSON *request = cJSON_CreateObject();
     int code = command_begin(CONFIG_FILE_DEFAULT, &in, argc, argv, token_flags, 1, 2);
-    const char *action = code < 0 ? in.arguments.words[0] : "";
+    const char *action = code < 0 ? in.arguments.word[0] : "";
     bool is_add = strcmp(action, "add") == 0, is_revoke = strcmp(action, "revoke") == 0;
     if (code < 0 && !is_add && !is_revoke && strcmp(action, "list") != 0) {
         fprintf(stderr, "unbaked: unknown command \"token %.80s\"; known: add, list, revoke\n", action);
@@ -141,7 +142,7 @@ int token_command(int argc, char **argv) {
                             : "no more words");
         code = EXIT_USAGE;
     }
-    const char *expires = code < 0 ? invocation_value(&in, "--expires", NULL) : NULL;
+    const char *expires = code < 0 ? invocation_value(&in, "expires", NULL) : NULL;
     int64_t expires_ms = 0;
     if (expires && !is_add) {
         fputs("unbaked: --expires belongs to token add\n", stderr);
@@ -155,10 +156,10 @@ int token_command(int argc, char **argv) {
         json_add_string(request, "command", command);
         mem_free(command);
         if (is_add)
-            json_add_string(request, "name", in.arguments.words[1]);
+            json_add_string(request, "name", in.arguments.word[1]);
         if (is_revoke)
-            json_add_string(request, "which", in.arguments.words[1]);
-        json_add_string(request, "role", invocation_value(&in, "--role", "user"));
+            json_add_string(request, "which", in.arguments.word[1]);
+        json_add_string(request, "role", invocation_value(&in, "role", "user"));
         json_add_int(request, "expires_ms", expires_ms);
     }
     return ask(code, &in, request, print_token_reply, action);
@@ -217,7 +218,7 @@ int check_config_command(int argc, char **argv) {
         code = command_begin(CONFIG_FILE_DEFAULT, &in, argc, argv, check_config_flags, 0, 1);
     }
     buf_init(&problems, (size_t)1 << 20);
-    if (code < 0 && has_file && config_read(&in.config, in.arguments.words[0], &problems, &err) != STATUS_OK)
+    if (code < 0 && has_file && config_read(&in.config, in.arguments.word[0], &problems, &err) != STATUS_OK)
         buf_printf(&problems, "%s\n", err.message);
     if (code < 0 && has_file)
         config_check(&in.config, &problems);

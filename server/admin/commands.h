@@ -4,7 +4,7 @@
 
 #include "server/invocation.h"
 
-extern const struct flag token_flags[], usage_flags[], backup_flags[], restore_flags[], check_config_flags[],
+extern const struct command_option token_flags[], usage_flags[], backup_flags[], restore_flags[], check_config_flags[],
     doctor_flags[];
 
 int token_command(int argc, char **argv);
@@ -15,7 +15,7 @@ int check_config_command(int argc, char **argv);
 int doctor_command(int argc, char **argv); /* doctor.c */
 
 /* Reads options and configuration. -1: go on; else the command's exit status. `file` as for invocation_read. */
-int command_begin(const char *file, struct invocation *in, int argc, char **argv, const struct flag *flags,
+int command_begin(const char *file, struct invocation *in, int argc, char **argv, const struct command_option *flags,
                   size_t words_min, size_t words_max);
 /* Prints the error to stderr; returns the exit status. */
 int command_failed(const struct error *err);

@@ -31,7 +31,7 @@
 #include "server/net/tls.h"
 #include "server/worker/sandbox.h"
 
-const struct flag doctor_flags[] = {INVOCATION_FLAGS, {"--help", NULL, "print this help"}, {0}};
+const struct command_option doctor_flags[] = {INVOCATION_FLAGS, {"help", 0, OPTION_FLAG, NULL, "print this help"}, {0}};
 
 enum doctor_verdict { GOOD, WARN, BAD };
 
@@ -293,7 +293,7 @@ int doctor_command(int argc, char **argv) {
     char address[CONFIG_ADDRESS_SIZE];
     uint16_t port;
     int code = invocation_read(&in, argc, argv, doctor_flags, CONFIG_FILE_DEFAULT);
-    if (code < 0 && (invocation_has(&in, "--help") || in.arguments.word_count > 0))
+    if (code < 0 && (invocation_has(&in, "help") || in.arguments.word_count > 0))
         code = in.arguments.word_count > 0 ? COMMAND_MISUSED : COMMAND_HELP;
     if (code < 0) {
         struct doctor doctor = {.config = &in.config}, *d = &doctor;

@@ -19,8 +19,8 @@
 
 #define SUMS_MAX_BYTES ((size_t)1 << 30)
 
-const struct flag restore_flags[] = {
-    {"--skip-damaged", NULL, "leave out files that are missing or damaged; ends with 1 then"},
+const struct command_option restore_flags[] = {
+    {"skip-damaged", 0, OPTION_FLAG, NULL, "leave out files that are missing or damaged; ends with 1 then"},
     COMMAND_HELP_FLAG,
     {0},
 };
@@ -193,9 +193,9 @@ int restore_command(int argc, char **argv) {
     struct error err;
     int code = command_begin(NULL, &in, argc, argv, restore_flags, 2, 2);
     if (code < 0) {
-        struct restoring r = {.backup = in.arguments.words[0],
-                              .data = in.arguments.words[1],
-                              .skips = invocation_has(&in, "--skip-damaged"),
+        struct restoring r = {.backup = in.arguments.word[0],
+                              .data = in.arguments.word[1],
+                              .skips = invocation_has(&in, "skip-damaged"),
                               .copy = {.from = -1, .to = -1}};
         enum status status = restore(&r, &contents, &err);
         if (status == STATUS_OK)

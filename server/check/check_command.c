@@ -15,27 +15,27 @@
 #include "server/ingest/facts.h"
 #include "server/ingest/pixels.h"
 
-const struct flag check_flags[] = {
-    {"--scene-set", "KEY=VALUE",
+const struct command_option check_flags[] = {
+    {"scene-set", 0, OPTION_TEXT, "KEY=VALUE",
      "how the bundle is to be read: transforms, mesh, axes, mesh_axes, scale, shift, coordinates, lens, distortion, "
      "exposures"},
-    {"--set", "NAME=VALUE", "a setting of the job that memory and time are estimated for"},
-    {"--pictures", "DIR", "draw the mesh's edges over photographs, a plan, and exposures there"},
-    {"--json", NULL, "print the facts as JSON"},
-    {"--threads", "N", "0: one per processor (0)"},
+    {"set", 0, OPTION_TEXT, "NAME=VALUE", "a setting of the job that memory and time are estimated for"},
+    {"pictures", 0, OPTION_TEXT, "DIR", "draw the mesh's edges over photographs, a plan, and exposures there"},
+    {"json", 0, OPTION_FLAG, NULL, "print the facts as JSON"},
+    {"threads", 0, OPTION_TEXT, "N", "0: one per processor (0)"},
     COMMAND_HELP_FLAG,
     {0},
 };
 
 /* The values of a flag that may be given several times, as an object; the caller's. */
-static enum status collect(const struct arguments *a, const char *flag,
+static enum status collect(const struct options *a, const char *flag,
                            enum status (*parse)(const char *, cJSON *, struct error *), cJSON **object,
                            struct error *err) {
     enum status status = STATUS_OK;
     *object = cJSON_CreateObject();
     for (size_t i = 0; i < a->given_count && status == STATUS_OK; i++)
-        if (strcmp(a->given[i].flag->name, flag) == 0)
-            status = parse(a->given[i].value, *object, err);
+        if (strcmp(a->given[i].option->name, flag) == 0)
+            status = parse(a->given[i].text, *object, err);
     return status;
 }
 
@@ -85,10 +85,9 @@ static void print_json(const cJSON *json) {
 }
 
 /* Everything that is known of the room; the caller's. */
-static enum status find_facts(const struct arguments *a, const struct scene_check *room,
-                              const struct settings *settings, struct parallel *pool, cJSON **facts,
-                              struct error *err) {
-    const char *dir = arguments_value(a, "--pictures", NULL);
+static enum status find_facts(const struct options *a, const struct scene_check *room, const struct settings *settings,
+                              struct parallel *pool, cJSON **facts, struct error *err) {
+    const char *dir = options_text(a, "pictures", NULL);
     double begin = clock_sec();
     *facts = facts_of(&room->scene);
     scene_check_facts(room, *facts);
@@ -103,15 +102,15 @@ static enum status find_facts(const struct arguments *a, const struct scene_chec
 }
 
 /* Checks the room and prints what was found. */
-static enum status check(const struct arguments *a, const struct reading *reading, const struct settings *settings,
+static enum status check(const struct options *a, const struct reading *reading, const struct settings *settings,
                          struct parallel *pool, bool *fits, struct error *err) {
     struct bundle_limits limits = bundle_default_limits();
     struct spill *pixels = pixels_new_temporary();
     struct scene_check room;
     cJSON *problems = cJSON_CreateArray(), *facts = NULL;
-    bool as_json = arguments_have(a, "--json");
+    bool as_json = options_flag(a, "json");
     pixels_use(pixels, &limits);
-    enum status status = scene_check(&room, a->words[0], reading, &limits, pool, problems, NULL, NULL, err);
+    enum status status = scene_check(&room, a->word[0], reading, &limits, pool, problems, NULL, NULL, err);
     *fits = status == STATUS_OK && room.fit.verdict != FIT_NO;
     if (status == STATUS_OK) {
         status = find_facts(a, &room, settings, pool, &facts, err);
@@ -135,8 +134,8 @@ static enum status check(const struct arguments *a, const struct reading *readin
 
 int check_command(int argc, char **argv) {
     uint32_t threads = 0;
-    const struct number_flag numbers[] = {{"--threads", 0, 1024, .count = &threads}};
-    struct arguments a;
+    const struct number_flag numbers[] = {{"threads", 0, 1024, .count = &threads}};
+    struct options a;
     struct error err;
     struct reading reading = reading_default();
     struct settings settings;
@@ -145,9 +144,9 @@ int check_command(int argc, char **argv) {
     int code = arguments_begin(&a, argc, argv, check_flags, numbers, sizeof numbers / sizeof *numbers, 1);
     if (code >= 0)
         return code;
-    enum status status = collect(&a, "--scene-set", reading_parse_assignment, &given, &err);
+    enum status status = collect(&a, "scene-set", reading_parse_assignment, &given, &err);
     if (status == STATUS_OK)
-        status = collect(&a, "--set", settings_parse_assignment, &wanted, &err);
+        status = collect(&a, "set", settings_parse_assignment, &wanted, &err);
     if (status == STATUS_OK)
         status = reading_parse(given, &reading, &err);
     settings_init(&settings);
@@ -165,5 +164,6 @@ int check_command(int argc, char **argv) {
     cJSON_Delete(given);
     cJSON_Delete(wanted);
     settings_release(&settings);
+    options_release(&a);
     return is_usage ? EXIT_USAGE : status == STATUS_OK && fits ? EXIT_SUCCESS : EXIT_FAILURE;
 }

@@ -4,7 +4,7 @@
 
 #include "server/arguments.h"
 
-extern const struct flag check_flags[];
+extern const struct command_option check_flags[];
 int check_command(int argc, char **argv);
 
 #endif

@@ -4,7 +4,7 @@
 
 #include "server/arguments.h"
 
-extern const struct flag demo_flags[];
+extern const struct command_option demo_flags[];
 
 /* Returns an exit status, COMMAND_HELP or COMMAND_MISUSED; argv[0] is the command's name. */
 int demo_command(int argc, char **argv);

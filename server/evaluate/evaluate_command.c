@@ -8,14 +8,14 @@
 #include "common/mem.h"
 #include "server/evaluate/evaluate.h"
 
-const struct flag evaluate_flags[] = {
-    {"--spp", "N",
+const struct command_option evaluate_flags[] = {
+    {"spp", 0, OPTION_TEXT, "N",
      "paths per pixel of the re-rendered views, up to four times where noise asks for it; 0: none, no MSRE (64)"},
-    {"--samples", "N", "first hits per pixel of the parameters (16)"},
-    {"--max-depth", "N", "segments of a path (16)"},
-    {"--pictures", "DIR", "write side-by-sides there: truth | recovered, photograph | re-render"},
-    {"--json", NULL, "print a JSON object instead of a table"},
-    {"--threads", "N", "0: one per processor (0)"},
+    {"samples", 0, OPTION_TEXT, "N", "first hits per pixel of the parameters (16)"},
+    {"max-depth", 0, OPTION_TEXT, "N", "segments of a path (16)"},
+    {"pictures", 0, OPTION_TEXT, "DIR", "write side-by-sides there: truth | recovered, photograph | re-render"},
+    {"json", 0, OPTION_FLAG, NULL, "print a JSON object instead of a table"},
+    {"threads", 0, OPTION_TEXT, "N", "0: one per processor (0)"},
     COMMAND_HELP_FLAG,
     {0},
 };
@@ -59,26 +59,28 @@ int evaluate_command(int argc, char **argv) {
     struct evaluate_settings s = evaluate_default_settings();
     uint32_t threads = 0;
     const struct number_flag numbers[] = {
-        {"--spp", 0, 1 << 20, .count = &s.spp},
-        {"--samples", 16, 4096, .count = &s.samples},
-        {"--max-depth", 2, 32, .count = &s.max_depth},
-        {"--threads", 0, 1024, .count = &threads},
+        {"spp", 0, 1 << 20, .count = &s.spp},
+        {"samples", 16, 4096, .count = &s.samples},
+        {"max-depth", 2, 32, .count = &s.max_depth},
+        {"threads", 0, 1024, .count = &threads},
     };
     struct evaluation evaluation;
-    struct arguments a;
+    struct options a;
     struct error err;
     int code = arguments_begin(&a, argc, argv, evaluate_flags, numbers, sizeof numbers / sizeof *numbers, 2);
     if (code >= 0)
         return code;
-    s.pictures_dir = arguments_value(&a, "--pictures", s.pictures_dir);
+    s.pictures_dir = options_text(&a, "pictures", s.pictures_dir);
     struct parallel *pool = parallel_new((int)threads);
-    enum status status = evaluate_outputs(a.words[0], a.words[1], &s, pool, &evaluation, &err);
+    enum status status = evaluate_outputs(a.word[0], a.word[1], &s, pool, &evaluation, &err);
     parallel_free(pool);
+    bool as_json = options_flag(&a, "json");
+    options_release(&a);
     if (status != STATUS_OK) {
         fprintf(stderr, "unbaked evaluate: %s\n", err.message);
         return EXIT_FAILURE;
     }
-    if (arguments_have(&a, "--json")) {
+    if (as_json) {
         cJSON *root = evaluate_to_json(&evaluation);
         char *text = json_text(root);
         puts(text);

@@ -4,7 +4,7 @@
 
 #include "server/arguments.h"
 
-extern const struct flag evaluate_flags[];
+extern const struct command_option evaluate_flags[];
 
 /* Returns an exit status, COMMAND_HELP or COMMAND_MISUSED; argv[0] is the command's name. */
 int evaluate_command(int argc, char **argv);

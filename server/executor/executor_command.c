@@ -13,10 +13,10 @@
 
 #define WAIT_SEC 600 /* as the flag's line says */
 
-const struct flag executor_flags[] = {
-    {"--wait", "SEC", "how long a test waits for its job to begin (600)"},
-    {"--url", "URL", "of probe: the daemon that this machine should reach"},
-    {"--ca", "FILE", "of probe: certificates to trust instead of the system's"},
+const struct command_option executor_flags[] = {
+    {"wait", 0, OPTION_TEXT, "SEC", "how long a test waits for its job to begin (600)"},
+    {"url", 0, OPTION_TEXT, "URL", "of probe: the daemon that this machine should reach"},
+    {"ca", 0, OPTION_TEXT, "FILE", "of probe: certificates to trust instead of the system's"},
     INVOCATION_FLAGS,
     COMMAND_HELP_FLAG,
     {0},
@@ -69,22 +69,22 @@ int executor_command(int argc, char **argv) {
     struct invocation in;
     struct error err;
     int code = invocation_read(&in, argc, argv, executor_flags, CONFIG_FILE_DEFAULT);
-    const struct arguments *a = &in.arguments;
-    const char *word = code < 0 && a->word_count > 0 ? a->words[0] : "";
+    const struct options *a = &in.arguments;
+    const char *word = code < 0 && a->word_count > 0 ? a->word[0] : "";
     uint32_t wait_sec = WAIT_SEC;
-    const struct number_flag numbers[] = {{"--wait", 0, 86400, .count = &wait_sec}};
-    if (code < 0 && invocation_has(&in, "--help"))
+    const struct number_flag numbers[] = {{"wait", 0, 86400, .count = &wait_sec}};
+    if (code < 0 && invocation_has(&in, "help"))
         code = COMMAND_HELP;
     else if (code < 0 && !arguments_numbers(a, numbers, 1))
         code = EXIT_USAGE;
     else if (code < 0 && strcmp(word, "list") == 0 && a->word_count == 1)
         code = list(&in.config);
     else if (code < 0 && strcmp(word, "test") == 0 && a->word_count == 2)
-        code = test(&in.config, a->words[1], wait_sec);
+        code = test(&in.config, a->word[1], wait_sec);
     else if (code < 0 && strcmp(word, "probe") == 0 && a->word_count <= 2) {
-        const struct node_probe probe = {.file = a->word_count == 2 ? a->words[1] : NULL,
-                                         .url = invocation_value(&in, "--url", NULL),
-                                         .ca = invocation_value(&in, "--ca", NULL)};
+        const struct node_probe probe = {.file = a->word_count == 2 ? a->word[1] : NULL,
+                                         .url = invocation_value(&in, "url", NULL),
+                                         .ca = invocation_value(&in, "ca", NULL)};
         code = probe_run(&probe, &err) == STATUS_OK ? EXIT_SUCCESS : EXIT_FAILURE;
         if (code != EXIT_SUCCESS)
             fprintf(stderr, "unbaked: %s\n", err.message);

@@ -4,7 +4,7 @@
 
 #include "server/invocation.h"
 
-extern const struct flag executor_flags[];
+extern const struct command_option executor_flags[];
 int executor_command(int argc, char **argv);
 
 #endif

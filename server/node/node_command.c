@@ -24,15 +24,16 @@
 #define CACHE_GB_DEFAULT 50 /* some hundred rooms */
 #define WORDS_MAX_BYTES 400 /* of the last that the worker printed, as at home */
 
-const struct flag node_flags[] = {
-    {"--job", "N", "the job's number"},
-    {"--attempt", "N", "the attempt's number"},
-    {"--token-file", "FILE", "the attempt's token; else the variable " TOKEN_VARIABLE},
-    {"--ca", "FILE", "certificates to trust instead of the system's"},
-    {"--cache", "DIR", "keeps scenes for later attempts; may be shared by machines (/var/tmp/unbake-scenes-UID)"},
-    {"--cache-gb", "N", "how much of them; 0: no bound (50)"},
-    {"--work", "DIR", "where the attempt works, on a disk of this machine ($TMPDIR, else /tmp)"},
-    {"--threads", "N", "0: as many as the daemon says (0)"},
+const struct command_option node_flags[] = {
+    {"job", 0, OPTION_TEXT, "N", "the job's number"},
+    {"attempt", 0, OPTION_TEXT, "N", "the attempt's number"},
+    {"token-file", 0, OPTION_TEXT, "FILE", "the attempt's token; else the variable " TOKEN_VARIABLE},
+    {"ca", 0, OPTION_TEXT, "FILE", "certificates to trust instead of the system's"},
+    {"cache", 0, OPTION_TEXT, "DIR",
+     "keeps scenes for later attempts; may be shared by machines (/var/tmp/unbake-scenes-UID)"},
+    {"cache-gb", 0, OPTION_TEXT, "N", "how much of them; 0: no bound (50)"},
+    {"work", 0, OPTION_TEXT, "DIR", "where the attempt works, on a disk of this machine ($TMPDIR, else /tmp)"},
+    {"threads", 0, OPTION_TEXT, "N", "0: as many as the daemon says (0)"},
     COMMAND_HELP_FLAG,
     {0},
 };
@@ -77,28 +78,31 @@ static const char *default_work(void) {
 static int read_arguments(struct node *n, int argc, char **argv) {
     uint64_t cache_gb = CACHE_GB_DEFAULT;
     const struct number_flag numbers[] = {
-        {"--job", 1, 0x1p53, .large = &n->job_id},
-        {"--attempt", 1, INT_MAX, .count = &n->number},
-        {"--cache-gb", 0, 1 << 20, .large = &cache_gb},
-        {"--threads", 0, 1024, .count = &n->threads},
+        {"job", 1, 0x1p53, .large = &n->job_id},
+        {"attempt", 1, INT_MAX, .count = &n->number},
+        {"cache-gb", 0, 1 << 20, .large = &cache_gb},
+        {"threads", 0, 1024, .count = &n->threads},
     };
-    struct arguments a;
+    struct options a;
     struct error err;
     int code = arguments_begin(&a, argc, argv, node_flags, numbers, sizeof numbers / sizeof *numbers, 1);
     if (code >= 0)
         return code;
     if (n->job_id == 0 || n->number == 0) {
         fprintf(stderr, "unbaked: --job and --attempt must be given\n");
+        options_release(&a);
         return EXIT_USAGE;
     }
     char *cache = mem_printf("/var/tmp/unbake-scenes-%u", (unsigned)geteuid());
-    n->url = a.words[0];
-    n->ca = arguments_value(&a, "--ca", NULL);
-    n->cache = mem_strdup(arguments_value(&a, "--cache", cache));
-    n->work = mem_strdup(arguments_value(&a, "--work", default_work()));
+    n->url = a.word[0];
+    n->ca = options_text(&a, "ca", NULL);
+    n->cache = mem_strdup(options_text(&a, "cache", cache));
+    n->work = mem_strdup(options_text(&a, "work", default_work()));
     n->cache_bytes = cache_gb * 1000000000u;
     mem_free(cache);
-    if (read_token(n, arguments_value(&a, "--token-file", NULL), &err) == STATUS_OK)
+    enum status status = read_token(n, options_text(&a, "token-file", NULL), &err);
+    options_release(&a);
+    if (status == STATUS_OK)
         return -1;
     fprintf(stderr, "unbaked: %s\n", err.message);
     return EXIT_USAGE;

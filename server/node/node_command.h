@@ -4,7 +4,7 @@
 
 #include "server/arguments.h"
 
-extern const struct flag node_flags[];
+extern const struct command_option node_flags[];
 int node_command(int argc, char **argv);
 
 #endif

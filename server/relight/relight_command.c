@@ -12,22 +12,26 @@
 #include "server/relight/denoise.h"
 #include "server/relight/relight.h"
 
-const struct flag relight_flags[] = {
-    {"--out", "FILE|DIR", "one picture (.png, or .exr for linear radiance), or a folder for all files (relit.png)"},
-    {"--set", "NAME=VALUE", "a setting; --settings lists them; may be given many times"},
-    {"--settings", NULL, "print what can be set"},
-    {"--view", "WHICH", "--set view=WHICH: numbers of cameras from 0, names of their pictures, or all (0)"},
-    {"--cameras", "WHICH", "--set cameras=WHICH: held_out, photographs, or a transforms.json with w and h (held_out)"},
-    {"--lights", "on|off", "--set lights=on|off: whether the room's emitters shine (on)"},
-    {"--environment", "WHICH", "--set environment=WHICH: found, none, sky, or a latitude-longitude map (found)"},
-    {"--environment-scale", "F", "--set environment_scale=F: factor on its radiance (1)"},
-    {"--turn", "DEG", "--set environment_turn=DEG: turns the map around the upward axis (0)"},
-    {"--up", "AXIS", "--set up=AXIS: auto, x, y or z, the room's axis that is up (auto)"},
-    {"--exposure", "F", "--set exposure=F: factor on radiance in a PNG; 0: chosen by the picture (0)"},
-    {"--spp", "N", "--set spp=N: paths per pixel (64)"},
-    {"--max-depth", "N", "--set max_depth=N: segments of a path (16)"},
-    {"--threads", "N", "0: one per processor (0)"},
-    {"--quiet", NULL, "no progress"},
+const struct command_option relight_flags[] = {
+    {"out", 0, OPTION_TEXT, "FILE|DIR",
+     "one picture (.png, or .exr for linear radiance), or a folder for all files (relit.png)"},
+    {"set", 0, OPTION_TEXT, "NAME=VALUE", "a setting; --settings lists them; may be given many times"},
+    {"settings", 0, OPTION_FLAG, NULL, "print what can be set"},
+    {"view", 0, OPTION_TEXT, "WHICH",
+     "--set view=WHICH: numbers of cameras from 0, names of their pictures, or all (0)"},
+    {"cameras", 0, OPTION_TEXT, "WHICH",
+     "--set cameras=WHICH: held_out, photographs, or a transforms.json with w and h (held_out)"},
+    {"lights", 0, OPTION_TEXT, "on|off", "--set lights=on|off: whether the room's emitters shine (on)"},
+    {"environment", 0, OPTION_TEXT, "WHICH",
+     "--set environment=WHICH: found, none, sky, or a latitude-longitude map (found)"},
+    {"environment-scale", 0, OPTION_TEXT, "F", "--set environment_scale=F: factor on its radiance (1)"},
+    {"turn", 0, OPTION_TEXT, "DEG", "--set environment_turn=DEG: turns the map around the upward axis (0)"},
+    {"up", 0, OPTION_TEXT, "AXIS", "--set up=AXIS: auto, x, y or z, the room's axis that is up (auto)"},
+    {"exposure", 0, OPTION_TEXT, "F", "--set exposure=F: factor on radiance in a PNG; 0: chosen by the picture (0)"},
+    {"spp", 0, OPTION_TEXT, "N", "--set spp=N: paths per pixel (64)"},
+    {"max-depth", 0, OPTION_TEXT, "N", "--set max_depth=N: segments of a path (16)"},
+    {"threads", 0, OPTION_TEXT, "N", "0: one per processor (0)"},
+    {"quiet", 0, OPTION_FLAG, NULL, "no progress"},
     COMMAND_HELP_FLAG,
     {0},
 };
@@ -36,16 +40,16 @@ const struct flag relight_flags[] = {
 static const struct {
     const char *flag, *setting;
 } shorthands[] = {
-    {"--view", "view"},
-    {"--cameras", "cameras"},
-    {"--lights", "lights"},
-    {"--environment", "environment"},
-    {"--environment-scale", "environment_scale"},
-    {"--turn", "environment_turn"},
-    {"--up", "up"},
-    {"--exposure", "exposure"},
-    {"--spp", "spp"},
-    {"--max-depth", "max_depth"},
+    {"view", "view"},
+    {"cameras", "cameras"},
+    {"lights", "lights"},
+    {"environment", "environment"},
+    {"environment-scale", "environment_scale"},
+    {"turn", "environment_turn"},
+    {"up", "up"},
+    {"exposure", "exposure"},
+    {"spp", "spp"},
+    {"max-depth", "max_depth"},
 };
 
 static bool has_ending(const char *name, const char *ending) {
@@ -62,18 +66,18 @@ static void print_settings(void) {
 
 /* --- settings of the command line ------------------------------------------------------------------------------- */
 
-static enum status add_settings(const struct arguments *a, cJSON *settings, struct error *err) {
+static enum status add_settings(const struct options *a, cJSON *settings, struct error *err) {
     enum status status = STATUS_OK;
     for (size_t i = 0; i < sizeof shorthands / sizeof *shorthands && status == STATUS_OK; i++) {
-        const char *value = arguments_value(a, shorthands[i].flag, NULL);
+        const char *value = options_text(a, shorthands[i].flag, NULL);
         char *text = value ? mem_printf("%s=%s", shorthands[i].setting, value) : NULL;
         if (text)
             status = render_settings_parse_assignment(text, settings, err);
         mem_free(text);
     }
     for (size_t i = 0; i < a->given_count && status == STATUS_OK; i++)
-        if (strcmp(a->given[i].flag->name, "--set") == 0)
-            status = render_settings_parse_assignment(a->given[i].value, settings, err);
+        if (strcmp(a->given[i].option->name, "set") == 0)
+            status = render_settings_parse_assignment(a->given[i].text, settings, err);
     return status;
 }
 
@@ -164,8 +168,8 @@ static int finish(enum status status, const struct error *err) {
 
 int relight_command(int argc, char **argv) {
     uint32_t threads = 0;
-    const struct number_flag numbers[] = {{"--threads", 0, 1024, .count = &threads}};
-    struct arguments a;
+    const struct number_flag numbers[] = {{"threads", 0, 1024, .count = &threads}};
+    struct options a;
     struct error err = {0};
     if (argc == 2 && strcmp(argv[1], "--settings") == 0) {
         print_settings();
@@ -174,15 +178,15 @@ int relight_command(int argc, char **argv) {
     int code = arguments_begin(&a, argc, argv, relight_flags, numbers, sizeof numbers / sizeof *numbers, 1);
     if (code >= 0)
         return code;
-    const char *out = arguments_value(&a, "--out", "relit.png");
-    bool is_file = has_ending(out, ".png") || has_ending(out, ".exr"), is_quiet = arguments_have(&a, "--quiet");
+    const char *out = options_text(&a, "out", "relit.png");
+    bool is_file = has_ending(out, ".png") || has_ending(out, ".exr"), is_quiet = options_flag(&a, "quiet");
     cJSON *settings = cJSON_CreateObject();
     enum status status = add_settings(&a, settings, &err);
     if (status != STATUS_OK)
         fprintf(stderr, "unbaked: %s\n", err.message);
     code = EXIT_USAGE;
     if (status == STATUS_OK && settings_are_good(settings) && (!is_file || add_format(out, settings))) {
-        struct relight_job job = {.outputs = a.words[0], .settings = settings, .out = out};
+        struct relight_job job = {.outputs = a.word[0], .settings = settings, .out = out};
         if (!is_file)
             status = file_make_dirs(out, &err);
         if (status == STATUS_OK)
@@ -190,5 +194,6 @@ int relight_command(int argc, char **argv) {
         code = finish(status, &err);
     }
     cJSON_Delete(settings);
+    options_release(&a);
     return code;
 }

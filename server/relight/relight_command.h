@@ -4,7 +4,7 @@
 
 #include "server/arguments.h"
 
-extern const struct flag relight_flags[];
+extern const struct command_option relight_flags[];
 
 /* Returns an exit status, COMMAND_HELP or COMMAND_MISUSED; argv[0] is the command's name. */
 int relight_command(int argc, char **argv);

@@ -28,10 +28,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     config_check(&c, &problems);
     for (size_t i = 0; i < count; i++) {
         const char *member = (const char *)&c + table[i].offset;
-        if (table[i].type == OPTION_INT)
+        if (table[i].type == CONFIG_INT)
             MUST((double)*(const int64_t *)(const void *)member >= table[i].minimum &&
                  (double)*(const int64_t *)(const void *)member <= table[i].maximum);
-        else if (table[i].type == OPTION_REAL)
+        else if (table[i].type == CONFIG_REAL)
             MUST(*(const double *)(const void *)member >= table[i].minimum &&
                  *(const double *)(const void *)member <= table[i].maximum);
     }

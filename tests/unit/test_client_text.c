@@ -75,12 +75,12 @@ static void test_sse(void) {
 
 /* --- options.c, nearest.c ------------------------------------------------------------------ */
 
-static const struct client_option own[] = {
+static const struct command_option own[] = {
     {"watch", 'w', OPTION_FLAG, NULL, ""},      {"name", 'n', OPTION_TEXT, "NAME", ""},
     {"set", 's', OPTION_LIST, "KEY=VALUE", ""}, {"priority", 'p', OPTION_WHOLE, "N", ""},
     {"retry", 0, OPTION_SECONDS, "SEC", ""},    {0},
 };
-static const struct client_option shared[] = {{"json", 0, OPTION_FLAG, NULL, ""}, {0}};
+static const struct command_option shared[] = {{"json", 0, OPTION_FLAG, NULL, ""}, {0}};
 
 static enum status parse(struct options *o, struct error *err, int count, const char *const *words) {
     char *argv[16];
@@ -158,12 +158,12 @@ static void test_commands(void) {
         CHECK(c->run && *c->summary && c->words_min <= c->words_max);
         CHECK((c->words_max > 0) == (*c->arguments != '\0'));
         CHECK(command_find(c->name) == c);
-        for (const struct client_option *a = c->options; a->name; a++) {
+        for (const struct command_option *a = c->options; a->name; a++) {
             CHECK((a->kind == OPTION_FLAG) == (a->value == NULL));
-            for (const struct client_option *b = command_shared_options; b->name; b++)
+            for (const struct command_option *b = command_shared_options; b->name; b++)
                 CHECK_THAT(strcmp(a->name, b->name) != 0 && (!a->letter || a->letter != b->letter),
                            "%s: --%s is given twice", c->name, a->name);
-            for (const struct client_option *b = a + 1; b->name; b++)
+            for (const struct command_option *b = a + 1; b->name; b++)
                 CHECK_THAT(strcmp(a->name, b->name) != 0 && (!a->letter || a->letter != b->letter),
                            "%s: --%s is given twice", c->name, a->name);
         }

@@ -74,14 +74,14 @@ static void check_documented(void) {
             const struct config_option *o = &table[next < count ? next : 0];
             snprintf(wanted, sizeof wanted, "%s =%s%s", o->name, *o->default_text ? " " : "", o->default_text);
             CHECK_STRING(line, wanted);
-            if (o->type == OPTION_INT || o->type == OPTION_REAL) {
+            if (o->type == CONFIG_INT || o->type == CONFIG_REAL) {
                 snprintf(value, sizeof value, "(%s, %.15g to %.15g", o->unit, o->minimum, o->maximum);
                 /* The comment may break the range over two lines. */
                 char *high = strrchr(value, ' ');
                 CHECK_THAT(strstr(comment, high + 1), "%s: its comment has no \"%s\"", o->name, high + 1);
                 *high = '\0';
                 CHECK_THAT(strstr(comment, value), "%s: its comment has no \"%s\"", o->name, value);
-            } else if (o->type == OPTION_BOOL) {
+            } else if (o->type == CONFIG_BOOL) {
                 CHECK_THAT(strstr(comment, "yes or no"), "%s: its comment has no \"yes or no\"", o->name);
             }
             next++;
@@ -235,7 +235,7 @@ static void check_files(void) {
 
 /* The file that commands read where they are told of none: it need not be there, but must be good. */
 static void check_default_file(void) {
-    static const struct flag flags[] = {INVOCATION_FLAGS, {0}};
+    static const struct command_option flags[] = {INVOCATION_FLAGS, {0}};
     char *good = write_file("threads = 3\n"), *bad = write_file("threads = many\n");
     const struct {
         const char *file, *option;

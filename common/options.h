@@ -1,11 +1,12 @@
-/* options.h -- parses a command line by a table of options. Options and other words may come in any order; `--name
+/* options.h -- parses a command line by a table of options, and prints the table for --help. Options and other words may come in any order; `--name
  * value`, `--name=value`, `-o value` and `-ovalue` are the same; `--` ends the options. Texts are borrowed from
  * argv. */
-#ifndef UNBAKE_CLIENT_OPTIONS_H
-#define UNBAKE_CLIENT_OPTIONS_H
+#ifndef UNBAKE_COMMON_OPTIONS_H
+#define UNBAKE_COMMON_OPTIONS_H
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdio.h>
 
 #include "common/error.h"
 
@@ -17,16 +18,16 @@ enum option_kind {
     OPTION_SECONDS /* a number of seconds (or of another unit, by the help), 0 or more */
 };
 
-struct client_option {
+struct command_option {
     const char *name; /* without the dashes; NULL ends a table */
     char letter;      /* 0: no short form */
     enum option_kind kind;
     const char *value; /* what the help calls the value: "DIR"; NULL for a flag */
-    const char *help;  /* NULL: that of the render setting of this name */
+    const char *help;  /* NULL: the program has it elsewhere (options_print) */
 };
 
 struct options_given {
-    const struct client_option *option;
+    const struct command_option *option;
     const char *text; /* NULL for a flag */
 };
 
@@ -39,11 +40,14 @@ struct options {
 
 /* Parses argv[count] by two tables (the command's own, and the shared one). On a mismatch STATUS_INPUT, with the
  * nearest valid name as hint. */
-enum status options_parse(struct options *o, int count, char *const *argv, const struct client_option *own,
-                          const struct client_option *shared, struct error *err);
+enum status options_parse(struct options *o, int count, char *const *argv, const struct command_option *own,
+                          const struct command_option *shared, struct error *err);
 void options_release(struct options *o);
+/* A table for --help, a line each. `help_of`: of those without a help of their own; may be NULL where all have one. */
+typedef const char *option_help(const struct command_option *option);
+void options_print(const struct command_option *table, option_help *help_of, FILE *out);
 /* Number of words that the option beginning with `word` takes; 0 if it is not in the table. */
-int options_length(const char *word, const struct client_option *table);
+int options_length(const char *word, const struct command_option *table);
 
 bool options_flag(const struct options *o, const char *name);
 /* The last value given, or `fallback`. */

@@ -1,5 +1,5 @@
 /* options.c -- see options.h. */
-#include "client/options.h"
+#include "common/options.h"
 
 #include <errno.h>
 #include <math.h>
@@ -9,26 +9,26 @@
 #include "common/mem.h"
 #include "common/nearest.h"
 
-static const struct client_option *find(const struct client_option *table, const char *name, size_t length) {
+static const struct command_option *find(const struct command_option *table, const char *name, size_t length) {
     for (; table && table->name; table++)
         if (strlen(table->name) == length && memcmp(table->name, name, length) == 0)
             return table;
     return NULL;
 }
 
-static const struct client_option *find_letter(const struct client_option *table, char letter) {
+static const struct command_option *find_letter(const struct command_option *table, char letter) {
     for (; table && table->name; table++)
         if (table->letter == letter)
             return table;
     return NULL;
 }
 
-static void offer(struct nearest *nearest, const struct client_option *table) {
+static void offer(struct nearest *nearest, const struct command_option *table) {
     for (; table && table->name; table++)
         nearest_offer(nearest, table->name);
 }
 
-static enum status unknown(const char *argument, const struct client_option *own, const struct client_option *shared,
+static enum status unknown(const char *argument, const struct command_option *own, const struct command_option *shared,
                            struct error *err) {
     if (argument[1] != '-')
         return error_set(err, STATUS_INPUT, "unknown option -%c", argument[1]);
@@ -44,7 +44,7 @@ static enum status unknown(const char *argument, const struct client_option *own
     return status;
 }
 
-static enum status check_value(const struct client_option *option, const char *text, struct error *err) {
+static enum status check_value(const struct command_option *option, const char *text, struct error *err) {
     char *end;
     if (option->kind == OPTION_WHOLE) {
         long value = strtol(text, &end, 10);
@@ -60,9 +60,9 @@ static enum status check_value(const struct client_option *option, const char *t
 }
 
 /* The option that `argument` begins with; *text is a value in the same word, if any. */
-static const struct client_option *read_option(const char *argument, const struct client_option *own,
-                                               const struct client_option *shared, const char **text) {
-    const struct client_option *option;
+static const struct command_option *read_option(const char *argument, const struct command_option *own,
+                                                const struct command_option *shared, const char **text) {
+    const struct command_option *option;
     *text = NULL;
     if (argument[1] == '-') {
         size_t length = strcspn(argument + 2, "=");
@@ -77,14 +77,14 @@ static const struct client_option *read_option(const char *argument, const struc
     return option ? option : find_letter(shared, argument[1]);
 }
 
-int options_length(const char *word, const struct client_option *table) {
+int options_length(const char *word, const struct command_option *table) {
     const char *text;
-    const struct client_option *option = word[0] == '-' && word[1] ? read_option(word, NULL, table, &text) : NULL;
+    const struct command_option *option = word[0] == '-' && word[1] ? read_option(word, NULL, table, &text) : NULL;
     return !option ? 0 : option->kind == OPTION_FLAG || text ? 1 : 2;
 }
 
-enum status options_parse(struct options *o, int count, char *const *argv, const struct client_option *own,
-                          const struct client_option *shared, struct error *err) {
+enum status options_parse(struct options *o, int count, char *const *argv, const struct command_option *own,
+                          const struct command_option *shared, struct error *err) {
     size_t room = count > 0 ? (size_t)count : 1;
     *o = (struct options){
         .given = mem_calloc(room, sizeof *o->given),
@@ -102,7 +102,7 @@ enum status options_parse(struct options *o, int count, char *const *argv, const
             continue;
         }
         const char *text;
-        const struct client_option *option = read_option(argument, own, shared, &text);
+        const struct command_option *option = read_option(argument, own, shared, &text);
         if (!option)
             return unknown(argument, own, shared, err);
         if (option->kind == OPTION_FLAG && text)
@@ -149,4 +149,20 @@ long options_whole(const struct options *o, const char *name, long fallback) {
 double options_seconds(const struct options *o, const char *name, double fallback) {
     const struct options_given *given = last(o, name);
     return given ? strtod(given->text, NULL) : fallback;
+}
+
+/* The name and its value; the short forms have a column of their own where any option has one. */
+void options_print(const struct command_option *table, option_help *help_of, FILE *out) {
+    bool any_letter = false;
+    for (const struct command_option *o = table; o && o->name; o++)
+        any_letter = any_letter || o->letter;
+    for (const struct command_option *o = table; o && o->name; o++) {
+        char letter[5] = "    ";
+        if (o->letter)
+            snprintf(letter, sizeof letter, "-%c, ", o->letter);
+        char *left =
+            mem_printf("%s--%s%s%s", any_letter ? letter : "", o->name, o->value ? " " : "", o->value ? o->value : "");
+        fprintf(out, "  %-22s %s\n", left, o->help ? o->help : help_of(o));
+        mem_free(left);
+    }
 }
