@@ -13,9 +13,7 @@
 #include "server/data/layout.h"
 #include "server/data/picture_record.h"
 
-/* The numbers of the attempts that have folders, ascending; *numbers is the caller's. */
-static enum status list_attempts(const char *data_dir, int64_t job_id, int **numbers, size_t *count,
-                                 struct error *err) {
+enum status attempt_folder_list(const char *data_dir, int64_t job_id, int **numbers, size_t *count, struct error *err) {
     char *dir = layout_job(data_dir, job_id);
     enum status status = file_list_numbered(dir, layout_attempt_number, numbers, count, err);
     if (status == STATUS_NOT_FOUND) /* a job that has not begun */
@@ -36,8 +34,7 @@ bool attempt_folder_is_checkpoint_name(const char *name) {
     return layout_part_number(name) > 0 || layout_is_checkpoint(name);
 }
 
-/* Whether the attempt's folder holds a checkpoint. */
-static enum status look_for_checkpoint(const char *dir, bool *exists, struct error *err) {
+enum status attempt_folder_has_checkpoint(const char *dir, bool *exists, struct error *err) {
     char *folder = layout_checkpoint_folder(dir), **names = NULL;
     size_t count = 0;
     enum status status = file_list(folder, &names, &count, err);
@@ -64,7 +61,7 @@ static enum status take_over(const char *data_dir, int64_t job_id, int number, c
     int *others;
     size_t count;
     bool exists = false;
-    enum status status = list_attempts(data_dir, job_id, &others, &count, err);
+    enum status status = attempt_folder_list(data_dir, job_id, &others, &count, err);
     for (size_t i = count; i-- > 0 && status == STATUS_OK && !exists;) {
         char *dir = layout_attempt(data_dir, job_id, others[i]), *from = layout_checkpoint_folder(dir);
         if (others[i] != number)
@@ -108,10 +105,10 @@ enum status attempt_folder_with_checkpoint(const char *data_dir, int64_t job_id,
     size_t count;
     bool exists = false;
     *work_dir = NULL;
-    enum status status = list_attempts(data_dir, job_id, &numbers, &count, err);
+    enum status status = attempt_folder_list(data_dir, job_id, &numbers, &count, err);
     for (size_t i = count; i-- > 0 && status == STATUS_OK && !exists;) {
         char *dir = layout_attempt(data_dir, job_id, numbers[i]);
-        status = look_for_checkpoint(dir, &exists, err);
+        status = attempt_folder_has_checkpoint(dir, &exists, err);
         if (exists)
             *work_dir = layout_attempt(NULL, job_id, numbers[i]);
         mem_free(dir);
@@ -123,7 +120,7 @@ enum status attempt_folder_with_checkpoint(const char *data_dir, int64_t job_id,
 enum status attempt_folder_drop_checkpoint(const char *data_dir, int64_t job_id, struct error *err) {
     int *numbers;
     size_t count;
-    enum status status = list_attempts(data_dir, job_id, &numbers, &count, err);
+    enum status status = attempt_folder_list(data_dir, job_id, &numbers, &count, err);
     for (size_t i = 0; i < count; i++) {
         /* The journal first: it must never meet another database. */
         char *dir = layout_attempt(data_dir, job_id, numbers[i]);
@@ -208,7 +205,7 @@ enum status attempt_folder_carry_outputs(const char *data_dir, int64_t job_id, i
     int *numbers;
     size_t count;
     char *dir = layout_attempt(data_dir, job_id, number), *to = layout_out(dir);
-    enum status status = list_attempts(data_dir, job_id, &numbers, &count, err);
+    enum status status = attempt_folder_list(data_dir, job_id, &numbers, &count, err);
     for (size_t i = count; i-- > 0 && status == STATUS_OK;) { /* newest first: an older file of a name is left out */
         char *other = layout_attempt(data_dir, job_id, numbers[i]), *from = layout_out(other);
         if (numbers[i] != number)
@@ -236,103 +233,9 @@ enum status attempt_folder_pictures_done(const char *data_dir, int64_t job_id, c
     int *numbers;
     size_t number_count;
     *done = 0;
-    enum status status = list_attempts(data_dir, job_id, &numbers, &number_count, err);
+    enum status status = attempt_folder_list(data_dir, job_id, &numbers, &number_count, err);
     if (status == STATUS_OK)
         status = picture_record_done(data_dir, job_id, numbers, number_count, digest, first, count, done, err);
-    mem_free(numbers);
-    return status;
-}
-
-/* --- what no row names ----------------------------------------------------------------------- */
-
-struct tidying {
-    const struct output_row *rows; /* [count], by name */
-    size_t count;
-    int number;     /* of the attempt */
-    bool has_files; /* something of it stays */
-};
-
-static bool is_named(const struct tidying *t, const char *name) {
-    size_t low = 0, high = t->count;
-    while (low < high) {
-        size_t middle = low + (high - low) / 2;
-        int order = strcmp(name, t->rows[middle].name);
-        if (order == 0)
-            return t->rows[middle].attempt == t->number;
-        low = order > 0 ? middle + 1 : low;
-        high = order < 0 ? middle : high;
-    }
-    return false;
-}
-
-/* `name` is that of the folder as outputs have it; "": out/ itself. Symbolic links are files here. */
-static enum status tidy_folder(struct tidying *t, const char *path, const char *name, struct error *err) {
-    char **names = NULL;
-    size_t count = 0;
-    enum status status = file_list(path, &names, &count, err);
-    if (status == STATUS_NOT_FOUND)
-        status = STATUS_OK;
-    for (size_t i = 0; status == STATUS_OK && i < count; i++) {
-        struct stat info;
-        char *inner = file_join(path, names[i]), *output = *name ? file_join(name, names[i]) : mem_strdup(names[i]);
-        if (lstat(inner, &info) != 0)
-            status = error_set_errno(err, errno, "cannot look at %s", inner);
-        else if (S_ISDIR(info.st_mode)) {
-            status = tidy_folder(t, inner, output, err);
-            if (status == STATUS_OK && rmdir(inner) != 0 && errno != ENOTEMPTY && errno != EEXIST)
-                status = error_set_errno(err, errno, "cannot remove %s", inner);
-        } else if (is_named(t, output) || is_record(output))
-            t->has_files = true;
-        else
-            status = file_remove_tree(inner, err);
-        mem_free(output);
-        mem_free(inner);
-    }
-    file_free_names(names, count);
-    return status;
-}
-
-/* Whether the attempt still writes. */
-static enum status is_running(struct store *store, int64_t job_id, int number, int ended, bool *runs,
-                              struct error *err) {
-    struct attempt_row row;
-    enum status status = store_attempt_get(store, &(struct attempt_key){job_id, number}, &row, err);
-    *runs = status == STATUS_OK && row.phase == ATTEMPT_ROW_RUNNING && number != ended;
-    return status == STATUS_NOT_FOUND ? STATUS_OK : status;
-}
-
-static enum status tidy_attempt(struct tidying *t, const char *dir, struct error *err) {
-    char *out = layout_out(dir);
-    bool has_checkpoint = false;
-    enum status status = tidy_folder(t, out, "", err);
-    if (status == STATUS_OK)
-        status = look_for_checkpoint(dir, &has_checkpoint, err);
-    if (status == STATUS_OK && !t->has_files && !has_checkpoint)
-        status = file_remove_tree(dir, err);
-    mem_free(out);
-    return status;
-}
-
-enum status attempt_folder_tidy(const char *data_dir, struct store *store, int64_t job_id, int ended,
-                                struct error *err) {
-    struct output_row *rows = NULL;
-    size_t row_count = 0, count = 0;
-    int *numbers = NULL;
-    enum status status = store_output_list(store, job_id, &rows, &row_count, err);
-    if (status == STATUS_OK)
-        status = list_attempts(data_dir, job_id, &numbers, &count, err);
-    for (size_t i = 0; status == STATUS_OK && i < count; i++) {
-        struct tidying t = {.rows = rows, .count = row_count, .number = numbers[i]};
-        char *dir = layout_attempt(data_dir, job_id, numbers[i]);
-        bool runs = false;
-        status = is_running(store, job_id, numbers[i], ended, &runs, err);
-        if (status == STATUS_OK && !runs)
-            status = tidy_attempt(&t, dir, err);
-        mem_free(dir);
-    }
-    for (size_t i = 0; i < row_count; i++)
-        output_row_release(&rows[i]);
-    mem_free(rows);
     mem_free(numbers);
     return status;
 }

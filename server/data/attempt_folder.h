@@ -19,6 +19,11 @@
 #include "common/error.h"
 #include "server/store/store.h"
 
+/* The numbers of the attempts that have folders, ascending; *numbers is the caller's (mem_free). */
+enum status attempt_folder_list(const char *data_dir, int64_t job_id, int **numbers, size_t *count, struct error *err);
+/* Whether the attempt's folder `work_dir` holds a checkpoint. */
+enum status attempt_folder_has_checkpoint(const char *work_dir, bool *exists, struct error *err);
+
 /* Makes the attempt's folder with all that it begins with, durably. No other attempt of the job may run. */
 enum status attempt_folder_begin(const char *data_dir, int64_t job_id, int number, struct error *err);
 /* The same for one of a part of a job that is split (store/parts.h): others may run, and it takes nothing of theirs. */
@@ -47,11 +52,6 @@ bool attempt_folder_is_checkpoint_name(const char *name);
 /* How many of the `count` pictures from `first` on earlier attempts have done one after another (picture_record.h). */
 enum status attempt_folder_pictures_done(const char *data_dir, int64_t job_id, const char *digest, int64_t first,
                                          int64_t count, int64_t *done, struct error *err);
-
-/* Removes what attempts of the job have left that no row names; of those that run, by the store, nothing: but for
- * `ended` (0: none), whose end is still to be entered. */
-enum status attempt_folder_tidy(const char *data_dir, struct store *store, int64_t job_id, int ended,
-                                struct error *err);
 
 /* At start: gives attempts of a version before 17 of state.db, whose files lay in their job's folder, folders of their
  * own. One that is interrupted goes on at the next start. */

@@ -20,7 +20,6 @@
 
 #define ROULETTE_DEPTH 5
 #define DISPLAY_MEDIAN 0.2 /* of the median radiance in pictures, white is 1; as reconstruct/report.c has it */
-#define OBJECTS_LIMIT ((size_t)1 << 26) /* bytes of objects.json */
 
 /* State shared by all views. */
 struct evaluator {
@@ -38,59 +37,6 @@ struct evaluator {
 
 struct evaluate_settings evaluate_default_settings(void) {
     return (struct evaluate_settings){.samples = 16, .spp = 64, .max_depth = 16, .seed = 7};
-}
-
-/* --- the truth by object ------------------------------------------------------------------ */
-
-/* Areas of one object in the recovered room. */
-struct object {
-    double area, emitting_area;
-};
-
-/* Areas of the object's triangles, all and emitting ones; sets e->emits of its triangles to `emits`. */
-static struct object measure_object(struct evaluator *e, int64_t id, bool emits) {
-    const struct mesh *mesh = &e->scene.mesh;
-    struct object object = {0.0, 0.0};
-    for (size_t t = 0; t < mesh->triangle_count; t++) {
-        if (mesh->object_id[t] != id)
-            continue;
-        double area = 0.5 * (double)vec3_length(mesh_cross(mesh, t));
-        uint32_t segment = e->recovered.segments.of_triangle[t];
-        object.area += area;
-        if (!rgb_is_black(e->recovered.materials.emission[segment]))
-            object.emitting_area += area;
-        e->emits[t] = emits;
-    }
-    return object;
-}
-
-static enum status score_objects(struct evaluator *e, struct evaluation *v, struct error *err) {
-    char *path = file_join(e->room, "truth/objects.json");
-    cJSON *list = NULL;
-    enum status status = json_read(path, OBJECTS_LIMIT, &list, err);
-    if (status == STATUS_OK && !cJSON_IsArray(list))
-        status = error_set(err, STATUS_INPUT, "%s: not a list of objects", path);
-    if (status == STATUS_OK && !e->scene.mesh.object_id)
-        status = error_set(err, STATUS_INPUT, "%s: the mesh has no object_id", e->room);
-    for (const cJSON *o = list ? list->child : NULL; o && status == STATUS_OK; o = o->next) {
-        const cJSON *emission = cJSON_GetObjectItemCaseSensitive(o, "emission");
-        double id;
-        bool emits = false;
-        for (const cJSON *c = emission ? emission->child : NULL; c; c = c->next)
-            emits = emits || c->valuedouble > 0.0;
-        status = json_number(o, "id", "truth/objects.json", -1.0, &id, err);
-        struct object found = measure_object(e, (int64_t)id, emits);
-        if (found.area == 0.0)
-            continue; /* all triangles of the object are degenerate */
-        bool mostly = found.emitting_area > 0.5 * found.area;
-        v->emitters += emits;
-        v->emitters_found += emits && mostly;
-        v->emitters_missed += emits && !mostly;
-        v->emitters_false += !emits && found.emitting_area > 0.0;
-    }
-    cJSON_Delete(list);
-    mem_free(path);
-    return status;
 }
 
 /* --- photographs -------------------------------------------------------------------------- */
@@ -362,7 +308,7 @@ enum status evaluate_outputs(const char *room, const char *outputs, const struct
     if (status == STATUS_OK)
         status = load_deviation(&e, outputs, err);
     if (status == STATUS_OK)
-        status = score_objects(&e, v, err);
+        status = found_emitters_count(room, &e.scene.mesh, &e.recovered, e.emits, &v->emitters, err);
     if (status == STATUS_OK) {
         seen_init(&e.seen, &e.scene, e.recovered.world.accel, e.emits, pool);
         status = score_views(&e, v, err);
@@ -397,10 +343,10 @@ cJSON *evaluate_to_json(const struct evaluation *v) {
     json_add_number(root, "specular_rms_error", sqrt(score_mean(s->specular)));
     json_add_number(root, "emission_iou", score_emission_iou(s));
     json_add_number(root, "emission_log_error", score_mean(s->emission_log));
-    json_add_int(root, "emitters", (int64_t)v->emitters);
-    json_add_int(root, "emitters_found", (int64_t)v->emitters_found);
-    json_add_int(root, "emitters_missed", (int64_t)v->emitters_missed);
-    json_add_int(root, "emitters_false", (int64_t)v->emitters_false);
+    json_add_int(root, "emitters", (int64_t)v->emitters.count);
+    json_add_int(root, "emitters_found", (int64_t)v->emitters.found);
+    json_add_int(root, "emitters_missed", (int64_t)v->emitters.missed);
+    json_add_int(root, "emitters_false", (int64_t)v->emitters.unfounded);
     json_add_number(root, "msre", v->msre);
     json_add_number(root, "msre_deviation", v->msre_deviation);
     json_add_number(root, "msre_noise_left", v->msre_noise_left);

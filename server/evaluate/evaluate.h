@@ -14,6 +14,7 @@
 #include "common/error.h"
 #include "common/json.h"
 #include "common/parallel.h"
+#include "server/evaluate/found_emitters.h"
 #include "server/evaluate/smooth_areas.h"
 #include "server/evaluate/noise_floor.h"
 #include "server/evaluate/score.h"
@@ -38,7 +39,7 @@ struct evaluation {
     size_t view_count;
     /* By object of the truth. An emitter is found if more than half of its area emits; a non-emitting object any part
      * of which emits is a false emitter. */
-    size_t emitters, emitters_found, emitters_missed, emitters_false;
+    struct found_emitters emitters;
     double msre, msre_deviation; /* mean over views and standard deviation; NaN without re-renders */
     double msre_noise_left;      /* standard error of the mean by the re-renders' noise */
     struct smooth_areas smooth;  /* needs re-renders */

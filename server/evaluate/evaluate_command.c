@@ -38,8 +38,8 @@ static void print_table(const struct evaluation *v) {
     printf("  %-22s %6.2f dB   (off by %.3f)\n", "roughness", score_psnr_db(s->roughness),
            sqrt(score_mean(s->roughness)));
     printf("  %-22s %6.2f dB   (off by %.3f)\n", "specular", score_psnr_db(s->specular), sqrt(score_mean(s->specular)));
-    printf("  %-22s %zu of %zu found, %zu missed, %zu false\n", "emitters", v->emitters_found, v->emitters,
-           v->emitters_missed, v->emitters_false);
+    printf("  %-22s %zu of %zu found, %zu missed, %zu false\n", "emitters", v->emitters.found, v->emitters.count,
+           v->emitters.missed, v->emitters.unfounded);
     printf("  %-22s %6.3f of 1, log error %.2g\n", "emission, overlap", score_emission_iou(s),
            score_mean(s->emission_log));
     if (isfinite(v->msre))

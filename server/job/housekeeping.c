@@ -12,6 +12,7 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "server/data/attempt_folder.h"
+#include "server/data/attempt_tidy.h"
 #include "server/data/layout.h"
 #include "server/job/measure.h"
 #include "server/store/remote.h"
@@ -55,7 +56,7 @@ void housekeeping_drop_temporary(const char *dir) {
 
 void housekeeping_tidy_job(const char *data_dir, struct store *store, int64_t job_id, int ended) {
     struct error err;
-    if (attempt_folder_tidy(data_dir, store, job_id, ended, &err) != STATUS_OK)
+    if (attempt_tidy(data_dir, store, job_id, ended, &err) != STATUS_OK)
         log_warning("job %lld: what its attempts have left over stays: %s", (long long)job_id, err.message);
 }
 

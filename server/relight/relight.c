@@ -16,15 +16,14 @@
 #include "server/relight/environment.h"
 #include "server/relight/output.h"
 #include "server/relight/picture.h"
+#include "server/relight/relight_plan.h"
 #include "server/relight/relit.h"
 #include "server/relight/unit.h"
 #include "server/render/film.h"
 
 #define ROULETTE_DEPTH 5
-#define FIRST_HIT_SPP 16 /* jittered rays for each pixel of the other passes */
-#define UNTIL_SPP 65536  /* with noise or time_limit, where spp is not given */
-#define GUESSED_SPP 1024 /* of a picture that is rendered until its noise is small */
-#define METER_WIDTH 160  /* pixels of the picture that chooses the exposure */
+#define UNTIL_SPP 65536 /* with noise or time_limit, where spp is not given */
+#define METER_WIDTH 160 /* pixels of the picture that chooses the exposure */
 #define METER_SPP 16
 #define PREVIEW_INTERVAL_SEC 1.0
 #define PICTURE_SEED UINT64_C(0x9e3779b97f4a7c15) /* between the seeds of two pictures */
@@ -203,7 +202,7 @@ static enum status render_picture(struct relight_state *r, struct error *err) {
     cJSON *files = cJSON_CreateArray();
     enum status status = STATUS_OK;
     if (r->has_first || is_denoised)
-        film_render_first_hits(&r->room.world, camera, FIRST_HIT_SPP, r->path.seed, r->pool, &first);
+        film_render_first_hits(&r->room.world, camera, RELIGHT_FIRST_HIT_SPP, r->path.seed, r->pool, &first);
     if (r->needs_light)
         status = picture_render(&r->room.world, camera, &path, &r->goal, r->has_direct, look, r, r->pool, &light,
                                 &quality, err);
@@ -226,15 +225,6 @@ static enum status render_picture(struct relight_state *r, struct error *err) {
 
 /* --- all -------------------------------------------------------------------------------------------------------- */
 
-static bool needs_light(const cJSON *settings) {
-    size_t count;
-    const struct render_pass *pass = passes_table(&count);
-    for (size_t i = 0; i < count; i++)
-        if (pass[i].is_light && render_settings_lists(settings, "passes", pass[i].name))
-            return true;
-    return false;
-}
-
 static void read_settings(struct relight_state *r) {
     const cJSON *s = r->job->settings;
     double noise = render_settings_number(s, "noise"), seconds = render_settings_number(s, "time_limit");
@@ -246,7 +236,7 @@ static void read_settings(struct relight_state *r) {
                                      .roulette_depth = ROULETTE_DEPTH,
                                      .seed = (uint64_t)render_settings_number(s, "seed")};
     r->suns = environment_suns(r->job);
-    r->needs_light = needs_light(s);
+    r->needs_light = relight_plan_needs_light(s);
     r->has_direct = wants(r, "direct") || wants(r, "indirect");
     for (size_t i = 0; i < count; i++)
         r->has_first = r->has_first || (!pass[i].is_light && wants(r, pass[i].name));
@@ -390,31 +380,5 @@ enum status relight_run(const struct relight_job *job, const struct relight_watc
         status = finish(&r, pictures, err);
     run_close(&r);
     cJSON_Delete(settings);
-    return status;
-}
-
-enum status relight_count(const struct relight_job *job, uint64_t *pictures, uint64_t *pixels, struct error *err) {
-    struct cameras views;
-    enum status status = cameras_read(job, (double[3]){0.0, 0.0, 0.0}, &views, err);
-    if (status != STATUS_OK)
-        return status;
-    *pictures = (uint64_t)views.count * environment_suns(job);
-    *pixels = 0;
-    for (size_t i = 0; i < views.count; i++)
-        *pixels += (uint64_t)views.view[i].camera.width * views.view[i].camera.height * environment_suns(job);
-    cameras_release(&views);
-    return STATUS_OK;
-}
-
-enum status relight_look(const struct relight_job *job, struct relight_plan *plan, struct error *err) {
-    const cJSON *s = job->settings;
-    uint64_t pixels = 0;
-    *plan = (struct relight_plan){0};
-    bool is_until = render_settings_number(s, "noise") > 0.0 || render_settings_number(s, "time_limit") > 0.0;
-    double spp = is_until && !render_settings_has(s, "spp") ? GUESSED_SPP : render_settings_number(s, "spp");
-    enum status status = relight_count(job, &plan->pictures, &pixels, err);
-    if (status == STATUS_OK)
-        output_digest(job, plan->digest);
-    plan->paths = (double)pixels * (needs_light(s) ? spp : FIRST_HIT_SPP);
     return status;
 }

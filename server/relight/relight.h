@@ -7,26 +7,12 @@
 #ifndef UNBAKE_RELIGHT_RELIGHT_H
 #define UNBAKE_RELIGHT_RELIGHT_H
 
-#include <stdint.h>
-
 #include "common/error.h"
 #include "common/parallel.h"
-#include "common/sha256.h"
 #include "server/relight/relight_job.h"
 
 /* STATUS_INPUT for settings that do not fit this room (a segment that is not there; nothing that shines). */
 enum status relight_run(const struct relight_job *job, const struct relight_watch *watch, struct parallel *pool,
                         struct error *err);
-
-/* How many pictures the settings mean, and how many pixels all of them have together: without reading the room. */
-enum status relight_count(const struct relight_job *job, uint64_t *pictures, uint64_t *pixels, struct error *err);
-
-/* What a render is, before it begins. */
-struct relight_plan {
-    uint64_t pictures;
-    double paths;                 /* pixels times samples, of all of them; a guess where noise or time limit them */
-    char digest[SHA256_HEX_SIZE]; /* with which views.jsonl records its pictures */
-};
-enum status relight_look(const struct relight_job *job, struct relight_plan *plan, struct error *err);
 
 #endif

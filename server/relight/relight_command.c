@@ -11,6 +11,7 @@
 #include "common/mem.h"
 #include "server/relight/denoise.h"
 #include "server/relight/relight.h"
+#include "server/relight/relight_plan.h"
 
 const struct command_option relight_flags[] = {
     {"out", 0, OPTION_TEXT, "FILE|DIR",
@@ -142,7 +143,7 @@ static enum status run_one(struct relight_job *job, const char *out, uint32_t th
     uint64_t pictures, pixels;
     char *folder = mem_printf("%s.part-%ld", out, (long)getpid());
     char *file = mem_printf("%s/00000_radiance%s", folder, strrchr(out, '.'));
-    enum status status = relight_count(job, &pictures, &pixels, err);
+    enum status status = relight_plan_count(job, &pictures, &pixels, err);
     if (status == STATUS_OK && pictures != 1)
         status = error_set(err, STATUS_INPUT, "the settings mean %llu pictures: give --out a folder for them",
                            (unsigned long long)pictures);

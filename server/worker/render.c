@@ -26,6 +26,7 @@
 #include "server/data/layout.h"
 #include "server/relight/denoise.h"
 #include "server/relight/relight.h"
+#include "server/relight/relight_plan.h"
 #include "server/store/parts.h"
 #include "server/worker/announce.h"
 #include "server/worker/requests.h"
@@ -175,7 +176,7 @@ static bool split(const struct render_run *run) {
     const struct relight_job job = job_of(run);
     struct relight_plan plan;
     /* what is wrong with its cameras, the render itself will say */
-    if (!run->order->may_split || relight_look(&job, &plan, NULL) != STATUS_OK)
+    if (!run->order->may_split || relight_plan_make(&job, &plan, NULL) != STATUS_OK)
         return false;
     int parts = plan.pictures > PICTURES_MAX ? 1 : count_parts(run->order, &plan);
     if (parts > 1)

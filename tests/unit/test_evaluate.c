@@ -193,8 +193,8 @@ static void test_known(const char *dir, struct parallel *pool) {
 
     export_room(outputs, &room);
     struct evaluation v = evaluate(dir, outputs, pool);
-    CHECK(v.view_count == 2 && v.emitters == 2 && v.emitters_found == 2);
-    CHECK(v.emitters_missed == 0 && v.emitters_false == 0);
+    CHECK(v.view_count == 2 && v.emitters.count == 2 && v.emitters.found == 2);
+    CHECK(v.emitters.missed == 0 && v.emitters.unfounded == 0);
     CHECK_THAT(score_psnr_db(v.score.base_color_all) > 35.0, "%g dB", /* samples differ */
                score_psnr_db(v.score.base_color_all));
     CHECK_THAT(score_psnr_db(v.score.roughness) > 50.0, "%g dB", score_psnr_db(v.score.roughness));
@@ -214,7 +214,7 @@ static void test_known(const char *dir, struct parallel *pool) {
     room.materials.emission[ROOM_FLOOR] = rgb_gray(0.5f);
     export_room(outputs, &room);
     struct evaluation w = evaluate(dir, outputs, pool);
-    CHECK(w.emitters_found == 1 && w.emitters_missed == 1 && w.emitters_false == 1);
+    CHECK(w.emitters.found == 1 && w.emitters.missed == 1 && w.emitters.unfounded == 1);
     /* A little more than 20: within a pixel, raised and lowered values partly cancel. */
     CHECK_NEAR(score_psnr_db(w.score.base_color_all), 20.5, 1.0);
     CHECK(score_emission_iou(&w.score) < 0.9);
