@@ -42,13 +42,13 @@ vec3 environment_direction(const struct environment *e, size_t column, size_t ro
 }
 
 void environment_update_figures(struct environment *e) {
-    size_t cells = (size_t)e->map.width * e->map.height, spread_count = 0;
+    size_t cells = environment_pixel_count(e), spread_count = 0;
     double all = 0.0, seen = 0.0, luminance = 0.0, seen_luminance = 0.0;
     float *spread = mem_array(cells, sizeof *spread);
     for (size_t i = 0; i < cells; i++) {
-        const float *p = e->map.pixel + 3 * i, *known = e->confidence.pixel + 2 * i;
+        const float *known = e->confidence.pixel + 2 * i;
         double angle = environment_cell_angle(e, i / e->map.width);
-        double light = angle * (double)rgb_luminance(rgb_make(p[0], p[1], p[2]));
+        double light = angle * (double)rgb_luminance(environment_pixel_radiance(e, i));
         all += angle;
         luminance += light;
         seen += known[0] > 0.0f ? angle : 0.0;
@@ -64,8 +64,8 @@ void environment_update_figures(struct environment *e) {
 }
 
 void environment_brighten(struct environment *e, const rgb factor[ENVIRONMENT_HALVES]) {
-    for (size_t i = 0; i < (size_t)e->map.width * e->map.height; i++) {
-        size_t half = environment_half(environment_direction(e, i % e->map.width, i / e->map.width));
+    for (size_t i = 0; i < environment_pixel_count(e); i++) {
+        size_t half = environment_half(environment_pixel_direction(e, i));
         for (size_t c = 0; c < 3 && e->is_bound[i]; c++)
             e->map.pixel[3 * i + c] *= (&factor[half].r)[c];
     }

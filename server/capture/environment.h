@@ -60,6 +60,22 @@ double environment_cell_angle(const struct environment *e, size_t row);
 /* Unit direction of the centre of a pixel of the map. */
 vec3 environment_direction(const struct environment *e, size_t column, size_t row);
 
+/* Of the map's pixels, by number row * width + column: how many there are, their directions, radiances, and whether a
+ * photograph shows them. */
+static inline size_t environment_pixel_count(const struct environment *e) {
+    return (size_t)e->map.width * e->map.height;
+}
+static inline vec3 environment_pixel_direction(const struct environment *e, size_t pixel) {
+    return environment_direction(e, pixel % e->map.width, pixel / e->map.width);
+}
+static inline rgb environment_pixel_radiance(const struct environment *e, size_t pixel) {
+    const float *p = e->map.pixel + 3 * pixel;
+    return rgb_make(p[0], p[1], p[2]);
+}
+static inline bool environment_pixel_is_seen(const struct environment *e, size_t pixel) {
+    return e->confidence.pixel[2 * pixel] > 0.0f;
+}
+
 /* The half of a unit direction. */
 static inline size_t environment_half(vec3 direction) { return direction.y < 0.0f; }
 

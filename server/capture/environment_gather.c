@@ -259,16 +259,13 @@ static void join_pole(struct environment *e, size_t row) {
 
 /* --- lower bounds ------------------------------------------------------------------------------- */
 
-static bool is_seen(const struct environment *e, size_t cell) { return e->confidence.pixel[2 * cell] > 0.0f; }
-
 /* Median of the channels' mean over measured directions; 0 where there is none. */
 static float median_measured(const struct environment *e) {
-    size_t cells = (size_t)e->map.width * e->map.height, count = 0;
+    size_t cells = environment_pixel_count(e), count = 0;
     float *measured = mem_array(cells, sizeof *measured);
     for (size_t i = 0; i < cells; i++) {
-        const float *p = e->map.pixel + 3 * i;
-        if (is_seen(e, i) && !e->is_bound[i])
-            measured[count++] = rgb_mean(rgb_make(p[0], p[1], p[2]));
+        if (environment_pixel_is_seen(e, i) && !e->is_bound[i])
+            measured[count++] = rgb_mean(environment_pixel_radiance(e, i));
     }
     float median = quantile(measured, count, 0.5);
     mem_free(measured);
@@ -279,9 +276,8 @@ static float median_measured(const struct environment *e) {
  * information: such directions count as unseen. With a single exposure no bound is below measured values. */
 static void drop_weak_bounds(struct environment *e) {
     float median = median_measured(e);
-    for (size_t i = 0; i < (size_t)e->map.width * e->map.height; i++) {
-        const float *p = e->map.pixel + 3 * i;
-        if (e->is_bound[i] && rgb_mean(rgb_make(p[0], p[1], p[2])) < median) {
+    for (size_t i = 0; i < environment_pixel_count(e); i++) {
+        if (e->is_bound[i] && rgb_mean(environment_pixel_radiance(e, i)) < median) {
             e->is_bound[i] = false;
             e->confidence.pixel[2 * i] = e->confidence.pixel[2 * i + 1] = 0.0f;
         }
@@ -291,8 +287,8 @@ static void drop_weak_bounds(struct environment *e) {
 /* Share of the seen solid angle with a lower bound only; negative where nothing is seen. */
 static double saturated_share(const struct environment *e) {
     double seen = 0.0, saturated = 0.0;
-    for (size_t i = 0; i < (size_t)e->map.width * e->map.height; i++) {
-        double angle = is_seen(e, i) ? environment_cell_angle(e, i / e->map.width) : 0.0;
+    for (size_t i = 0; i < environment_pixel_count(e); i++) {
+        double angle = environment_pixel_is_seen(e, i) ? environment_cell_angle(e, i / e->map.width) : 0.0;
         seen += angle;
         saturated += e->is_bound[i] ? angle : 0.0;
     }

@@ -38,7 +38,7 @@ cJSON *segments_json(const struct export_input *in) {
     for (size_t t = 0; t < in->mesh->triangle_count; t++) {
         uint32_t s = in->segments->of_triangle[t];
         triangles[s]++;
-        area[s] += 0.5 * (double)vec3_length(mesh_cross(in->mesh, t));
+        area[s] += (double)mesh_triangle_area(in->mesh, t);
     }
     average_segments(in, color, texels);
     cJSON *list = cJSON_CreateArray();

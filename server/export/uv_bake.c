@@ -43,7 +43,7 @@ static double uv_share(const struct mesh *mesh) {
     double sum = 0.0;
     for (size_t t = 0; t < mesh->triangle_count; t++)
         if (mesh_has_uv(mesh, t) && flat_area(mesh->uv[t]) > 0.0)
-            sum += 0.5 * (double)vec3_length(mesh_cross(mesh, t));
+            sum += (double)mesh_triangle_area(mesh, t);
     return sum / mesh_area(mesh);
 }
 

@@ -36,6 +36,15 @@ vec3 incident_cosine_direction(const vec3 frame[3], vec2 u) {
     return vec3_mad(d, r * circle.y, frame[1]);
 }
 
+void incident_cosine_rays(const struct surface_point *at, uint32_t key, size_t count, struct accel_ray *ray) {
+    vec3 frame[3] = {[2] = at->shading};
+    vec3_frame(at->shading, &frame[0], &frame[1]);
+    for (uint32_t i = 0; i < count; i++) {
+        vec3 direction = incident_cosine_direction(frame, sampler_pair(key, i, 0));
+        ray[i] = (struct accel_ray){accel_offset(at->position, at->normal, direction), 0.0f, direction, INFINITY};
+    }
+}
+
 /* --- radiance along a ray ---------------------------------------------------------------------------- */
 
 /* Position of a hit in the texture, texels. */

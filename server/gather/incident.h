@@ -63,6 +63,9 @@ size_t incident_texel(const struct world *world, const struct accel_hit *hit);
 /* Cosine-distributed direction about frame[2] (Malley's method), from u in [0, 1)^2. */
 vec3 incident_cosine_direction(const vec3 frame[3], vec2 u);
 
+/* Fills ray[count] with unbounded rays from a point in cosine-distributed directions about its shading normal. */
+void incident_cosine_rays(const struct surface_point *at, uint32_t key, size_t count, struct accel_ray *ray);
+
 /* Fills radiance, light_pdf and escapes for direction[0..count). Random numbers are those of `key`, samples
  * first_sample and up. */
 void incident_trace(struct incident *in, const struct light_field *field, const struct surface_point *at, uint32_t key,

@@ -67,13 +67,13 @@ static void find_lit(void *user, size_t chunk, int thread) {
 
 /* Chooses source texels, evenly spaced where there are many, and the photons of each. */
 static void choose_texels(struct caustics *m) {
-    size_t lit = 0, met = 0;
+    size_t lit = 0;
     for (size_t i = 0; i < m->inverse->valid_count; i++)
         lit += m->lit[i];
-    size_t wanted = lit < MAX_PHOTONS ? lit : MAX_PHOTONS;
-    m->texel = mem_array(wanted + 1, sizeof *m->texel);
-    for (size_t i = 0; i < m->inverse->valid_count && m->count < wanted; i++) {
-        if (m->lit[i] && met++ == spaced(m->count, lit, wanted))
+    struct spacing spacing = {.all = lit, .wanted = lit < MAX_PHOTONS ? lit : MAX_PHOTONS};
+    m->texel = mem_array(spacing.wanted + 1, sizeof *m->texel);
+    for (size_t i = 0; i < m->inverse->valid_count; i++) {
+        if (m->lit[i] && spacing_takes(&spacing))
             m->texel[m->count++] = m->inverse->valid[i];
     }
     if (m->count == 0)

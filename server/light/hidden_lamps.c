@@ -73,7 +73,7 @@ static void renew_few(struct lamp_search *s) {
 /* No photograph shows it, and it has a surface. */
 static bool may_be_lamp(const struct light_model *m, size_t segment) {
     const struct emitter_evidence *e = &m->r->evidence[segment];
-    return !e->is_seen && !e->is_outshone && !m->is_lamp[segment] && m->light.area_m2[segment] > 0.0f;
+    return !e->is_seen && !e->is_outshone && !m->lamps.is_lamp[segment] && m->lamps.light.area_m2[segment] > 0.0f;
 }
 
 bool hidden_lamps_any(const struct light_model *m) {
@@ -92,7 +92,7 @@ static void find_candidates(struct lamp_search *s) {
         struct lamp_candidate *c = &s->candidate[s->count++];
         c->segment = (uint32_t)i;
         c->few = mem_calloc(s->few_count + 1, sizeof *c->few);
-        segment_light_add(&m->light, s->few, s->few_count, c->segment, FEW_SOURCE_POINTS, c->few);
+        segment_light_add(&m->lamps.light, s->few, s->few_count, c->segment, FEW_SOURCE_POINTS, c->few);
     }
 }
 
@@ -100,7 +100,7 @@ static void try_candidate(void *user, size_t index, int thread) {
     (void)thread;
     const struct lamp_search *s = user;
     struct lamp_candidate *c = &s->candidate[index];
-    c->source = light_model_hidden_prior(s->m);
+    c->source = light_lamps_hidden_prior(&s->m->lamps);
     c->gain = joint_fit_try(s->all ? &s->m->fit : &s->fit, &c->source, s->all ? c->all : c->few);
 }
 
@@ -137,7 +137,7 @@ static size_t find_likeliest(struct lamp_search *s) {
         if (c->all)
             continue;
         c->all = mem_calloc(m->points.count + 1, sizeof *c->all);
-        segment_light_add(&m->light, m->points.point, m->points.count, c->segment, SEGMENT_LIGHT_POINTS, c->all);
+        segment_light_add(&m->lamps.light, m->points.point, m->points.count, c->segment, SEGMENT_LIGHT_POINTS, c->all);
     }
     s->all = true;
     forget_guesses(&m->fit, m->first_guess);
@@ -185,8 +185,8 @@ static bool add_best(struct lamp_search *s) {
 static bool remove_one(struct lamp_search *s) {
     struct light_model *m = s->m;
     double with = joint_fit_loss(&m->fit);
-    for (size_t i = 0; i < m->lamp_count; i++) {
-        const struct light_lamp *lamp = &m->lamp[i];
+    for (size_t i = 0; i < m->lamps.count; i++) {
+        const struct light_lamp *lamp = &m->lamps.lamp[i];
         if (lamp->kind != ESTIMATED_HIDDEN)
             continue;
         struct joint_source *source = &m->fit.source[lamp->source], kept = *source;
@@ -204,13 +204,13 @@ static bool remove_one(struct lamp_search *s) {
 
 void hidden_lamps_find(struct light_model *m) {
     struct lamp_search s = {.m = m};
-    size_t before = m->lamp_count;
+    size_t before = m->lamps.count;
     choose_few(&s);
     find_candidates(&s);
     renew_few(&s);
-    while (s.count > 0 && m->lamp_count - before < LIGHT_HIDDEN_MOST && add_best(&s))
+    while (s.count > 0 && m->lamps.count - before < LIGHT_HIDDEN_MOST && add_best(&s))
         continue;
-    while (m->lamp_count > before && remove_one(&s))
+    while (m->lamps.count > before && remove_one(&s))
         continue;
     for (size_t i = 0; i < s.count; i++) {
         mem_free(s.candidate[i].few);

@@ -37,17 +37,14 @@ static void add_block(struct alike *a, const struct joint_block *b) {
 double joint_alike(const struct joint_fit *f, const vec3 *position, float radius_m) {
     struct alike a = {.f = f, .radius_m = radius_m};
     struct joint_scratch s;
-    double *x = mem_array(f->source_count + 1, sizeof *x);
+    double *x = joint_fit_radiances(f);
     a.middle = mem_array(f->patch_count + 1, sizeof *a.middle);
     a.score = mem_array(f->patch_count + 1, sizeof *a.score);
     joint_scratch_init(&s, f);
     find_middles(&a, position);
-    for (size_t j = 0; j < f->source_count; j++)
-        x[j] = exp(f->source[j].value);
     for (size_t k = 0; k < f->block_count; k++) {
         const struct joint_block *b = &f->block[k];
-        for (size_t i = b->first; i < b->end; i++)
-            s.base[i - b->first] = log((double)f->point[i].observed / joint_fit_light(f, i, x));
+        joint_find_base(f, b, x, &s);
         joint_settle(f, b, &s);
         for (size_t p = b->first_patch; p < b->end_patch; p++)
             a.score[p] = s.stiffness[p - b->first_patch] * s.offset[p - b->first_patch];

@@ -41,7 +41,7 @@ void joint_fit_init(struct joint_fit *f, const struct joint_point *point, size_t
     f->response = mem_calloc_large(point_count * source_most + 1, sizeof *f->response);
     f->source = mem_array(source_most + 1, sizeof *f->source);
     f->source[f->source_count++] = (struct joint_source){
-        .mean = log(JOINT_WHITE), .deviation = JOINT_WHITE_DEVIATION, .least = -INFINITY, .value = log(JOINT_WHITE)};
+        .mean = log(ALBEDO_WHITE), .deviation = ALBEDO_WHITE_DEVIATION, .least = -INFINITY, .value = log(ALBEDO_WHITE)};
     find_blocks(f);
 }
 
@@ -168,8 +168,7 @@ static void add_patch(const struct assembly *a, struct joint_chunk *c, const str
 static void add_block(const struct assembly *a, struct joint_chunk *c, const struct joint_block *b,
                       struct joint_scratch *s, struct derivative *d) {
     const struct joint_fit *f = a->f;
-    for (size_t i = b->first; i < b->end; i++)
-        s->base[i - b->first] = log((double)f->point[i].observed / joint_fit_light(f, i, a->x));
+    joint_find_base(f, b, a->x, s);
     c->loss += joint_settle(f, b, s);
     if (!c->slope)
         return;
@@ -177,7 +176,7 @@ static void add_block(const struct assembly *a, struct joint_chunk *c, const str
     memset(d->block, 0, f->source_count * sizeof *d->block);
     for (size_t p = b->first_patch; p < b->end_patch; p++)
         add_patch(a, c, b, s, d, p, &weight);
-    add_square(c->curvature, f->source_count, d->block, -1.0 / (weight + 1.0 / square(JOINT_ALBEDO_DEVIATION)));
+    add_square(c->curvature, f->source_count, d->block, -1.0 / (weight + 1.0 / square(ALBEDO_DEVIATION)));
 }
 
 static void add_chunk(void *user, size_t index, int thread) {
@@ -222,10 +221,8 @@ static double add_prior(const struct joint_fit *f, struct joint_chunk *c, size_t
 /* Loss at the sources' values, and, into slope[] and curvature[] unless they are NULL, its derivatives. */
 static double assemble(const struct joint_fit *f, double *slope, double *curvature) {
     size_t n = f->source_count;
-    struct assembly a = {.f = f, .x = mem_array(n + 1, sizeof *a.x)};
+    struct assembly a = {.f = f, .x = joint_fit_radiances(f)};
     struct joint_chunk sum = {0.0, slope, curvature};
-    for (size_t j = 0; j < n; j++)
-        a.x[j] = exp(f->source[j].value);
     for (size_t k = 0; k < CHUNKS && slope; k++) {
         a.chunk[k].slope = mem_calloc(n + 1, sizeof *slope);
         a.chunk[k].curvature = mem_calloc(n * n + 1, sizeof *curvature);

@@ -6,11 +6,11 @@
  *
  *     O_i         observed outgoing radiance, without highlights where they are known
  *     E_i, R_ij   what a surface of albedo 1 would send of known light, and of source j at radiance 1
- *     mu_s        log albedo of the segment, normal about JOINT_ALBEDO
+ *     mu_s        log albedo of the segment, normal about ALBEDO_MEAN
  *     eta_p       error of the model in a patch: texture and light that is not modelled, Student's t
  *     epsilon_i   texture, noise and highlights at the point, Student's t
  *
- * and the mean of a patch hardly exceeds that of white paint, which is normal about JOINT_WHITE: all errors of E_i have
+ * and the mean of a patch hardly exceeds that of white paint, which is normal about ALBEDO_WHITE: all errors of E_i have
  * a common part. Patches make neighbouring points count as what they are: not
  * independent. The maximum of the posterior in theta, with mu and eta at their best, is found by Gauss-Newton steps with
  * iterative reweighting; mu and eta are eliminated by Schur complements. Its curvature gives the sources' variances.

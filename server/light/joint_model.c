@@ -6,12 +6,6 @@
 #include "common/mem.h"
 #include "common/quantile.h"
 
-/* Standard deviations of log albedo about its segment: of points about their patch, by texture; and of a patch, by
- * texture and light that is not modelled. */
-#define POINT_DEVIATION 0.25
-#define PATCH_DEVIATION 0.15
-/* Standard deviation of a patch's mean beyond white paint. */
-#define WHITE_DEVIATION 0.15
 /* Degrees of freedom of Student's t: tails wide enough for lamps and pictures on walls. */
 #define FREEDOM 4.0
 #define SETTLE_ROUNDS 6
@@ -44,6 +38,13 @@ void joint_scratch_release(struct joint_scratch *s) {
     mem_free(s->stiffness);
 }
 
+double *joint_fit_radiances(const struct joint_fit *f) {
+    double *x = mem_array(f->source_count + 1, sizeof *x);
+    for (size_t j = 0; j < f->source_count; j++)
+        x[j] = exp(f->source[j].value);
+    return x;
+}
+
 double joint_fit_light(const struct joint_fit *f, size_t point, const double *x) {
     const float *row = f->response + point * f->source_most;
     double light = (double)f->point[point].known;
@@ -52,21 +53,24 @@ double joint_fit_light(const struct joint_fit *f, size_t point, const double *x)
     return light;
 }
 
+void joint_find_base(const struct joint_fit *f, const struct joint_block *b, const double *x, struct joint_scratch *s) {
+    for (size_t i = b->first; i < b->end; i++)
+        s->base[i - b->first] = log((double)f->point[i].observed / joint_fit_light(f, i, x));
+}
+
 /* Student's t: loss of a residual in deviations, and its weight in the reweighted least squares. */
 static double t_loss(double e) { return 0.5 * (FREEDOM + 1.0) * log1p(e * e / FREEDOM); }
 static double t_weight(double e) { return (FREEDOM + 1.0) / (FREEDOM + e * e); }
 
 struct joint_white joint_whiteness(double beyond, double variance) {
-    double deviation = sqrt(square(WHITE_DEVIATION) + variance);
+    double deviation = sqrt(square(ALBEDO_PATCH) + variance);
     if (!(beyond > 0.0))
         return (struct joint_white){0.0, 0.0, 0.0};
     double e = beyond / deviation, weight = t_weight(e) / square(deviation);
     return (struct joint_white){t_loss(e), weight * beyond, weight};
 }
 
-static double variance_of(const struct joint_point *p) {
-    return square(POINT_DEVIATION) + square((double)p->deviation);
-}
+static double variance_of(const struct joint_point *p) { return square(ALBEDO_POINT) + square((double)p->deviation); }
 
 static double median_of(const struct joint_block *b, struct joint_scratch *s) {
     size_t count = b->end - b->first, stride = (count + MEDIAN_POINTS - 1) / MEDIAN_POINTS, taken = 0;
@@ -92,13 +96,13 @@ static struct patch_sums weigh_patch(const struct joint_fit *f, const struct joi
         sum.base += weight * s->base[i - b->first];
     }
     s->stiffness[patch - b->first_patch] =
-        t_weight(s->offset[patch - b->first_patch] / PATCH_DEVIATION) / square(PATCH_DEVIATION);
+        t_weight(s->offset[patch - b->first_patch] / ALBEDO_PATCH) / square(ALBEDO_PATCH);
     return sum;
 }
 
 /* One round of reweighting: the mean with all offsets at their best, then the offsets. */
 static void settle_round(const struct joint_fit *f, const struct joint_block *b, struct joint_scratch *s) {
-    double prior = 1.0 / square(JOINT_ALBEDO_DEVIATION), sum = prior * log(JOINT_ALBEDO), weights = prior;
+    double prior = 1.0 / square(ALBEDO_DEVIATION), sum = prior * log(ALBEDO_MEAN), weights = prior;
     for (size_t p = b->first_patch; p < b->end_patch; p++) {
         struct patch_sums patch = weigh_patch(f, b, s, p);
         double stiffness = s->stiffness[p - b->first_patch];
@@ -118,11 +122,11 @@ static void settle_round(const struct joint_fit *f, const struct joint_block *b,
 }
 
 static double loss_of(const struct joint_fit *f, const struct joint_block *b, struct joint_scratch *s) {
-    double loss = 0.5 * square((s->mean - log(JOINT_ALBEDO)) / JOINT_ALBEDO_DEVIATION);
+    double loss = 0.5 * square((s->mean - log(ALBEDO_MEAN)) / ALBEDO_DEVIATION);
     for (size_t p = b->first_patch; p < b->end_patch; p++) {
         struct patch_sums patch = weigh_patch(f, b, s, p);
         double offset = s->offset[p - b->first_patch];
-        loss += t_loss(offset / PATCH_DEVIATION) +
+        loss += t_loss(offset / ALBEDO_PATCH) +
                 joint_whiteness(patch.base / patch.weight - f->source[0].value, 1.0 / patch.weight).loss;
         for (size_t i = f->patch[p]; i < f->patch[p + 1]; i++) {
             double deviation = sqrt(variance_of(&f->point[i]));

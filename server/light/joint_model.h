@@ -7,15 +7,7 @@
 #include <stdint.h>
 
 #include "common/parallel.h"
-
-/* Prior of a segment's albedo: the mean and the standard deviation of its logarithm. Recommended reflectances of
- * interiors are .2 for floors, .5 for walls, .8 for ceilings (EN 12464-1). */
-#define JOINT_ALBEDO 0.4
-#define JOINT_ALBEDO_DEVIATION 0.7
-
-/* The same of white paint. */
-#define JOINT_WHITE 0.85
-#define JOINT_WHITE_DEVIATION 0.15
+#include "server/light/albedo.h"
 
 struct joint_point {
     uint32_t segment, patch; /* points of a segment are adjacent, and in it those of a patch */
@@ -56,6 +48,8 @@ struct joint_fit {
     size_t *patch;             /* [patch_count + 1] first point of each patch */
 };
 
+/* x[source_count]: the sources' radiances exp(value). The first result is the caller's. */
+double *joint_fit_radiances(const struct joint_fit *f);
 /* Light at a point, for sources of radiances x[source_count]. */
 double joint_fit_light(const struct joint_fit *f, size_t point, const double *x);
 
@@ -73,6 +67,9 @@ struct joint_scratch {
 void joint_scratch_init(struct joint_scratch *s, const struct joint_fit *f);
 void joint_scratch_release(struct joint_scratch *s);
 
+/* Fills base[] for a block. */
+void joint_find_base(const struct joint_fit *f, const struct joint_block *block, const double *x,
+                     struct joint_scratch *s);
 /* Fills the scratch for a block from base[0, end - first), and returns its share of the loss. */
 double joint_settle(const struct joint_fit *f, const struct joint_block *block, struct joint_scratch *s);
 

@@ -64,12 +64,10 @@ static double search(struct trial *t, struct joint_source *source) {
 
 double joint_fit_try(const struct joint_fit *f, struct joint_source *source, const float *lit) {
     struct trial t = {.f = f, .lit = lit, .light = mem_array(f->point_count + 1, sizeof *t.light)};
-    double *x = mem_array(f->source_count + 1, sizeof *x);
+    double *x = joint_fit_radiances(f);
     bool reaches = false;
     t.reaches = mem_calloc(f->block_count + 1, sizeof *t.reaches);
     joint_scratch_init(&t.scratch, f);
-    for (size_t j = 0; j < f->source_count; j++)
-        x[j] = exp(f->source[j].value);
     for (size_t k = 0; k < f->block_count; k++) {
         for (size_t i = f->block[k].first; i < f->block[k].end; i++) {
             t.light[i] = joint_fit_light(f, i, x);

@@ -5,7 +5,7 @@
 
 #include "server/light/emitters.h"
 #include "server/light/hidden_lamps.h"
-#include "server/light/light_model.h"
+#include "server/light/light_finish.h"
 #include "server/state/evidence.h"
 
 #define SOLVE_STEPS 30
@@ -35,7 +35,7 @@ static void hand_over_sky(struct light_model *m) {
     struct reconstruction *r = m->r;
     rgb factor[ENVIRONMENT_HALVES] = {rgb_gray(1.0f), rgb_gray(1.0f)};
     for (size_t half = 0; half < ENVIRONMENT_HALVES; half++) {
-        const struct light_lamp *lamp = light_model_sky(m, half);
+        const struct light_lamp *lamp = light_lamps_half(&m->lamps, half);
         if (!lamp)
             continue;
         factor[half] = lamp->radiance;
@@ -51,8 +51,8 @@ static void hand_over_sky(struct light_model *m) {
 static void hand_over(struct light_model *m) {
     struct reconstruction *r = m->r;
     r->light.source_count = 0;
-    for (size_t i = 0; i < m->lamp_count; i++) {
-        const struct light_lamp *lamp = &m->lamp[i];
+    for (size_t i = 0; i < m->lamps.count; i++) {
+        const struct light_lamp *lamp = &m->lamps.lamp[i];
         for (size_t k = 0; k < lamp->segment_count && lamp->kind != ESTIMATED_SEEN; k++)
             hand_over_segment(r, lamp, lamp->segment[k]);
     }
@@ -67,7 +67,7 @@ static void estimate(struct light_model *m, const struct views *views) {
     joint_fit_solve(&m->fit, SOLVE_STEPS);
     hidden_lamps_find(m);
     joint_fit_solve(&m->fit, SOLVE_STEPS);
-    light_model_finish(m);
+    light_finish(m);
     hand_over(m);
 }
 
@@ -75,7 +75,7 @@ void light_estimate(struct reconstruction *r, const struct views *views) {
     struct light_model m;
     emitters_observe(r, views, r->evidence);
     light_model_init(&m, r, views, false);
-    if (light_model_has_unknown(&m) || hidden_lamps_any(&m))
+    if (light_lamps_has_unknown(&m.lamps) || hidden_lamps_any(&m))
         estimate(&m, views);
     light_model_release(&m);
     r->light.factor_count = 0; /* on resume the environment is as it is here */
@@ -89,7 +89,7 @@ void light_estimate_again(struct reconstruction *r, const struct views *views, c
     light_model_init(&m, r, views, true);
     light_model_survey(&m, views, field, diffuse);
     joint_fit_solve(&m.fit, SOLVE_STEPS);
-    light_model_finish(&m);
+    light_finish(&m);
     hand_over(&m);
     light_model_release(&m);
 }

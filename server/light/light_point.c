@@ -98,27 +98,22 @@ static void set_guesses_apart(const struct gathering *g, struct incident *in, st
 /* The part of the sky that is seen from a point: where a ray of the last gathering escaped many more are traced. */
 static void look_at_sky(const struct gathering *g, struct incident *in, struct light_point *p, uint32_t key) {
     const struct accel *accel = g->survey->r->world.accel;
-    float cell[UNSEEN_CELLS] = {0};
+    float cell[SKY_CELLS] = {0};
     bool escapes = false;
-    vec3 frame[3] = {[2] = p->at.shading};
     for (size_t i = 0; i < RAYS_PER_POINT; i++)
         escapes = escapes || in->escapes[i];
     if (!escapes)
         return;
-    vec3_frame(p->at.shading, &frame[0], &frame[1]);
-    for (uint32_t i = 0; i < SKY_RAYS; i++) {
-        vec3 d = incident_cosine_direction(frame, sampler_pair(key, i, 0));
-        in->shadow[i] = (struct accel_ray){accel_offset(p->at.position, p->at.normal, d), 0.0f, d, INFINITY};
-    }
+    incident_cosine_rays(&p->at, key, SKY_RAYS, in->shadow);
     accel_occluded_many(accel, SKY_RAYS, in->shadow, in->occluded);
     for (size_t i = 0; i < SKY_RAYS; i++) {
         if (!in->occluded[i] && vec3_dot(in->shadow[i].direction, p->at.normal) > 0.0f)
             light_sky_add_ray(g->sky, in->shadow[i].direction, 1.0f / SKY_RAYS, cell, p->saturated);
     }
-    for (size_t k = 0; k < UNSEEN_CELLS; k++)
+    for (size_t k = 0; k < SKY_CELLS; k++)
         p->escaping += cell[k];
     if (p->escaping > 0.0f) {
-        p->sky = mem_array(UNSEEN_CELLS, sizeof *p->sky);
+        p->sky = mem_array(SKY_CELLS, sizeof *p->sky);
         memcpy(p->sky, cell, sizeof cell);
     }
 }
@@ -198,7 +193,7 @@ static void average_patch(struct light_point *p, size_t count) {
         for (size_t half = 0; half < ENVIRONMENT_HALVES; half++)
             p[i].saturated[half] = (float)saturated[half];
     }
-    average_arrays(p, count, UNSEEN_CELLS, sky_of);
+    average_arrays(p, count, SKY_CELLS, sky_of);
     average_arrays(p, count, 3 * LIGHT_REGIONS, guessed_of);
 }
 
@@ -221,21 +216,10 @@ static void find_deviations(struct light_points *p, float median_radiance) {
 void light_points_init(struct light_points *p, const struct survey *survey, const struct light_sky *sky,
                        const struct fused *observed, float median_radiance) {
     const struct mesh *mesh = &survey->r->scene->mesh;
-    struct gathering g = {survey,
-                          sky,
-                          observed,
-                          mem_array(survey->count + 1, sizeof *g.point),
-                          {INFINITY, INFINITY, INFINITY},
-                          {-INFINITY, -INFINITY, -INFINITY},
-                          0.0f};
-    double area = 0.0;
-    for (size_t i = 0; i < mesh->triangle_count; i++) {
-        area += 0.5 * (double)vec3_length(mesh_cross(mesh, i));
-        vec3 at = mesh_point(mesh, i, 0.0f, 0.0f);
-        g.least = (vec3){fminf(g.least.x, at.x), fminf(g.least.y, at.y), fminf(g.least.z, at.z)};
-        g.most = (vec3){fmaxf(g.most.x, at.x), fmaxf(g.most.y, at.y), fmaxf(g.most.z, at.z)};
-    }
-    g.edge_m = PATCH_PART * (float)sqrt(area);
+    struct gathering g = {.survey = survey, .sky = sky, .observed = observed};
+    g.point = mem_array(survey->count + 1, sizeof *g.point);
+    g.edge_m = PATCH_PART * (float)sqrt(mesh_area(mesh));
+    mesh_bounds(mesh, &g.least, &g.most);
     parallel_for(survey->r->pool, survey->count, gather_point, &g);
     *p = (struct light_points){survey->count, g.point, g.edge_m};
     qsort(p->point, p->count, sizeof *p->point, by_patch);

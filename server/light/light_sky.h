@@ -1,5 +1,5 @@
 /* light_sky.h -- the parts of the environment that are sources of light to be estimated: unseen directions, in the
- * cells of unseen_fit.h, and those at which every photograph that shows them saturates, of the sky and of the ground.
+ * cells of sky_cells.h, and those at which every photograph that shows them saturates, of the sky and of the ground.
  *
  * Near seen directions the fill of environment.h is kept, with a weight that falls over some degrees: what lies beside
  * an opening's edge resembles what is seen there. Cells are bilinear between their centres, but for the horizon, where
@@ -10,13 +10,13 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#include "server/light/unseen_fit.h"
+#include "server/light/sky_cells.h"
 #include "server/state/reconstruction.h"
 
 struct light_sky {
     const struct environment *environment; /* borrowed */
     float *angle;                          /* [map height][map width] to what is seen; NULL: nothing is; owned */
-    double fill[UNSEEN_CELLS];             /* mean radiance of the fill about each cell; 0: there is none */
+    double fill[SKY_CELLS];                /* mean radiance of the fill about each cell; 0: there is none */
     bool estimates_bounds;                 /* saturated directions are sources; else their bounds are known light */
     /* Of each half (environment.h): the part of the seen directions that saturates, -1: none is seen; and their mean. */
     double bound_share[ENVIRONMENT_HALVES], bound_radiance[ENVIRONMENT_HALVES];
@@ -31,15 +31,11 @@ bool light_sky_known(const struct light_sky *s, struct image *map);
 
 /* Shares of rays: what a ray of weight `share` that escapes in a unit direction adds to each cell, and to the saturated
  * directions of its half, times their radiance. */
-void light_sky_add_ray(const struct light_sky *s, vec3 direction, float share, float cell[UNSEEN_CELLS],
+void light_sky_add_ray(const struct light_sky *s, vec3 direction, float share, float cell[SKY_CELLS],
                        float saturated[ENVIRONMENT_HALVES]);
 
-/* The half in which a cell lies. */
-size_t light_sky_half(size_t cell);
-
-/* The cells of the same half beside cell k: to the right (around the horizon), and below; UNSEEN_CELLS: none. */
-size_t light_sky_right(size_t cell);
-size_t light_sky_below(size_t cell);
+/* Part of the fill that is kept at an unseen pixel of the map; 0 where nothing is seen. */
+float light_sky_kept(const struct light_sky *s, size_t pixel);
 
 /* Brightens the saturated directions of each half of r->environment, which has a map, and fills the unseen ones in
  * again. Updates the world. */

@@ -5,12 +5,8 @@
 
 #include "common/mem.h"
 #include "common/quantile.h"
+#include "server/light/albedo.h"
 
-/* Standard deviations of the logarithm of base colour within a segment and above white; and what a highlight, not
- * known yet, may add to base colour, which makes dark surfaces less alike. */
-#define SPREAD_WITHIN 0.3f
-#define SPREAD_BEYOND 0.15f
-#define HIGHLIGHT_ALLOWANCE 0.04f
 /* Strengths tried: from one on that adds this share of the light that is known to what is lit, on average, each so
  * much stronger; then nearer and nearer to the best. */
 #define FAINTEST 0.01
@@ -74,13 +70,13 @@ static void find_base(const struct missing_light *m, size_t first, size_t end, f
     }
 }
 
-/* Spread of base colours about a median. */
-static float spread_about(float median) { return SPREAD_WITHIN + HIGHLIGHT_ALLOWANCE * expf(-median); }
+/* Spread of base colours about a median: a highlight, not known yet, makes dark surfaces less alike. */
+static float spread_about(float median) { return (float)ALBEDO_WITHIN + ALBEDO_HIGHLIGHT * expf(-median); }
 
 /* Misfit of place i, given the median base colour of its segment. */
 static double place_misfit(const struct missing_light *m, size_t i, float median, float spread) {
     double within = oddity(m->base[i] - median, spread);
-    double beyond = oddity(fmaxf(m->base[i] - logf(m->max_albedo), 0.0f), SPREAD_BEYOND);
+    double beyond = oddity(fmaxf(m->base[i] - logf(m->max_albedo), 0.0f), (float)ALBEDO_PATCH);
     return (double)(m->weight[i] * m->places->place[i].weight) * (within + beyond);
 }
 

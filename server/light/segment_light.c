@@ -10,30 +10,16 @@
 #define RECURRENCE_1 0.75487766624669276
 #define RECURRENCE_2 0.56984029099805327
 
-static float triangle_area_m2(const struct mesh *mesh, size_t triangle) {
-    return 0.5f * vec3_length(mesh_cross(mesh, triangle));
-}
-
 void segment_light_init(struct segment_light *l, const struct reconstruction *r) {
     const struct mesh *mesh = &r->scene->mesh;
-    size_t segments = r->segments.count;
-    *l = (struct segment_light){.r = r, .area_m2 = mem_calloc(segments + 1, sizeof *l->area_m2)};
-    l->first = mem_calloc(segments + 2, sizeof *l->first);
-    l->triangle = mem_array(mesh->triangle_count + 1, sizeof *l->triangle);
-    for (size_t i = 0; i < mesh->triangle_count; i++) {
-        l->area_m2[r->segments.of_triangle[i]] += triangle_area_m2(mesh, i);
-        l->first[r->segments.of_triangle[i] + 2]++;
-    }
-    for (size_t s = 0; s < segments; s++)
-        l->first[s + 2] += l->first[s + 1];
-    for (size_t i = 0; i < mesh->triangle_count;
-         i++) /* first[s + 1] is where the next one of s goes, at last its end */
-        l->triangle[l->first[r->segments.of_triangle[i] + 1]++] = (uint32_t)i;
+    *l = (struct segment_light){.r = r, .area_m2 = mem_calloc(r->segments.count + 1, sizeof *l->area_m2)};
+    by_segment_sort_triangles(&l->triangles, &r->segments, mesh->triangle_count);
+    for (size_t i = 0; i < mesh->triangle_count; i++)
+        l->area_m2[r->segments.of_triangle[i]] += mesh_triangle_area(mesh, i);
 }
 
 void segment_light_release(struct segment_light *l) {
-    mem_free(l->triangle);
-    mem_free(l->first);
+    by_segment_release_triangles(&l->triangles);
     mem_free(l->area_m2);
     *l = (struct segment_light){0};
 }
@@ -92,10 +78,11 @@ static struct surface_point point_in(const struct mesh *mesh, uint32_t triangle,
 static void spread_points(const struct segment_light *l, uint32_t segment, size_t wanted, struct lighting *job) {
     const struct mesh *mesh = &l->r->scene->mesh;
     double part = (double)l->area_m2[segment] / (double)wanted, passed = 0.0;
-    for (size_t i = l->first[segment]; i < l->first[segment + 1]; i++) {
-        passed += (double)triangle_area_m2(mesh, l->triangle[i]);
+    for (size_t i = l->triangles.first[segment]; i < l->triangles.first[segment + 1]; i++) {
+        uint32_t triangle = l->triangles.triangle[i];
+        passed += (double)mesh_triangle_area(mesh, triangle);
         while (job->source_count < wanted && passed > ((double)job->source_count + 0.5) * part) {
-            job->source[job->source_count] = point_in(mesh, l->triangle[i], job->source_count);
+            job->source[job->source_count] = point_in(mesh, triangle, job->source_count);
             job->source_count++;
         }
     }

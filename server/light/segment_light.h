@@ -3,13 +3,13 @@
 #define UNBAKE_LIGHT_SEGMENT_LIGHT_H
 
 #include "server/light/light_point.h"
+#include "server/scene/by_segment.h"
 
-/* What is the same for all segments. Triangles [first[s], first[s + 1]) are those of segment s, in the mesh's order. */
+/* What is the same for all segments. */
 struct segment_light {
-    const struct reconstruction *r; /* borrowed */
-    uint32_t *first;                /* [segment_count + 1]; owned, as all below */
-    uint32_t *triangle;             /* [triangle_count] */
-    float *area_m2;                 /* [segment_count] */
+    const struct reconstruction *r;        /* borrowed */
+    struct triangles_by_segment triangles; /* owned */
+    float *area_m2;                        /* [segment_count]; owned */
 };
 
 void segment_light_init(struct segment_light *l, const struct reconstruction *r);

@@ -10,9 +10,7 @@
 #include "server/render/sampler.h"
 
 #define PLACES 64
-#define POINTS 1024 /* all over the room; those with this share of unseen directions tell of them */
-#define SHARE_LEAST 0.1f
-#define LEAST_POINTS 64
+#define POINTS 1024        /* all over the room */
 #define RAYS_PER_POINT 256 /* directions at a place */
 #define BRIGHTER_PLACES 0.75
 #define KEY_PLACES 31 /* keep these random numbers apart from others of the triangle */
@@ -35,32 +33,24 @@
 #define BESIDE_COSINE 0.8f
 #define LEAST_BESIDE 6
 
-struct shining_place {
-    uint32_t triangle;
-    vec3 position, normal;
-};
-
 /* --- places --------------------------------------------------------------------------------------- */
-
-static float area_of(const struct mesh *mesh, uint32_t triangle) {
-    return 0.5f * vec3_length(mesh_cross(mesh, triangle));
-}
 
 /* Up to `most` places, evenly spread over the area of the triangles. */
 static size_t choose_places(const struct mesh *mesh, const uint32_t *triangle, size_t count, size_t most,
-                            struct shining_place *place) {
+                            struct surface_point *place) {
     double total = 0.0, passed = 0.0;
     size_t chosen = 0;
     for (size_t i = 0; i < count; i++)
-        total += (double)area_of(mesh, triangle[i]);
+        total += (double)mesh_triangle_area(mesh, triangle[i]);
     for (size_t i = 0; i < count; i++) {
-        passed += (double)area_of(mesh, triangle[i]);
+        passed += (double)mesh_triangle_area(mesh, triangle[i]);
         vec3 normal = vec3_normalize(mesh_cross(mesh, triangle[i]));
         for (; chosen < most && passed >= total * ((double)chosen + 0.5) / (double)most; chosen++) {
             vec2 u = sampler_pair(sampler_key(KEY_PLACES, triangle[i], 0), (uint32_t)chosen, 0);
             float root = sqrtf(u.x);
             vec3 at = mesh_point(mesh, triangle[i], root * (1.0f - u.y), root * u.y);
-            place[chosen] = (struct shining_place){triangle[i], at, normal};
+            place[chosen] =
+                (struct surface_point){.triangle = triangle[i], .position = at, .normal = normal, .shading = normal};
         }
     }
     return chosen;
@@ -68,14 +58,9 @@ static size_t choose_places(const struct mesh *mesh, const uint32_t *triangle, s
 
 /* --- what arrives --------------------------------------------------------------------------------- */
 
-static void trace_ways(const struct shining *s, const struct shining_place *place, uint32_t key,
+static void trace_ways(const struct shining *s, const struct surface_point *place, uint32_t key,
                        struct accel_ray ray[RAYS_PER_POINT], struct accel_hit hit[RAYS_PER_POINT]) {
-    vec3 frame[3] = {[2] = place->normal};
-    vec3_frame(place->normal, &frame[0], &frame[1]);
-    for (uint32_t i = 0; i < RAYS_PER_POINT; i++) {
-        vec3 direction = incident_cosine_direction(frame, sampler_pair(key, i, 0));
-        ray[i] = (struct accel_ray){accel_offset(place->position, place->normal, direction), 0.0f, direction, INFINITY};
-    }
+    incident_cosine_rays(place, key, RAYS_PER_POINT, ray);
     accel_intersect_many(s->r->world.accel, RAYS_PER_POINT, ray, hit);
 }
 
@@ -98,23 +83,17 @@ static float distant_radiance(const struct shining *s, vec3 direction) {
         return PERHAPS_BRIGHTER * radiance;
     if (!s->has_unseen || seen)
         return radiance;
-    struct unseen_corners c = unseen_corners(direction);
-    double unseen = 0.0;
-    for (int k = 0; k < 4; k++)
-        unseen += (double)c.weight[k] * exp(s->log_unseen[c.cell[k]]);
-    return fmaxf(radiance, (float)unseen);
+    return fmaxf(radiance, (float)sky_cells_radiance(s->log_unseen, direction));
 }
 
 /* Lambert radiance at albedo 1 by a sun that photographs show. */
-static float sun_radiance(const struct shining *s, const struct shining_place *place) {
-    const struct sun *sun = &s->r->sun;
-    struct surface_point at = {.position = place->position, .normal = place->normal, .shading = place->normal};
+static float sun_radiance(const struct shining *s, const struct surface_point *place) {
     struct irradiance light = {0};
-    sun_add_light(sun, s->r->world.accel, &at, &light);
-    return rgb_mean(irradiance_diffuse(&light, at.shading, 1.0f, at.shading));
+    sun_add_light(&s->r->sun, s->r->world.accel, place, &light);
+    return rgb_mean(irradiance_diffuse(&light, place->shading, 1.0f, place->shading));
 }
 
-static float white_at(const struct shining *s, const struct shining_place *place, uint32_t key) {
+static float white_at(const struct shining *s, const struct surface_point *place, uint32_t key) {
     struct accel_ray ray[RAYS_PER_POINT];
     struct accel_hit hit[RAYS_PER_POINT];
     double sum = 0.0;
@@ -127,7 +106,7 @@ static float white_at(const struct shining *s, const struct shining_place *place
 }
 
 float shining_white(const struct shining *s, const uint32_t *triangle, size_t count) {
-    struct shining_place place[PLACES];
+    struct surface_point place[PLACES];
     float white[PLACES];
     size_t places = choose_places(&s->r->scene->mesh, triangle, count, PLACES, place);
     for (size_t i = 0; i < places; i++)
@@ -160,11 +139,7 @@ static void look_around(void *user, size_t index, int thread) {
             p->known += (far ? distant_radiance(s, direction) : radiance_of(s, hit[i].triangle)) / RAYS_PER_POINT;
             continue;
         }
-        p->filled += distant_radiance(s, direction) / RAYS_PER_POINT;
-        p->unseen += 1.0f / RAYS_PER_POINT;
-        struct unseen_corners c = unseen_corners(direction);
-        for (int k = 0; k < 4; k++)
-            p->share[c.cell[k]] += c.weight[k] / RAYS_PER_POINT;
+        unseen_add_ray(p, direction, 1.0f / RAYS_PER_POINT, distant_radiance(s, direction));
     }
 }
 
@@ -193,8 +168,7 @@ static void find_unseen_light(struct shining *s) {
     const struct mesh *mesh = &r->scene->mesh;
     struct shining_survey *survey = mem_alloc(sizeof *survey);
     uint32_t *shown = mem_array(mesh->triangle_count + 1, sizeof *shown);
-    size_t count = 0, kept = 0;
-    double unseen = 0.0;
+    size_t count = 0;
     survey->shining = s;
     for (size_t t = 0; t < mesh->triangle_count; t++) {
         if (s->light->observed[t] >= 0.0f)
@@ -202,13 +176,9 @@ static void find_unseen_light(struct shining *s) {
     }
     s->room_count = choose_places(mesh, shown, count, POINTS, s->room);
     parallel_for(r->pool, s->room_count, look_around, survey);
-    for (size_t i = 0; i < s->room_count; i++) {
-        unseen += (double)survey->point[i].unseen / (double)s->room_count;
-        if (survey->point[i].unseen >= SHARE_LEAST)
-            survey->point[kept++] = survey->point[i];
-    }
-    s->unseen_share = (float)unseen;
-    if (kept >= LEAST_POINTS) {
+    s->unseen_share = (float)unseen_share(survey->point, s->room_count);
+    size_t kept = unseen_keep_telling(survey->point, s->room_count);
+    if (kept >= UNSEEN_LEAST_POINTS) {
         unseen_fit(survey->point, kept, r->segments.count, s->log_unseen);
         s->has_unseen = true;
     }
@@ -233,17 +203,17 @@ void shining_release(struct shining *s) {
 struct sunlight {
     const struct shining *shining;
     const struct accel *accel;
-    struct shining_place lit[PLACES], beside[PLACES];
+    struct surface_point lit[PLACES], beside[PLACES];
     size_t lit_count, beside_count;
 };
 
 /* Whether light may come from far away in a direction. */
-static bool is_open(const struct accel *accel, const struct shining_place *place, vec3 direction) {
+static bool is_open(const struct accel *accel, const struct surface_point *place, vec3 direction) {
     vec3 origin = accel_offset(place->position, place->normal, direction);
     return vec3_dot(direction, place->normal) > 0.0f && !accel_occluded(accel, origin, direction, 0.0f, INFINITY);
 }
 
-static float share_open(const struct sunlight *sun, const struct shining_place *place, size_t count, vec3 direction) {
+static float share_open(const struct sunlight *sun, const struct surface_point *place, size_t count, vec3 direction) {
     size_t open = 0;
     for (size_t i = 0; i < count; i++)
         open += is_open(sun->accel, &place[i], direction);

@@ -15,17 +15,15 @@
 #include "server/light/unseen_fit.h"
 #include "server/state/reconstruction.h"
 
-struct shining_place;
-
 struct shining {
     const struct reconstruction *r; /* borrowed, both; needs world and environment */
     const struct triangle_light *light;
     float *segment_mean; /* [segment_count] what a triangle that nobody sees shows; owned */
     size_t room_count;
-    struct shining_place *room; /* [room_count] places all over the room; owned */
+    struct surface_point *room; /* [room_count] places all over the room; owned */
     float unseen_share;         /* of rays from surfaces: those that go where nothing is known */
     bool has_unseen;            /* what comes from there was estimated: */
-    double log_unseen[UNSEEN_CELLS];
+    double log_unseen[SKY_CELLS];
 };
 
 void shining_init(struct shining *s, const struct reconstruction *r, const struct triangle_light *light);

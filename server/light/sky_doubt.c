@@ -3,6 +3,7 @@
 
 #include <math.h>
 
+#include "common/spaced.h"
 #include "server/gather/incident.h"
 #include "server/render/sampler.h"
 #include "server/scene/surface.h"
@@ -17,32 +18,30 @@ static float unseen_light_at(const struct reconstruction *r, uint32_t texel) {
     struct surface_point at;
     if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at))
         return 0.0f;
-    uint32_t key = sampler_key(KEY_DOUBT, texel, 0);
-    vec3 frame[3] = {[2] = at.shading};
-    vec3_frame(at.shading, &frame[0], &frame[1]);
+    struct accel_ray ray[RAYS_PER_POINT];
     float sum = 0.0f;
-    for (uint32_t i = 0; i < RAYS_PER_POINT; i++) {
-        vec3 d = incident_cosine_direction(frame, sampler_pair(key, i, 0));
+    incident_cosine_rays(&at, sampler_key(KEY_DOUBT, texel, 0), RAYS_PER_POINT, ray);
+    for (size_t i = 0; i < RAYS_PER_POINT; i++) {
+        vec3 d = ray[i].direction;
         if (vec3_dot(d, at.normal) > 0.0f && !environment_is_seen(&r->environment, d) &&
-            !accel_occluded(r->world.accel, accel_offset(at.position, at.normal, d), d, 0.0f, INFINITY))
+            !accel_occluded(r->world.accel, ray[i].origin, d, 0.0f, INFINITY))
             sum += rgb_mean(lights_environment(r->world.lights, d));
     }
     return sum / RAYS_PER_POINT;
 }
 
 float sky_doubt(const struct reconstruction *r, const uint32_t *texel, size_t count) {
-    size_t bright = 0, met = 0, taken = 0;
+    size_t bright = 0;
     float sum = 0.0f;
     if (!r->environment.map.pixel)
         return 0.0f;
     for (size_t i = 0; i < count; i++)
         bright += evidence_is_bright(r, texel[i]);
-    size_t of = bright > 0 ? bright : count, wanted = of < PLACES ? of : PLACES;
-    for (size_t i = 0; i < count && taken < wanted; i++) {
-        if ((bright == 0 || evidence_is_bright(r, texel[i])) && met++ == taken * of / wanted) {
+    size_t all = bright > 0 ? bright : count;
+    struct spacing spacing = {.all = all, .wanted = all < PLACES ? all : PLACES};
+    for (size_t i = 0; i < count; i++) {
+        if ((bright == 0 || evidence_is_bright(r, texel[i])) && spacing_takes(&spacing))
             sum += unseen_light_at(r, texel[i]);
-            taken++;
-        }
     }
-    return taken > 0 ? sum / (float)taken : 0.0f;
+    return spacing.taken > 0 ? sum / (float)spacing.taken : 0.0f;
 }

@@ -12,15 +12,13 @@
 #include "common/mem.h"
 #include "common/quantile.h"
 #include "server/capture/triangle_light.h"
+#include "server/light/emitters.h"
 #include "server/light/shining.h"
 #include "server/scene/adjacency.h"
+#include "server/scene/by_segment.h"
 
 #define FIRST_LEVEL 1.5f /* of the median of the photographs */
 #define LEVEL_STEP 1.25f
-/* The share of a level that must be beyond what white could reflect; so much more where all light that
- * arrives is an estimate. As the decision has it later (solve.c). */
-#define BEYOND_WHITE 0.25f
-#define BEYOND_WHITE_UNSEEN 0.25f
 /* A set whose white was that far above its level is looked at again when the level comes near. */
 #define NEAR 0.8f
 /* A part and what is left are that large in photographs, at least, and differ by so much. */
@@ -38,14 +36,13 @@ struct split_job {
     struct triangle_light light;
     struct adjacency adjacency;
     float first_level;
-    uint32_t *first;    /* [segment_count + 1] where a segment's triangles begin in... */
-    uint32_t *triangle; /* [triangle_count] all, by segment */
-    uint32_t *parent;   /* [triangle_count] connected sets at the present level, written by segment */
-    float *size;        /* [triangle_count] of a root of those: pixels or m^2 */
-    uint32_t *part;     /* [triangle_count] number of the part among its segment's, from 1; 0: the rest */
-    bool *settled;      /* [triangle_count] is known to shine */
-    float *needed;      /* [triangle_count] levels below this are known not to be beyond white */
-    uint32_t *count;    /* [segment_count] parts found */
+    struct triangles_by_segment triangles;
+    uint32_t *parent; /* [triangle_count] connected sets at the present level, written by segment */
+    float *size;      /* [triangle_count] of a root of those: pixels or m^2 */
+    uint32_t *part;   /* [triangle_count] number of the part among its segment's, from 1; 0: the rest */
+    bool *settled;    /* [triangle_count] is known to shine */
+    float *needed;    /* [triangle_count] levels below this are known not to be beyond white */
+    uint32_t *count;  /* [segment_count] parts found */
 };
 
 /* A segment at one level. */
@@ -93,9 +90,7 @@ static void connect(const struct split_level *l, bool (*belongs)(const struct sp
 
 /* --- a part --------------------------------------------------------------------------------------- */
 
-static float area_of(const struct split_job *job, uint32_t t) {
-    return 0.5f * vec3_length(mesh_cross(&job->r->scene->mesh, t));
-}
+static float area_of(const struct split_job *job, uint32_t t) { return mesh_triangle_area(&job->r->scene->mesh, t); }
 
 struct split_measure {
     float pixels, shown; /* what they fill together; the median of what they show */
@@ -178,7 +173,7 @@ static void try_part(const struct split_level *l, size_t lit_count, const struct
     if (lit.pixels < LEAST_PIXELS || l->bright < job->needed[l->lit[0]])
         return;
     float white = shining_white(&job->shining, l->lit, lit_count);
-    float needed = white / (1.0f - BEYOND_WHITE - BEYOND_WHITE_UNSEEN * job->shining.unseen_share);
+    float needed = white / (1.0f - EMITTER_SHARE - EMITTER_SHARE_UNSEEN * job->shining.unseen_share);
     if (l->bright < needed) {
         for (size_t i = 0; i < lit_count; i++)
             job->needed[l->lit[i]] = NEAR * needed;
@@ -230,9 +225,10 @@ static float brightest(const struct split_job *job, const uint32_t *triangle, si
 static void try_segment(void *user, size_t segment, int thread) {
     (void)thread;
     struct split_job *job = user;
-    size_t count = job->first[segment + 1] - job->first[segment];
+    const uint32_t *first = job->triangles.first;
+    size_t count = first[segment + 1] - first[segment];
     struct split_level l = {.job = job,
-                            .triangle = job->triangle + job->first[segment],
+                            .triangle = job->triangles.triangle + first[segment],
                             .triangle_count = count,
                             .segment = (uint32_t)segment,
                             .bright = job->first_level};
@@ -251,20 +247,6 @@ static void try_segment(void *user, size_t segment, int thread) {
     mem_free(l.lit);
 }
 
-static void sort_triangles(struct split_job *job) {
-    const struct segments *segments = &job->r->segments;
-    size_t triangles = job->r->scene->mesh.triangle_count;
-    job->first = mem_calloc(segments->count + 2, sizeof *job->first);
-    job->triangle = mem_array(triangles, sizeof *job->triangle);
-    /* A counting sort; first[] is shifted by two while it counts and by one while it places. */
-    for (size_t t = 0; t < triangles; t++)
-        job->first[segments->of_triangle[t] + 2]++;
-    for (size_t s = 2; s < segments->count + 2; s++)
-        job->first[s] += job->first[s - 1];
-    for (size_t t = 0; t < triangles; t++)
-        job->triangle[job->first[segments->of_triangle[t] + 1]++] = (uint32_t)t;
-}
-
 /* Numbers the parts after the segments, in the order of these. */
 static void number_parts(struct split *split, const struct split_job *job, struct segments *segments) {
     split->old_count = segments->count;
@@ -278,8 +260,8 @@ static void number_parts(struct split *split, const struct split_job *job, struc
             split->whole[segments->count - split->old_count] = (uint32_t)s;
             segments->id[segments->count++] = segments->id[s];
         }
-        for (size_t i = job->first[s]; i < job->first[s + 1]; i++) {
-            uint32_t t = job->triangle[i];
+        for (size_t i = job->triangles.first[s]; i < job->triangles.first[s + 1]; i++) {
+            uint32_t t = job->triangles.triangle[i];
             segments->of_triangle[t] = job->part[t] > 0 ? first + job->part[t] - 1 : (uint32_t)s;
         }
     }
@@ -292,7 +274,7 @@ void split_segments(struct split *split, struct reconstruction *r, const struct 
     triangle_light_measure(&job.light, views, r->pool);
     shining_init(&job.shining, r, &job.light);
     adjacency_make(&job.adjacency, &r->scene->mesh);
-    sort_triangles(&job);
+    by_segment_sort_triangles(&job.triangles, &r->segments, triangles);
     job.parent = mem_array(triangles, sizeof *job.parent);
     job.size = mem_array(triangles, sizeof *job.size);
     job.part = mem_calloc(triangles, sizeof *job.part);
@@ -307,8 +289,7 @@ void split_segments(struct split *split, struct reconstruction *r, const struct 
     mem_free(job.part);
     mem_free(job.size);
     mem_free(job.parent);
-    mem_free(job.triangle);
-    mem_free(job.first);
+    by_segment_release_triangles(&job.triangles);
     adjacency_release(&job.adjacency);
     shining_release(&job.shining);
     triangle_light_release(&job.light);

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "common/mem.h"
+#include "common/spaced.h"
 #include "server/light/missing_light.h"
 #include "server/render/bsdf.h"
 #include "server/scene/latlong.h"
@@ -73,13 +74,11 @@ static void ask_direction(void *user, size_t index, int thread) {
 
 /* Up to ASKED_POINTS places that are bright, or not. */
 static void choose_asked(struct asked *a, bool bright) {
-    size_t all = 0, met = 0, first = a->count;
-    for (size_t i = 0; i < a->s->places.count; i++)
-        all += (a->s->places.place[i].residual > PLACE_BRIGHT) == bright;
-    size_t wanted = all < ASKED_POINTS ? all : ASKED_POINTS;
-    for (size_t i = 0; i < a->s->places.count && a->count - first < wanted; i++) {
-        if ((a->s->places.place[i].residual > PLACE_BRIGHT) == bright && met++ == (a->count - first) * all / wanted) {
-            a->weight[a->count] = (float)all / (float)wanted;
+    size_t above = light_places_above(&a->s->places, PLACE_BRIGHT), all = bright ? above : a->s->places.count - above;
+    struct spacing spacing = {.all = all, .wanted = all < ASKED_POINTS ? all : ASKED_POINTS};
+    for (size_t i = 0; i < a->s->places.count; i++) {
+        if ((a->s->places.place[i].residual > PLACE_BRIGHT) == bright && spacing_takes(&spacing)) {
+            a->weight[a->count] = (float)all / (float)spacing.wanted;
             a->place[a->count++] = (uint32_t)i;
         }
     }
@@ -253,11 +252,9 @@ void sun_find(struct reconstruction *r, const struct views *views) {
         report_found(r);
         return;
     }
-    survey_lights_on(r, views, NULL);
-    survey_init(&survey, r, NULL, NULL, LIGHT_PLACES);
+    survey_init(&survey, r, views, NULL, NULL, LIGHT_PLACES);
     light_places_init(&s.places, &survey);
     survey_release(&survey);
-    survey_lights_off(r);
     light_places_leave_out_lamps(&s.places);
     missing_light_init(&s.missing, &s.places, PLACE_WHITE);
     if (light_places_above(&s.places, PLACE_BRIGHT) >= LEAST_BRIGHT)

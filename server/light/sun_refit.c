@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "common/mem.h"
+#include "common/spaced.h"
 #include "server/gather/sun.h"
 #include "server/light/missing_light.h"
 #include "server/render/bsdf.h"
@@ -20,12 +21,12 @@ static bool tells(const struct divide *d, uint32_t texel) {
 /* Evenly spread; returns their number. */
 static size_t choose_texels(const struct divide *d, uint32_t texel[LIGHT_PLACES]) {
     const struct inverse_uv *inverse = d->surface.inverse;
-    size_t all = 0, met = 0, count = 0;
+    size_t all = 0, count = 0;
     for (size_t i = 0; i < inverse->valid_count; i++)
         all += tells(d, inverse->valid[i]);
-    size_t wanted = all < LIGHT_PLACES ? all : LIGHT_PLACES;
-    for (size_t i = 0; i < inverse->valid_count && count < wanted; i++) {
-        if (tells(d, inverse->valid[i]) && met++ == count * all / wanted)
+    struct spacing spacing = {.all = all, .wanted = all < LIGHT_PLACES ? all : LIGHT_PLACES};
+    for (size_t i = 0; i < inverse->valid_count; i++) {
+        if (tells(d, inverse->valid[i]) && spacing_takes(&spacing))
             texel[count++] = inverse->valid[i];
     }
     return count;

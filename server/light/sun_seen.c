@@ -23,27 +23,17 @@ struct seen_sun {
     rgb around;
 };
 
-static rgb radiance_at(const struct environment *e, size_t pixel) {
-    const float *p = e->map.pixel + 3 * pixel;
-    return rgb_make(p[0], p[1], p[2]);
-}
-
-static size_t pixel_count(const struct environment *e) { return (size_t)e->map.width * e->map.height; }
-
-static vec3 direction_of(const struct environment *e, size_t pixel) {
-    return environment_direction(e, pixel % e->map.width, pixel / e->map.width);
-}
-
 static bool is_measured(const struct environment *e, size_t pixel) {
-    return e->confidence.pixel[2 * pixel] > 0.0f && !e->is_bound[pixel];
+    return environment_pixel_is_seen(e, pixel) && !e->is_bound[pixel];
 }
 
 static double angle_between(vec3 a, vec3 b) { return 2.0 * asin(fmin(0.5 * (double)vec3_length(vec3_sub(a, b)), 1.0)); }
 
 static size_t brightest_pixel(const struct environment *e) {
     size_t best = 0;
-    for (size_t i = 1; i < pixel_count(e); i++) {
-        if (is_measured(e, i) && rgb_mean(radiance_at(e, i)) > rgb_mean(radiance_at(e, best)))
+    for (size_t i = 1; i < environment_pixel_count(e); i++) {
+        if (is_measured(e, i) &&
+            rgb_mean(environment_pixel_radiance(e, i)) > rgb_mean(environment_pixel_radiance(e, best)))
             best = i;
     }
     return best;
@@ -52,12 +42,13 @@ static size_t brightest_pixel(const struct environment *e) {
 /* The disc: pixels of half the greatest radiance about the brightest one. */
 static void find_disc(struct seen_sun *s, size_t brightest) {
     const struct environment *e = s->e;
-    float half = 0.5f * rgb_mean(radiance_at(e, brightest));
-    vec3 from = direction_of(e, brightest), sum = {0.0f, 0.0f, 0.0f};
+    float half = 0.5f * rgb_mean(environment_pixel_radiance(e, brightest));
+    vec3 from = environment_pixel_direction(e, brightest), sum = {0.0f, 0.0f, 0.0f};
     double angle = 0.0, pixel_rad = PI / (double)(e->map.height - 1);
-    for (size_t i = 0; i < pixel_count(e); i++) {
-        vec3 d = direction_of(e, i);
-        if (!(rgb_mean(radiance_at(e, i)) > half) || angle_between(d, from) > 2.0 * WIDEST_DEGREES * PI / 180.0)
+    for (size_t i = 0; i < environment_pixel_count(e); i++) {
+        vec3 d = environment_pixel_direction(e, i);
+        if (!(rgb_mean(environment_pixel_radiance(e, i)) > half) ||
+            angle_between(d, from) > 2.0 * WIDEST_DEGREES * PI / 180.0)
             continue;
         double part = environment_cell_angle(e, i / e->map.width);
         angle += part;
@@ -71,8 +62,8 @@ static void find_disc(struct seen_sun *s, size_t brightest) {
 
 /* Whether all of the disc, and what it is spread over, is measured. */
 static bool is_whole(const struct seen_sun *s) {
-    for (size_t i = 0; i < pixel_count(s->e); i++) {
-        if (!is_measured(s->e, i) && angle_between(direction_of(s->e, i), s->middle) < s->reach_rad)
+    for (size_t i = 0; i < environment_pixel_count(s->e); i++) {
+        if (!is_measured(s->e, i) && angle_between(environment_pixel_direction(s->e, i), s->middle) < s->reach_rad)
             return false;
     }
     return true;
@@ -80,12 +71,12 @@ static bool is_whole(const struct seen_sun *s) {
 
 /* Medians of the measured pixels around it; false: there are none. */
 static bool find_around(struct seen_sun *s) {
-    float *value = mem_array(pixel_count(s->e), sizeof *value);
+    float *value = mem_array(environment_pixel_count(s->e), sizeof *value);
     size_t count = 0;
     for (int c = 0; c < 3; c++) {
         count = 0;
-        for (size_t i = 0; i < pixel_count(s->e); i++) {
-            double off = angle_between(direction_of(s->e, i), s->middle);
+        for (size_t i = 0; i < environment_pixel_count(s->e); i++) {
+            double off = angle_between(environment_pixel_direction(s->e, i), s->middle);
             if (is_measured(s->e, i) && off >= s->reach_rad && off < s->ring_rad)
                 value[count++] = s->e->map.pixel[3 * i + (size_t)c];
         }
@@ -98,9 +89,9 @@ static bool find_around(struct seen_sun *s) {
 /* Irradiance, on a surface that faces it, beyond what is around it; with `map` also gives its pixels that. */
 static rgb take_excess(const struct seen_sun *s, struct image *map) {
     rgb sum = rgb_gray(0.0f);
-    for (size_t i = 0; i < pixel_count(s->e); i++) {
-        rgb excess = rgb_clamp(rgb_sub(radiance_at(s->e, i), s->around), 0.0f, INFINITY);
-        if (!(angle_between(direction_of(s->e, i), s->middle) < s->reach_rad))
+    for (size_t i = 0; i < environment_pixel_count(s->e); i++) {
+        rgb excess = rgb_clamp(rgb_sub(environment_pixel_radiance(s->e, i), s->around), 0.0f, INFINITY);
+        if (!(angle_between(environment_pixel_direction(s->e, i), s->middle) < s->reach_rad))
             continue;
         sum = rgb_add(sum, rgb_scale(excess, (float)environment_cell_angle(s->e, i / s->e->map.width)));
         for (size_t c = 0; c < 3 && map; c++)
@@ -115,8 +106,8 @@ bool sun_seen_take(struct environment *e, struct sun *sun) {
         return false;
     size_t brightest = brightest_pixel(e);
     find_disc(&s, brightest);
-    if (!(rgb_mean(radiance_at(e, brightest)) > 0.0f) || s.radius_rad > WIDEST_DEGREES * PI / 180.0 || !is_whole(&s) ||
-        !find_around(&s))
+    if (!(rgb_mean(environment_pixel_radiance(e, brightest)) > 0.0f) || s.radius_rad > WIDEST_DEGREES * PI / 180.0 ||
+        !is_whole(&s) || !find_around(&s))
         return false;
     rgb irradiance = take_excess(&s, NULL);
     if ((double)rgb_luminance(irradiance) < LEAST_SHARE * 4.0 * PI * e->luminance)

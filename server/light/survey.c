@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "common/mem.h"
+#include "common/spaced.h"
 #include "server/light/emitters.h"
 #include "server/state/evidence.h"
 
@@ -33,7 +34,7 @@ static void fill_radiance(struct survey *s) {
     mem_free(sum);
 }
 
-void survey_lights_on(struct reconstruction *r, const struct views *views, const bool *without) {
+static void make_lights(struct reconstruction *r, const struct views *views, const bool *without) {
     struct emitter_evidence *evidence = mem_array(r->segments.count, sizeof *evidence);
     memcpy(evidence, r->evidence, r->segments.count * sizeof *evidence);
     emitters_observe(r, views, evidence);
@@ -43,11 +44,6 @@ void survey_lights_on(struct reconstruction *r, const struct views *views, const
     }
     emitters_light_bright(r, views, evidence);
     mem_free(evidence);
-}
-
-void survey_lights_off(struct reconstruction *r) {
-    memset(r->materials.emission, 0, r->segments.count * sizeof *r->materials.emission);
-    world_update_lights(&r->world);
 }
 
 /* Segments of `without` are as bright as they are by now, to those who see them in a mirror. */
@@ -70,22 +66,25 @@ static bool is_usable(const struct reconstruction *r, const bool *without, uint3
 
 static void choose_points(struct survey *s, const bool *without, size_t points) {
     const struct reconstruction *r = s->r;
-    size_t seen = 0, met = 0;
+    size_t seen = 0;
     for (size_t i = 0; i < r->inverse.valid_count; i++)
         seen += is_usable(r, without, r->inverse.valid[i]);
-    size_t wanted = seen < points ? seen : points;
-    s->texel = mem_array(wanted + 1, sizeof *s->texel);
-    for (size_t i = 0; i < r->inverse.valid_count && s->count < wanted; i++) {
+    struct spacing spacing = {.all = seen, .wanted = seen < points ? seen : points};
+    s->texel = mem_array(spacing.wanted + 1, sizeof *s->texel);
+    for (size_t i = 0; i < r->inverse.valid_count; i++) {
         uint32_t texel = r->inverse.valid[i];
-        if (is_usable(r, without, texel) && met++ == s->count * seen / wanted)
+        if (is_usable(r, without, texel) && spacing_takes(&spacing))
             s->texel[s->count++] = texel;
     }
 }
 
-void survey_init(struct survey *s, const struct reconstruction *r, const struct light_field *field, const bool *without,
-                 size_t points) {
+void survey_init(struct survey *s, struct reconstruction *r, const struct views *views, const struct light_field *field,
+                 const bool *without, size_t points) {
     size_t texels = (size_t)r->fused.width * r->fused.height;
-    *s = (struct survey){.r = r, .radiance = mem_calloc_large(texels, sizeof *s->radiance)};
+    *s =
+        (struct survey){.r = r, .has_lights = views != NULL, .radiance = mem_calloc_large(texels, sizeof *s->radiance)};
+    if (views)
+        make_lights(r, views, without);
     memcpy(s->radiance, field ? field->radiance : (const uint16_t(*)[3])r->fused.radiance,
            texels * sizeof *s->radiance);
     if (!field)
@@ -100,6 +99,11 @@ void survey_init(struct survey *s, const struct reconstruction *r, const struct 
 }
 
 void survey_release(struct survey *s) {
+    struct reconstruction *r = s->r;
+    if (s->has_lights) {
+        memset(r->materials.emission, 0, r->segments.count * sizeof *r->materials.emission);
+        world_update_lights(&r->world);
+    }
     mem_free(s->scratch);
     mem_free(s->texel);
     mem_free(s->radiance);

@@ -11,25 +11,21 @@
 #include "server/state/reconstruction.h"
 
 struct survey {
-    const struct reconstruction *r; /* borrowed */
-    uint16_t (*radiance)[3];        /* [height][width] half precision: outgoing radiance; owned, as all below */
+    struct reconstruction *r; /* borrowed */
+    bool has_lights;          /* it made some of bright segments */
+    uint16_t (*radiance)[3];  /* [height][width] half precision: outgoing radiance; owned, as all below */
     struct light_field field;
     size_t count;
     uint32_t *texel;          /* [count] evenly spread, observed, of no lamp */
     struct incident *scratch; /* [threads] */
 };
 
-/* Makes lights of the world of all segments that outshine the room, since small lamps must be sampled, except those of
- * without[segment_count] (NULL: none). To be called before survey_init. */
-void survey_lights_on(struct reconstruction *r, const struct views *views, const bool *without);
-/* Sets all emission to 0 again. */
-void survey_lights_off(struct reconstruction *r);
-
 /* Outgoing radiance is that of `field`; with NULL it is fused radiance, and for unobserved texels the mean of their
  * segment, or of the room. Segments of without[segment_count] (NULL: none; borrowed) send out nothing, but polished
- * surfaces mirror them. At most `points` points. */
-void survey_init(struct survey *s, const struct reconstruction *r, const struct light_field *field, const bool *without,
-                 size_t points);
+ * surfaces mirror them. All other segments that outshine the room by `views` (NULL: not asked) are lights of
+ * the world until survey_release, since small lamps must be sampled; then all emission is 0. At most `points` points. */
+void survey_init(struct survey *s, struct reconstruction *r, const struct views *views, const struct light_field *field,
+                 const bool *without, size_t points);
 void survey_release(struct survey *s);
 
 #endif

@@ -7,18 +7,14 @@
 #include "common/cholesky.h"
 #include "common/mem.h"
 #include "common/quantile.h"
-#include "server/scene/latlong.h"
+#include "server/light/albedo.h"
 
-#define COLUMNS UNSEEN_COLUMNS
-#define ROWS UNSEEN_ROWS
-#define CELLS UNSEEN_CELLS
-/* White paint, and the part of the points that is no whiter. In scans that is not near 1: in creases of a
+#define CELLS SKY_CELLS
+/* Part of a point's rays that must be unseen for it to tell of them. */
+#define SHARE_LEAST 0.1f
+/* The part of the points that is no whiter than white paint. In scans that is not near 1: in creases of a
  * fused mesh too little light is found. */
-#define WHITE_BASE_COLOR 0.85
 #define NO_WHITER 0.9
-/* Standard deviations of the logarithm of base colour within a segment and above white. */
-#define SPREAD_WITHIN 0.3
-#define SPREAD_BEYOND 0.15
 /* Deviations at which a point has a quarter of its influence: emitters are no surfaces lit. Beyond white it
  * comes later, or a room that is much too dark would be taken for one of lamps. */
 #define OUTLIER 2.0
@@ -38,19 +34,28 @@ struct fit {
     double start[CELLS];
 };
 
-struct unseen_corners unseen_corners(vec3 d) {
-    struct latlong at = latlong_of(d); /* the centres of cells are half a cell in, both ways: this is no map */
-    double x = at.around * COLUMNS - 0.5, y = at.down * ROWS - 0.5;
-    double column = floor(x), row = floor(y);
-    float fx = (float)(x - column), fy = (float)(y - row);
-    struct unseen_corners c;
-    for (int i = 0; i < 4; i++) {
-        int at_x = ((int)column + i % 2 + COLUMNS) % COLUMNS, at_y = (int)row + i / 2;
-        at_y = at_y < 0 ? 0 : at_y >= ROWS ? ROWS - 1 : at_y;
-        c.cell[i] = (size_t)(at_y * COLUMNS + at_x);
-        c.weight[i] = (i % 2 ? fx : 1.0f - fx) * (i / 2 ? fy : 1.0f - fy);
+void unseen_add_ray(struct unseen_point *p, vec3 direction, float share, float filled) {
+    struct sky_corners c = sky_cells_around(direction);
+    p->filled += share * filled;
+    p->unseen += share;
+    for (int k = 0; k < 4; k++)
+        p->share[c.cell[k]] += share * c.weight[k];
+}
+
+size_t unseen_keep_telling(struct unseen_point *point, size_t count) {
+    size_t kept = 0;
+    for (size_t i = 0; i < count; i++) {
+        if (point[i].unseen >= SHARE_LEAST)
+            point[kept++] = point[i];
     }
-    return c;
+    return kept;
+}
+
+double unseen_share(const struct unseen_point *point, size_t count) {
+    double sum = 0.0;
+    for (size_t i = 0; i < count; i++)
+        sum += (double)point[i].unseen;
+    return sum / fmax((double)count, 1.0);
 }
 
 static double arrived(const struct unseen_point *p, const double log_radiance[CELLS]) {
@@ -79,7 +84,7 @@ static void make_white(struct fit *f) {
         double middle = 0.5 * (low + high);
         for (size_t k = 0; k < CELLS; k++)
             cell[k] = f->cell[k] + middle;
-        *(unseen_base_color(f->point, f->count, NO_WHITER, cell) > WHITE_BASE_COLOR ? &low : &high) = middle;
+        *(unseen_base_color(f->point, f->count, NO_WHITER, cell) > ALBEDO_WHITE ? &low : &high) = middle;
     }
     for (size_t k = 0; k < CELLS; k++)
         f->cell[k] += high;
@@ -97,7 +102,7 @@ static void means_of_segments(const struct fit *f, const double *log_base, doubl
     double *weight = mem_calloc(segments, sizeof *weight);
     memset(mean, 0, segments * sizeof *mean);
     for (size_t i = 0; i < f->count; i++) {
-        double w = influence(fmax(log_base[i] - log(WHITE_BASE_COLOR), 0.0) / SPREAD_BEYOND, OUTLIER_BEYOND);
+        double w = influence(fmax(log_base[i] - log(ALBEDO_WHITE), 0.0) / ALBEDO_PATCH, OUTLIER_BEYOND);
         mean[f->point[i].segment] += w * log_base[i];
         weight[f->point[i].segment] += w;
     }
@@ -124,9 +129,9 @@ static void tie(struct normal *n, size_t a, size_t b, double difference, double 
 
 static void add_point(struct normal *n, const struct unseen_point *p, const double cell[CELLS], double log_base,
                       double mean) {
-    double within = log_base - mean, beyond = fmax(log_base - log(WHITE_BASE_COLOR), 0.0);
-    double within_weight = influence(within / SPREAD_WITHIN, OUTLIER) / (SPREAD_WITHIN * SPREAD_WITHIN);
-    double beyond_weight = influence(beyond / SPREAD_BEYOND, OUTLIER_BEYOND) / (SPREAD_BEYOND * SPREAD_BEYOND);
+    double within = log_base - mean, beyond = fmax(log_base - log(ALBEDO_WHITE), 0.0);
+    double within_weight = influence(within / ALBEDO_WITHIN, OUTLIER) / (ALBEDO_WITHIN * ALBEDO_WITHIN);
+    double beyond_weight = influence(beyond / ALBEDO_PATCH, OUTLIER_BEYOND) / (ALBEDO_PATCH * ALBEDO_PATCH);
     double pull = within_weight * within + beyond_weight * beyond;
     double weight = within_weight + (beyond > 0.0 ? beyond_weight : 0.0);
     double slope[CELLS], all = arrived(p, cell);
@@ -151,11 +156,11 @@ static void step(struct fit *f, struct normal *n, double *log_base, double *mean
     for (size_t i = 0; i < f->count; i++)
         add_point(n, &f->point[i], cell, log_base[i], mean[f->point[i].segment]);
     for (size_t k = 0; k < CELLS; k++) {
-        size_t right = k % COLUMNS + 1 < COLUMNS ? k + 1 : k + 1 - COLUMNS;
+        size_t right = sky_cells_right(k), below = sky_cells_below(k);
         tie(n, k, k, cell[k] - f->start[k], inertia);
         tie(n, k, right, cell[k] - cell[right], smoothness);
-        if (k + COLUMNS < CELLS)
-            tie(n, k, k + COLUMNS, cell[k] - cell[k + COLUMNS], smoothness);
+        if (below < CELLS)
+            tie(n, k, below, cell[k] - cell[below], smoothness);
     }
     if (!cholesky_factor(CELLS, CELLS, &n->matrix[0][0]))
         return;

@@ -1,7 +1,6 @@
 /* unseen_fit.h -- fits radiance of unobserved directions (unseen_light.h) to points of the surface.
  *
- * The unknown is the logarithm of a coarse latitude-longitude map (layout of world.h), bilinear between the centres of
- * its cells. A point's radiance is base colour times Lambert radiance, by known light and by the map. Robust
+ * The unknown is the logarithm of a coarse map (sky_cells.h). A point's radiance is base colour times Lambert radiance, by known light and by the map. Robust
  * Gauss-Newton with a smoothness prior makes base colours similar within a segment and plausible; a common factor then
  * leaves nine tenths of them below that of white paint. */
 #ifndef UNBAKE_LIGHT_UNSEEN_FIT_H
@@ -10,32 +9,31 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "common/vec.h"
-
-#define UNSEEN_COLUMNS 12
-#define UNSEEN_ROWS 6
-#define UNSEEN_CELLS (UNSEEN_COLUMNS * UNSEEN_ROWS)
-
-/* The four cells around a unit direction and their weights, whose sum is 1. */
-struct unseen_corners {
-    size_t cell[4];
-    float weight[4];
-};
-struct unseen_corners unseen_corners(vec3 direction);
+#include "server/light/sky_cells.h"
 
 /* One point: its observed radiance; Lambert radiance at albedo 1 by known light, and by filled-in light; and the parts
  * of its cosine-distributed rays that go to each cell. Means of the channels. */
 struct unseen_point {
     uint32_t segment;
     float shown, known, filled;
-    float unseen, share[UNSEEN_CELLS]; /* unseen: the sum of the shares */
+    float unseen, share[SKY_CELLS]; /* unseen: the sum of the shares */
 };
+
+/* Adds a ray of weight `share` that leaves in an unobserved unit direction, with the filled-in radiance from there. */
+void unseen_add_ray(struct unseen_point *p, vec3 direction, float share, float filled);
+
+/* Moves the points that tell of unobserved directions to the front; returns their number. */
+size_t unseen_keep_telling(struct unseen_point *point, size_t count);
+/* So many of these must be there. */
+#define UNSEEN_LEAST_POINTS 64
+
+/* The part of all the points' rays that is unseen. */
+double unseen_share(const struct unseen_point *point, size_t count);
 
 /* Quantile `below` of the points' base colour under a map, or, if it is NULL, under the filled-in light. */
 double unseen_base_color(const struct unseen_point *point, size_t count, double below, const double *log_radiance);
 
 /* Fills the map. Segments of the points are below segment_count. */
-void unseen_fit(const struct unseen_point *point, size_t count, size_t segment_count,
-                double log_radiance[UNSEEN_CELLS]);
+void unseen_fit(const struct unseen_point *point, size_t count, size_t segment_count, double log_radiance[SKY_CELLS]);
 
 #endif

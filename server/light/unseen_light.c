@@ -4,7 +4,7 @@
 #include <math.h>
 
 #include "common/mem.h"
-#include "server/capture/fill.h"
+#include "server/light/light_sky.h"
 #include "server/light/survey.h"
 #include "server/light/unseen_fit.h"
 #include "server/render/sampler.h"
@@ -12,15 +12,10 @@
 #define POINTS 2048
 #define RAYS_PER_POINT 512 /* directions a point */
 #define KEY_UNSEEN 23      /* keeps these random numbers apart from others of the texel */
-/* A point speaks of the unseen directions where they have this share of its rays; so many must. */
-#define SHARE_LEAST 0.1f
-#define LEAST_POINTS 64
 /* Part of the light at a grey card that the unseen one must be, as guessed: what is wrong with the rest is taken for its
  * scale. Between a room whose light is all unseen and one where it is all seen (test_grey_card.c) it may be anything: .15 and .25 give
  * the same there. */
 #define CARD_LEAST 0.2
-/* At this many radians from what is seen 1/e of what was filled in from there is kept. */
-#define NEAR 0.1f
 /* Nothing is so white. Light is missing, and not only known badly, if more than the rest of the points are. */
 #define IMPOSSIBLE_BASE_COLOR 1.5
 #define NOT_IMPOSSIBLE 0.8
@@ -34,12 +29,9 @@ struct unseen {
     size_t count;
     struct unseen_point *point; /* [count] */
     struct unseen_point card;   /* the grey card's, where there is one */
-    double log_radiance[UNSEEN_CELLS];
-    float *angle; /* [map height][map width] to what is seen; NULL where there is no map */
+    double log_radiance[SKY_CELLS];
+    struct light_sky sky; /* what of the fill is kept */
 };
-
-/* The share of what was filled in that is kept. */
-static float kept_of_filled(const struct unseen *u, size_t cell) { return expf(-u->angle[cell] / NEAR); }
 
 /* --- looking around ------------------------------------------------------------------------------- */
 
@@ -52,22 +44,17 @@ static void look_from(const struct unseen *u, uint32_t texel, int thread, struct
     *p = (struct unseen_point){.segment = reconstruction_segment(r, texel)};
     if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at))
         return;
-    vec3 frame[3] = {[2] = at.shading};
-    vec3_frame(at.shading, &frame[0], &frame[1]);
-    for (uint32_t i = 0; i < RAYS_PER_POINT; i++)
-        in->direction[i] = incident_cosine_direction(frame, sampler_pair(key, i, 0));
+    incident_cosine_rays(&at, key, RAYS_PER_POINT, in->ray);
+    for (size_t i = 0; i < RAYS_PER_POINT; i++)
+        in->direction[i] = in->ray[i].direction;
     incident_trace(in, field, &at, key, 0, RAYS_PER_POINT);
     for (size_t i = 0; i < RAYS_PER_POINT; i++) {
         if (!in->escapes[i])
             continue;
         float share = 1.0f / RAYS_PER_POINT; /* of the ray, that is unseen */
-        if (u->angle)
-            share *= 1.0f - kept_of_filled(u, environment_cell(&r->environment, in->direction[i]));
-        p->filled += share * rgb_mean(in->radiance[i]);
-        p->unseen += share;
-        struct unseen_corners c = unseen_corners(in->direction[i]);
-        for (int k = 0; k < 4; k++)
-            p->share[c.cell[k]] += share * c.weight[k];
+        if (r->environment.map.pixel)
+            share *= 1.0f - light_sky_kept(&u->sky, environment_cell(&r->environment, in->direction[i]));
+        unseen_add_ray(p, in->direction[i], share, rgb_mean(in->radiance[i]));
     }
     struct irradiance light;
     irradiance_gather(&light, in, field, &at, key, RAYS_PER_POINT);
@@ -81,48 +68,24 @@ static void look_around(void *user, size_t index, int thread) {
     look_from(u, u->survey->texel[index], thread, &u->point[index]);
 }
 
-static double unseen_share(const struct unseen *u) {
-    double sum = 0.0;
-    for (size_t i = 0; i < u->count; i++)
-        sum += (double)u->point[i].unseen;
-    return sum / fmax((double)u->count, 1.0);
-}
-
-/* Keeps the points that speak of the unseen directions. */
-static void keep_telling_points(struct unseen *u) {
-    size_t kept = 0;
-    for (size_t i = 0; i < u->count; i++) {
-        if (u->point[i].unseen >= SHARE_LEAST)
-            u->point[kept++] = u->point[i];
-    }
-    u->count = kept;
-}
-
 /* --- the whole ------------------------------------------------------------------------------------ */
 
 static void fill_in(const struct unseen *u) {
     struct environment *e = &u->r->environment;
-    for (size_t row = 0; row < e->map.height; row++) {
-        for (size_t column = 0; column < e->map.width; column++) {
-            size_t at = row * e->map.width + column;
-            if (e->confidence.pixel[2 * at] > 0.0f)
-                continue;
-            struct unseen_corners c = unseen_corners(environment_direction(e, column, row));
-            double radiance = 0.0;
-            for (int k = 0; k < 4; k++)
-                radiance += (double)c.weight[k] * exp(u->log_radiance[c.cell[k]]);
-            float kept = u->angle ? kept_of_filled(u, at) : 0.0f, *pixel = e->map.pixel + 3 * at;
-            for (size_t channel = 0; channel < 3; channel++)
-                pixel[channel] = kept * pixel[channel] + (1.0f - kept) * (float)radiance;
-        }
+    for (size_t i = 0; i < environment_pixel_count(e); i++) {
+        if (environment_pixel_is_seen(e, i))
+            continue;
+        float radiance = (float)sky_cells_radiance(u->log_radiance, environment_pixel_direction(e, i));
+        float kept = light_sky_kept(&u->sky, i), *pixel = e->map.pixel + 3 * i;
+        for (size_t channel = 0; channel < 3; channel++)
+            pixel[channel] = kept * pixel[channel] + (1.0f - kept) * radiance;
     }
 }
 
 /* Fills the points: what they show, and what is around them. */
 static void gather_points(struct unseen *u, const struct views *views) {
     struct survey survey;
-    survey_lights_on(u->r, views, NULL);
-    survey_init(&survey, u->r, NULL, NULL, POINTS);
+    survey_init(&survey, u->r, views, NULL, NULL, POINTS);
     u->survey = &survey;
     u->count = survey.count;
     u->point = mem_array(u->count + 1, sizeof *u->point);
@@ -130,7 +93,6 @@ static void gather_points(struct unseen *u, const struct views *views) {
     if (u->r->grey_card.is_given)
         look_from(u, u->r->grey_card.texel, 0, &u->card);
     survey_release(&survey);
-    survey_lights_off(u->r);
 }
 
 /* Scales the map, whose level is a guess (nine tenths of base colours below that of white paint), so that base colour at
@@ -140,13 +102,13 @@ static void scale_by_card(struct unseen *u) {
     struct grey_card *card = &u->r->grey_card;
     const struct unseen_point *p = &u->card;
     double unseen = 0.0;
-    for (size_t k = 0; k < UNSEEN_CELLS; k++)
+    for (size_t k = 0; k < SKY_CELLS; k++)
         unseen += (double)p->share[k] * exp(u->log_radiance[k]);
     double wanted = (double)p->shown / card->pixel.value - (double)p->known;
     if (!card->is_given || !(unseen > 0.0) || unseen < CARD_LEAST * (unseen + (double)p->known) || !(wanted > 0.0))
         return;
     card->light_factor = wanted / unseen;
-    for (size_t k = 0; k < UNSEEN_CELLS; k++)
+    for (size_t k = 0; k < SKY_CELLS; k++)
         u->log_radiance[k] += log(card->light_factor);
 }
 
@@ -164,22 +126,19 @@ static void relight(struct unseen *u) {
 void unseen_light_estimate(struct reconstruction *r, const struct views *views) {
     struct unseen u = {.r = r};
     cJSON *figures = cJSON_AddObjectToObject(r->report, "unseen_light");
-    const struct image *known = &r->environment.confidence;
-    if (r->environment.map.pixel) {
-        u.angle = mem_array((size_t)known->width * known->height, sizeof *u.angle);
-        fill_angles(known, u.angle);
-    }
+    light_sky_init(&u.sky, &r->environment);
     gather_points(&u, views);
-    r->unseen_share = unseen_share(&u);
-    keep_telling_points(&u);
+    r->unseen_share = unseen_share(u.point, u.count);
+    u.count = unseen_keep_telling(u.point, u.count);
     double base_color = unseen_base_color(u.point, u.count, NOT_IMPOSSIBLE, NULL);
-    bool matters = u.count >= LEAST_POINTS && (base_color > IMPOSSIBLE_BASE_COLOR || r->unseen_share > MOSTLY_UNSEEN);
+    bool matters =
+        u.count >= UNSEEN_LEAST_POINTS && (base_color > IMPOSSIBLE_BASE_COLOR || r->unseen_share > MOSTLY_UNSEEN);
     if (matters)
         relight(&u);
     r->sky_is_fitted = matters;
     json_add_number(figures, "share_of_rays", r->unseen_share);
     json_add_number(figures, "base_color_without", base_color);
     json_add_bool(figures, "estimated", matters);
-    mem_free(u.angle);
+    light_sky_release(&u.sky);
     mem_free(u.point);
 }

@@ -7,19 +7,15 @@
 #include "common/mem.h"
 #include "common/ordered.h"
 #include "server/light/changing_light.h"
+#include "server/light/emitters.h"
 #include "server/light/lambert_mean.h"
 #include "server/light/sky_doubt.h"
 #include "server/material/emission_pattern.h"
 #include "server/reconstruct/inputs.h"
 #include "server/scene/by_segment.h"
 
-/* Least part of a segment's radiance beyond the reflection of base colour 1 that makes an emitter. White walls of
- * albedo .9 stay near .1; bowls around lamps, whose pixels mix with the lamp, stay below .25. Higher where all pixels
- * are mixed. */
-#define EMITTER_SHARE 0.25f
+/* EMITTER_SHARE where all pixels are mixed. */
 #define EMITTER_SHARE_MIXED 0.3f
-/* Added where all incident light is an estimate (unseen_light.h), which may be half of the truth. */
-#define EMITTER_SHARE_UNSEEN 0.25f
 /* Unobserved sky may be brighter than assumed by this factor of its radiance. */
 #define SKY_DOUBT 1.0f
 /* Part of a segment's surface whose light must have changed for it to be an emitter. */

@@ -50,7 +50,7 @@ static enum status make_atlas(const struct mesh *mesh, const struct mesh_look *l
     float *density = mem_array(mesh->triangle_count, sizeof *density), finest = 0.0f;
     double sum = 0.0;
     for (size_t t = 0; t < mesh->triangle_count; t++) {
-        double pixels = pixels_of(mesh, look, t), area = 0.5 * (double)vec3_length(mesh_cross(mesh, t));
+        double pixels = pixels_of(mesh, look, t), area = (double)mesh_triangle_area(mesh, t);
         density[t] = (float)sqrt(pixels / area);
         finest = fmaxf(finest, density[t]);
         sum += pixels;

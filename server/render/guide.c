@@ -94,7 +94,7 @@ static void add_point(struct guide_builder *l, vec3 point, vec3 normal) {
 static void sample_surface(struct guide_builder *l, const struct mesh *mesh) {
     double total = 0.0, until = 0.0;
     for (size_t i = 0; i < mesh->triangle_count; i++)
-        total += 0.5 * (double)vec3_length(mesh_cross(mesh, i));
+        total += (double)mesh_triangle_area(mesh, i);
     size_t at = 0;
     for (size_t i = 0; i < mesh->triangle_count; i++) {
         vec3 cross = mesh_cross(mesh, i);

@@ -11,7 +11,7 @@ void area_sampler_init(struct area_sampler *s, const struct mesh *mesh) {
     s->mesh = mesh;
     s->until = mem_array(mesh->triangle_count, sizeof *s->until);
     for (size_t t = 0; t < mesh->triangle_count; t++)
-        s->until[t] = sum += 0.5 * (double)vec3_length(mesh_cross(mesh, t));
+        s->until[t] = sum += (double)mesh_triangle_area(mesh, t);
 }
 
 void area_sampler_release(struct area_sampler *s) {

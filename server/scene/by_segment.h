@@ -1,4 +1,4 @@
-/* by_segment.h -- valid texels grouped by segment. */
+/* by_segment.h -- valid texels, and triangles, grouped by segment. */
 #ifndef UNBAKE_SCENE_BY_SEGMENT_H
 #define UNBAKE_SCENE_BY_SEGMENT_H
 
@@ -14,6 +14,14 @@ struct texels_by_segment {
     uint32_t *first; /* [segment_count + 1]; owned */
     uint32_t *texel; /* [valid_count]; owned */
 };
+
+/* The same of triangles, in the mesh's order. */
+struct triangles_by_segment {
+    uint32_t *first;    /* [segment_count + 1]; owned */
+    uint32_t *triangle; /* [triangle_count]; owned */
+};
+void by_segment_sort_triangles(struct triangles_by_segment *t, const struct segments *segments, size_t triangle_count);
+void by_segment_release_triangles(struct triangles_by_segment *t);
 
 void by_segment_sort(struct texels_by_segment *t, const struct segments *segments, const struct inverse_uv *inverse);
 void by_segment_release(struct texels_by_segment *t);

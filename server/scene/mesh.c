@@ -37,7 +37,7 @@ const char *mesh_object_name(const struct mesh *mesh, int64_t object_id) {
 double mesh_area(const struct mesh *mesh) {
     double sum = 0.0;
     for (size_t t = 0; t < mesh->triangle_count; t++)
-        sum += 0.5 * (double)vec3_length(mesh_cross(mesh, t));
+        sum += (double)mesh_triangle_area(mesh, t);
     return sum;
 }
 

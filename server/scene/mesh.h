@@ -67,6 +67,10 @@ uint32_t *mesh_weld(const struct mesh *mesh);
 
 /* Twice the area times the unit geometric normal of a triangle, m^2. */
 vec3 mesh_cross(const struct mesh *mesh, size_t triangle);
+/* Area of a triangle, m^2. */
+static inline float mesh_triangle_area(const struct mesh *mesh, size_t triangle) {
+    return 0.5f * vec3_length(mesh_cross(mesh, triangle));
+}
 /* The point with barycentrics (1 - b1 - b2, b1, b2), metres. */
 static inline vec3 mesh_point(const struct mesh *mesh, size_t triangle, float b1, float b2) {
     const uint32_t *v = mesh->index[triangle];

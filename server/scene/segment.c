@@ -120,7 +120,7 @@ static struct link *make_links(const struct mesh *mesh, const struct adjacency *
 static bool is_scan(const struct mesh *mesh, double total) {
     double squares = 0.0;
     for (size_t t = 0; t < mesh->triangle_count; t++) {
-        double area = 0.5 * (double)vec3_length(mesh_cross(mesh, t));
+        double area = (double)mesh_triangle_area(mesh, t);
         squares += area * area;
     }
     return squares * (double)mesh->triangle_count < SCAN_EVENNESS * total * total;
@@ -237,7 +237,7 @@ void segments_automatic(struct segments *s, const struct mesh *mesh) {
     double total = mesh_area(mesh);
     for (uint32_t t = 0; t < n; t++) {
         r.parent[t] = t;
-        r.area[t] = 0.5 * (double)vec3_length(mesh_cross(mesh, t));
+        r.area[t] = (double)mesh_triangle_area(mesh, t);
     }
     double bonus = SIZE_BONUS * total / BONUS_PARTS;
     for (size_t i = 0; i < link_count; i++) {

@@ -162,7 +162,7 @@ static void make_room_with_hole(struct mesh *m) {
 }
 
 /* Adds the form factors from a floor point to the parts of the hole that lie in each cell; returns their sum. */
-static double hole_factors(vec3 p, double cell[UNSEEN_CELLS]) {
+static double hole_factors(vec3 p, double cell[SKY_CELLS]) {
     double sum = 0.0, area = (double)(HOLE * HOLE) / (PARTS * PARTS);
     for (int i = 0; i < PARTS * PARTS; i++) {
         vec3 at = {0.5f + HOLE * ((float)(i % PARTS) + 0.5f) / PARTS, 3.0f,
@@ -170,7 +170,7 @@ static double hole_factors(vec3 p, double cell[UNSEEN_CELLS]) {
         vec3 way = vec3_sub(at, p);
         double square = (double)vec3_dot(way, way);
         double factor = area * (double)(way.y * way.y) / (PI * square * square);
-        struct unseen_corners c = unseen_corners(vec3_normalize(way));
+        struct sky_corners c = sky_cells_around(vec3_normalize(way));
         for (int k = 0; k < 4; k++)
             cell[c.cell[k]] += factor * (double)c.weight[k];
         sum += factor;
@@ -185,7 +185,7 @@ static double fit_sky(const struct rig *g, const struct light_points *points) {
     struct joint_fit fit;
     for (size_t i = 0; i < points->count; i++) {
         const struct light_point *p = &points->point[i];
-        double cell[UNSEEN_CELLS] = {0};
+        double cell[SKY_CELLS] = {0};
         float light = p->at.position.x > WALL_AT ? 0.0f : SKY * (float)hole_factors(p->at.position, cell);
         joint[i] = (struct joint_point){p->segment, p->patch, 0.5f * (0.1f + light), 0.1f, 0.05f};
         lit[i] = p->escaping;
@@ -201,7 +201,7 @@ static double fit_sky(const struct rig *g, const struct light_points *points) {
 }
 
 static void compare_sky(const struct light_points *points) {
-    double cell[2][UNSEEN_CELLS] = {{0}}, sum[2] = {0.0, 0.0};
+    double cell[2][SKY_CELLS] = {{0}}, sum[2] = {0.0, 0.0};
     for (size_t i = 0; i < points->count; i++) {
         const struct light_point *p = &points->point[i];
         if (p->at.position.x > WALL_AT + 0.3f) {
@@ -209,13 +209,13 @@ static void compare_sky(const struct light_points *points) {
             continue;
         }
         sum[0] += (double)p->escaping;
-        for (size_t k = 0; k < UNSEEN_CELLS && p->sky; k++)
+        for (size_t k = 0; k < SKY_CELLS && p->sky; k++)
             cell[0][k] += (double)p->sky[k];
         if (p->at.position.x < WALL_AT)
             sum[1] += hole_factors(p->at.position, cell[1]);
     }
     CHECK_NEAR(sum[0] / sum[1], 1.0, 0.02);
-    for (size_t k = 0; k < UNSEEN_CELLS; k++)
+    for (size_t k = 0; k < SKY_CELLS; k++)
         CHECK_THAT(fabs(cell[0][k] - cell[1][k]) < 0.03 * cell[1][k] + 0.003 * sum[1], "cell %zu: %g, %g", k,
                    cell[0][k], cell[1][k]);
 }
@@ -228,7 +228,7 @@ static void test_sky(void) {
     make_room_with_hole(&g.scene.mesh);
     rig_init(&g);
     light_sky_init(&sky, &g.r.environment);
-    survey_init(&survey, &g.r, NULL, NULL, 1600);
+    survey_init(&survey, &g.r, NULL, NULL, NULL, 1600);
     light_points_init(&points, &survey, &sky, NULL, 0.1f);
     survey_release(&survey);
     CHECK(points.count > 300);

@@ -123,7 +123,7 @@ static double check_areas(const struct atlas *atlas, const struct mesh *mesh) {
         const vec2 *c = atlas->corner[t];
         vec2 a = vec2_sub(c[1], c[0]), b = vec2_sub(c[2], c[0]);
         double texels = 0.5 * fabs((double)a.x * (double)b.y - (double)a.y * (double)b.x);
-        double wanted = 0.5 * (double)vec3_length(mesh_cross(mesh, t)) * scale;
+        double wanted = (double)mesh_triangle_area(mesh, t) * scale;
         double around = (double)(sqrtf(a.x * a.x + a.y * a.y) + sqrtf(b.x * b.x + b.y * b.y));
         double rounding = 2.0 * around / COVERAGE_UNITS + 1e-4 * wanted;
         wrong += texels > wanted + rounding || texels < least * wanted - rounding;

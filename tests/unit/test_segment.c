@@ -110,8 +110,7 @@ static double purity(const struct mesh *mesh, const struct segments *s, const st
     double *shared = mem_calloc(s->count * truth->count, sizeof *shared);
     double total = 0.0, pure = 0.0;
     for (size_t t = 0; t < mesh->triangle_count; t++)
-        shared[s->of_triangle[t] * truth->count + truth->of_triangle[t]] +=
-            0.5 * (double)vec3_length(mesh_cross(mesh, t));
+        shared[s->of_triangle[t] * truth->count + truth->of_triangle[t]] += (double)mesh_triangle_area(mesh, t);
     for (size_t i = 0; i < s->count; i++) {
         double most = 0.0;
         for (size_t j = 0; j < truth->count; j++) {
@@ -151,7 +150,7 @@ static void test_kitchen(void) {
     check_well_formed(&s, mesh.triangle_count);
     double *area = mem_calloc(s.count, sizeof *area), largest = 0.0;
     for (size_t t = 0; t < mesh.triangle_count; t++)
-        area[s.of_triangle[t]] += 0.5 * (double)vec3_length(mesh_cross(&mesh, t));
+        area[s.of_triangle[t]] += (double)mesh_triangle_area(&mesh, t);
     for (size_t i = 0; i < s.count; i++)
         largest = fmax(largest, area[i] / mesh_area(&mesh));
     printf("redkitchen: %zu segments, the largest is %.3f of the area\n", s.count, largest);

@@ -25,19 +25,19 @@ static float sky(vec3 d) { return d.y < 0.0f ? 0.2f : 0.2f + 3.0f * d.y; }
 static void test_corners(void) {
     for (uint64_t i = 0; i < 1000; i++) {
         vec3 d = direction_of(i, 100);
-        struct unseen_corners c = unseen_corners(d);
+        struct sky_corners c = sky_cells_around(d);
         float sum = 0.0f;
         for (int k = 0; k < 4; k++) {
-            CHECK(c.cell[k] < UNSEEN_CELLS && c.weight[k] >= 0.0f);
+            CHECK(c.cell[k] < SKY_CELLS && c.weight[k] >= 0.0f);
             sum += c.weight[k];
         }
         CHECK_NEAR(sum, 1.0, 1e-5);
     }
-    CHECK(unseen_corners((vec3){0, 1, 0}).cell[0] / UNSEEN_COLUMNS == 0);
-    CHECK(unseen_corners((vec3){0, -1, 0}).cell[0] / UNSEEN_COLUMNS == UNSEEN_ROWS - 1);
+    CHECK(sky_cells_around((vec3){0, 1, 0}).cell[0] / SKY_COLUMNS == 0);
+    CHECK(sky_cells_around((vec3){0, -1, 0}).cell[0] / SKY_COLUMNS == SKY_ROWS - 1);
     /* Around the seam, which is at -z: half the first column, half the last. */
-    struct unseen_corners seam = unseen_corners((vec3){0, 0, -1});
-    CHECK(seam.cell[0] % UNSEEN_COLUMNS == UNSEEN_COLUMNS - 1 && seam.cell[1] % UNSEEN_COLUMNS == 0);
+    struct sky_corners seam = sky_cells_around((vec3){0, 0, -1});
+    CHECK(seam.cell[0] % SKY_COLUMNS == SKY_COLUMNS - 1 && seam.cell[1] % SKY_COLUMNS == 0);
     CHECK_NEAR(seam.weight[0], seam.weight[1], 1e-6);
 }
 
@@ -51,7 +51,7 @@ static double make_points(struct unseen_point *point, float white[POINTS]) {
         *p = (struct unseen_point){.segment = (uint32_t)(i % SEGMENTS), .known = KNOWN, .unseen = 1.0f};
         for (uint64_t k = 0; k < WAYS; k++) {
             vec3 d = vec3_normalize(vec3_add(normal, vec3_scale(direction_of(i, 10 + 2 * k), 0.999f)));
-            struct unseen_corners c = unseen_corners(d);
+            struct sky_corners c = sky_cells_around(d);
             for (int m = 0; m < 4; m++)
                 p->share[c.cell[m]] += c.weight[m] / WAYS;
             light += sky(d) / WAYS;
@@ -67,11 +67,11 @@ static double make_points(struct unseen_point *point, float white[POINTS]) {
 
 /* Relative error of the light that arrives, root of the mean square. */
 static double fit_error(const struct unseen_point *point, const float *white) {
-    double map[UNSEEN_CELLS], error = 0.0;
+    double map[SKY_CELLS], error = 0.0;
     unseen_fit(point, POINTS, SEGMENTS, map);
     for (size_t i = 0; i < POINTS; i++) {
         double light = (double)point[i].known;
-        for (size_t k = 0; k < UNSEEN_CELLS; k++)
+        for (size_t k = 0; k < SKY_CELLS; k++)
             light += (double)point[i].share[k] * exp(map[k]);
         error += pow(light / (double)white[i] - 1.0, 2.0) / POINTS;
     }

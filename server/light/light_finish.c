@@ -1,0 +1,62 @@
+/* light_finish.c -- see light_finish.h. */
+#include "server/light/light_finish.h"
+
+#include <math.h>
+
+#include "common/mem.h"
+
+/* Colour: standard deviation of the logarithm of a channel about the mean of the channels. Black bodies of 2,700 K and
+ * 6,500 K are .5 off in blue, coloured lamps twice as much. */
+#define COLOR_DEVIATION 1.0
+#define MEASURED_DEVIATION 0.02 /* of a channel that does not saturate */
+#define COLOR_STEPS 8
+/* Of a lamp, by what the model lacks: the root mean square of errors of ten hidden lamps of the rooms for choices is .23,
+ * nearly all of it upwards. */
+#define SYSTEMATIC_DEVIATION 0.25
+
+/* Fits a channel of the lamps, whose means are known; the unseen sky is grey. */
+static void fit_channel(struct light_model *m, int channel) {
+    struct joint_point *joint = mem_array(m->points.count + 1, sizeof *joint);
+    struct joint_fit fit;
+    for (size_t i = 0; i < m->points.count; i++) {
+        const struct light_point *p = &m->points.point[i];
+        float known = (&p->known.r)[channel];
+        for (size_t k = 0; k < SKY_CELLS && m->has_sky && p->sky; k++)
+            known += p->sky[k] * (float)exp(m->fit.source[m->first_cell + k].value);
+        for (size_t k = 0; k < LIGHT_REGIONS && p->guessed; k++)
+            known += p->guessed[3 * k + (size_t)channel] * (float)exp(m->fit.source[m->first_guess + k].value);
+        joint[i] = (struct joint_point){p->segment, p->patch, (&p->observed.r)[channel], known, m->joint[i].deviation};
+    }
+    joint_fit_init(&fit, joint, m->points.count, 1 + m->lamps.count, m->r->pool);
+    for (size_t i = 0; i < m->lamps.count; i++) {
+        const struct light_lamp *lamp = &m->lamps.lamp[i];
+        double least = log(fmax((double)(&lamp->least.r)[channel], 1e-30)), mean = m->fit.source[lamp->source].value;
+        struct joint_source source = {.mean = mean, .deviation = COLOR_DEVIATION, .least = least, .value = mean};
+        if (lamp->kind == ESTIMATED_HIDDEN) {
+            source.least = -INFINITY;
+        } else if (lamp->kind == ESTIMATED_SEEN) {
+            double off = m->fit.source[lamp->source].value - m->fit.source[lamp->source].mean;
+            source = (struct joint_source){least + off, MEASURED_DEVIATION, -INFINITY, least + off, 0.0};
+        } else if (lamp->is_measured[channel]) {
+            source.mean = least, source.value = least, source.deviation = MEASURED_DEVIATION;
+        }
+        source.value = fmax(source.value, source.least);
+        joint_fit_add(&fit, &source, lamp->lit);
+    }
+    joint_fit_solve(&fit, COLOR_STEPS);
+    for (size_t i = 0; i < m->lamps.count; i++)
+        (&m->lamps.lamp[i].radiance.r)[channel] = (float)exp(fit.source[1 + i].value);
+    joint_fit_release(&fit);
+    mem_free(joint);
+}
+
+void light_finish(struct light_model *m) {
+    light_model_measure(m);
+    joint_fit_errors(&m->fit);
+    for (size_t i = 0; i < m->lamps.count; i++) {
+        double error = sqrt(m->patches_alike) * m->fit.source[m->lamps.lamp[i].source].error;
+        m->lamps.lamp[i].deviation = (float)sqrt(error * error + SYSTEMATIC_DEVIATION * SYSTEMATIC_DEVIATION);
+    }
+    for (int c = 0; c < 3 && m->lamps.count > 0; c++)
+        fit_channel(m, c);
+}

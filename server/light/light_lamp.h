@@ -1,0 +1,71 @@
+/* light_lamp.h -- the lamps of the joint fit (light_model.h), and the saturated sky and ground: which segments they are,
+ * what is known of their radiance, and what they send to points. */
+#ifndef UNBAKE_LIGHT_LIGHT_LAMP_H
+#define UNBAKE_LIGHT_LIGHT_LAMP_H
+
+#include "server/light/joint_model.h"
+#include "server/light/segment_light.h"
+#include "server/state/estimated_light.h"
+
+#define LIGHT_SATURATED_MOST 16 /* lamps of each kind */
+#define LIGHT_HIDDEN_MOST 16
+#define LIGHT_SEEN_MOST 24
+#define LIGHT_LAMPS_MOST (LIGHT_SATURATED_MOST + LIGHT_HIDDEN_MOST + LIGHT_SEEN_MOST + ENVIRONMENT_HALVES)
+#define LIGHT_ALIKE_MOST 16 /* segments that are one lamp */
+_Static_assert(LIGHT_SATURATED_MOST *LIGHT_ALIKE_MOST + LIGHT_HIDDEN_MOST + ENVIRONMENT_HALVES <= ESTIMATED_MOST,
+               "all lamps and the sky are reported");
+
+/* Standard deviation of the logarithm of a radiance of which photographs tell no more than where to begin: a lower bound,
+ * or the room's median. */
+#define LIGHT_UNKNOWN_DEVIATION 2.0
+
+/* A segment, several that look alike, or the saturated part of sky or ground, whose radiance is then a factor of the
+ * map's. */
+struct light_lamp {
+    enum estimated_kind kind;
+    size_t segment_count;
+    uint32_t segment[LIGHT_ALIKE_MOST];
+    rgb least;           /* observed radiance, a lower bound; 0 for hidden lamps */
+    bool is_measured[3]; /* by channel: not saturated, so that `least` is the radiance */
+    rgb radiance;        /* the estimate */
+    float deviation;     /* standard deviation of its logarithm */
+    size_t source;       /* in the fit */
+    float *lit;          /* [point count] column of the response; owned */
+};
+
+struct light_lamps {
+    const struct reconstruction *r; /* borrowed */
+    float median_radiance;          /* of the room */
+    struct segment_light light;
+    bool *is_lamp; /* [segment_count] segments of lamps, which known light goes without; owned */
+    size_t count;
+    struct light_lamp lamp[LIGHT_LAMPS_MOST];
+};
+
+void light_lamps_init(struct light_lamps *l, const struct reconstruction *r, float median_radiance);
+void light_lamps_release(struct light_lamps *l);
+
+/* The saturated part of a half of the environment: adds it; the one that there is, or NULL. */
+void light_lamps_add_half(struct light_lamps *l, size_t half);
+const struct light_lamp *light_lamps_half(const struct light_lamps *l, size_t half);
+
+/* Adds the lamps at which photographs saturate, by r->evidence (emitters_observe); with `again` those of r->light, and the
+ * hidden ones, instead. And those that photographs measure. */
+void light_lamps_choose(struct light_lamps *l, bool again);
+
+/* Adds a hidden lamp. */
+struct light_lamp *light_lamps_add_hidden(struct light_lamps *l, uint32_t segment);
+/* Removes a lamp; the last one takes its place. */
+void light_lamps_remove(struct light_lamps *l, size_t index);
+
+/* Whether there are lamps or sky of unknown radiance. */
+bool light_lamps_has_unknown(const struct light_lamps *l);
+
+/* What is known of a lamp; of a hidden one. */
+struct joint_source light_lamps_prior(const struct light_lamps *l, const struct light_lamp *lamp);
+struct joint_source light_lamps_hidden_prior(const struct light_lamps *l);
+
+/* Makes a lamp's column of the response. */
+void light_lamps_respond(const struct light_lamps *l, struct light_lamp *lamp, const struct light_points *points);
+
+#endif
