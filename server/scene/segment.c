@@ -17,6 +17,7 @@
 #include "common/mem.h"
 #include "common/rng.h"
 #include "server/scene/adjacency.h"
+#include "server/scene/segment_names.h"
 
 #define CONVEX_FACTOR                                                                                                  \
     0.3f            /* of the weight of a convex fold: objects are convex, and borders between objects are
@@ -40,12 +41,11 @@ static int ascending(const void *left, const void *right) {
 
 void segments_from_object_id(struct segments *s, const struct mesh *mesh) {
     size_t n = mesh->triangle_count;
-    s->is_given = true;
+    *s = (struct segments){.is_given = true};
     s->id = mem_array(n, sizeof *s->id);
     s->of_triangle = mem_array(n, sizeof *s->of_triangle);
     memcpy(s->id, mesh->object_id, n * sizeof *s->id);
     qsort(s->id, n, sizeof *s->id, ascending);
-    s->count = 0;
     for (size_t i = 0; i < n; i++)
         if (i == 0 || s->id[i] != s->id[i - 1])
             s->id[s->count++] = s->id[i];
@@ -213,8 +213,7 @@ static void number_regions(struct segments *s, struct regions *r, size_t triangl
     uint32_t *number = mem_array(triangle_count, sizeof *number);
     for (size_t t = 0; t < triangle_count; t++)
         number[t] = NONE;
-    s->is_given = false;
-    s->count = 0;
+    *s = (struct segments){0};
     s->of_triangle = mem_array(triangle_count, sizeof *s->of_triangle);
     for (uint32_t t = 0; t < triangle_count; t++) {
         uint32_t root = root_of(r, t);
@@ -257,6 +256,8 @@ void segments_automatic(struct segments *s, const struct mesh *mesh) {
     if (is_scan(mesh, total))
         merge_debris(&r, mesh, total / SMALL_PARTS);
     number_regions(s, &r, n);
+    s->name = segment_names_make(s->of_triangle, s->count, mesh);
+    s->name_count = s->name ? s->count : 0;
     mem_free(r.parent);
     mem_free(r.area);
     mem_free(r.inside);
@@ -265,10 +266,16 @@ void segments_automatic(struct segments *s, const struct mesh *mesh) {
 }
 
 const char *segments_name(const struct segments *s, const struct mesh *mesh, size_t segment) {
-    return s->is_given ? mesh_object_name(mesh, s->id[segment]) : NULL;
+    int64_t id = s->id[segment];
+    if (s->is_given)
+        return mesh_object_name(mesh, id);
+    return id >= 0 && (uint64_t)id < s->name_count ? s->name[id] : NULL;
 }
 
 void segments_release(struct segments *s) {
+    for (size_t i = 0; i < s->name_count; i++)
+        mem_free(s->name[i]);
+    mem_free(s->name);
     mem_free(s->of_triangle);
     mem_free(s->id);
     *s = (struct segments){0};

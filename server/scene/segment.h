@@ -17,12 +17,15 @@ struct segments {
     bool is_given;         /* by the input: `id` is its object_id */
     int64_t *id;           /* [count] the input's object_id, or the segment's own number; of a part that was split
                             * off: that of the whole; owned */
+    size_t name_count;
+    char **name; /* [name_count] of automatic segments by `id` (segment_names.h); none: NULL; owned */
 };
 
 void segments_from_object_id(struct segments *s, const struct mesh *mesh); /* needs object_id */
 /* Deterministic; a few seconds for millions of triangles. */
 void segments_automatic(struct segments *s, const struct mesh *mesh);
-/* What the input calls the object that the segment is or is part of; borrowed from the mesh; NULL: nothing. */
+/* What the input calls the object that the segment is or is part of; of several automatic segments in one object
+ * numbered; borrowed; NULL: nothing. */
 const char *segments_name(const struct segments *s, const struct mesh *mesh, size_t segment);
 void segments_release(struct segments *s);
 

@@ -55,7 +55,7 @@ static inline struct mesh room_grid(uint32_t columns, uint32_t rows, vec3 (*plac
 
 /* One segment for all. */
 static inline void room_one_segment(struct segments *segments, const struct mesh *mesh) {
-    segments->count = 1;
+    *segments = (struct segments){.count = 1};
     segments->of_triangle = mem_calloc(mesh->triangle_count, sizeof *segments->of_triangle);
     segments->id = mem_calloc(1, sizeof *segments->id);
 }

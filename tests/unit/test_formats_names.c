@@ -46,6 +46,12 @@ static void test_named(const char *dir, struct export_input *in, struct mesh *ro
     CHECK_THAT(utf8_valid(label, strlen(label), NULL) && strlen(label) > PARTS_LABEL_BYTES - 5, "%s", label);
     name[1] = "";
     CHECK(segments_name(&named, room, 1) == NULL && segments_name(&automatic, room, 0) == NULL);
+    automatic.name = (char *[]){"wall (2)"};
+    automatic.name_count = 1;
+    parts_label(&automatic, room, 0, label);
+    CHECK_STRING(label, "segment_0_wall_2");
+    parts_label(&automatic, room, 1, label);
+    CHECK_STRING(label, "segment_1");
     for (size_t i = 0; i < sizeof table / sizeof *table; i++) {
         struct error err = {.message = ""};
         struct buf file;

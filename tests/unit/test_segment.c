@@ -105,6 +105,50 @@ static void test_shapes(void) {
     mesh_release(&mesh);
 }
 
+/* The corridor's walls are one object, its floor another, of which a sliver of the left wall is part; its segments are the
+ * left wall, the floor, the right wall in this order. */
+static void test_names(void) {
+    static const struct {
+        const char *of_object[2];
+        float floor_from_u; /* the floor is u from .4 to .6 */
+        const char *wanted[3];
+    } table[] = {
+        {{"walls", "floor"}, 0.4f, {"walls (1)", "floor", "walls (2)"}},
+        {{"walls", ""}, 0.4f, {"walls (1)", NULL, "walls (2)"}},
+        {{"", ""}, 0.4f, {NULL, NULL, NULL}},
+        {{"walls", "floor"}, 0.38f, {"walls (1)", "floor", "walls (2)"}}, /* 1/20 of the left wall is called floor */
+        {{"walls", "floor"}, 0.25f, {NULL, "floor", "walls"}},            /* 3/8 of it: it has no name */
+    };
+    struct mesh mesh = room_grid(100, 40, corridor, NULL);
+    mesh.object_id = mem_array(mesh.triangle_count, sizeof *mesh.object_id);
+    mesh.name = mem_array(2, sizeof *mesh.name);
+    mesh.name_count = 2;
+    for (size_t i = 0; i < sizeof table / sizeof *table; i++) {
+        for (size_t t = 0; t < mesh.triangle_count; t++) {
+            float u = ((float)(t / 2 % 100) + 0.5f) / 100.0f;
+            mesh.object_id[t] = u > table[i].floor_from_u && u < 0.6f;
+        }
+        for (int k = 0; k < 2; k++)
+            mesh.name[k] = mem_printf("%s", table[i].of_object[k]);
+        struct segments s;
+        segments_automatic(&s, &mesh);
+        CHECK(s.count == 3);
+        for (size_t k = 0; k < 3; k++) {
+            const char *name = segments_name(&s, &mesh, k), *wanted = table[i].wanted[k];
+            CHECK_THAT(wanted ? name && strcmp(name, wanted) == 0 : !name, "row %zu, segment %zu: %s", i, k,
+                       name ? name : "no name");
+        }
+        s.id = mem_realloc_array(s.id, 4, sizeof *s.id); /* a part is split off the last one, as light/split.c does */
+        s.id[s.count++] = s.id[2];
+        CHECK(segments_name(&s, &mesh, 3) == segments_name(&s, &mesh, 2));
+        segments_release(&s);
+        for (int k = 0; k < 2; k++)
+            mem_free(mesh.name[k]);
+    }
+    mesh.name_count = 0;
+    mesh_release(&mesh);
+}
+
 /* Share of the area whose segment's main object is its own. */
 static double purity(const struct mesh *mesh, const struct segments *s, const struct segments *truth) {
     double *shared = mem_calloc(s->count * truth->count, sizeof *shared);
@@ -165,6 +209,7 @@ int main(void) {
     test_ids();
     test_scan();
     test_shapes();
+    test_names();
     test_room("rooms/staircase2", 0.95, 400);
     test_room("rooms/bathroom", 0.98, 1500);
     test_kitchen();
