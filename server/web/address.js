@@ -1,6 +1,7 @@
 // address.js -- what is looked at is in the address, after #: a reload, a bookmark and the back button keep it.
 //
-//   job: the number of the job that is looked at; with: of the one beside it; q, state: what the list shows
+//   job: the number of the job that is looked at; with: of the one beside it; scene: the room whose check is shown;
+//   q, state: what the list shows
 
 const listeners = new Set();
 

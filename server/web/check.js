@@ -1,6 +1,8 @@
-// check.js -- a new room: it is sent, its check is shown while it goes on, and a job is started.
+// check.js -- a new room: it is sent, its check is shown while it goes on, and a job is started. The address names the
+// room, so that a reload keeps its check.
 
 import { $, element, showEach } from "./dom.js";
+import { go, place } from "./address.js";
 import { get, load, post, send } from "./ask.js";
 import { openLarge } from "./pictures.js";
 import { givenSettings, showSettings } from "./settings.js";
@@ -23,7 +25,9 @@ async function sendFiles(files) {
       $("sent-words").textContent = words;
     });
     for (const id of ["archive", "folder"]) $(id).value = "";
+    named = scene.id;
     watchCheck(scene);
+    go({ scene: named });
   } catch (problem) {
     $("submit-problem").textContent = problem.message;
   }
@@ -59,9 +63,28 @@ const VERDICTS = {
 };
 const CHECK_LOOK_MS = 700;
 let checked = null; // the scene whose check is shown
+let named = null;   // its id, as the address has it
+
+// The room that the address names, if any.
+export async function showScene() {
+  const id = place().scene ?? null;
+  if (id === named) return;
+  forgetCheck();
+  named = id;
+  if (id === null) return;
+  $("new").open = true;
+  try {
+    const scene = await get(`v1/scenes/${encodeURIComponent(id)}`);
+    if (named !== id) return; // another was chosen meanwhile
+    watchCheck(scene);
+    $("check").scrollIntoView();
+  } catch (problem) {
+    if (named === id) $("submit-problem").textContent = problem.message;
+  }
+}
 
 // Until its check has ended; one that waits for room on the server's disk says so.
-export async function watchCheck(scene) {
+async function watchCheck(scene) {
   checked = scene;
   $("check-problem").textContent = "";
   showCheck();
@@ -86,7 +109,8 @@ function describeCheck(scene, fit) {
 }
 
 export function forgetCheck() {
-  checked = null;
+  checked = named = null;
+  $("submit-problem").textContent = "";
   showCheck();
 }
 

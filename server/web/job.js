@@ -48,6 +48,7 @@ export class JobView {
     this.roomRender = null;
     this.slider = new Slider(this.at("compare"));
     this.mixer = new Mixer(this.at("mixer"), this.server, () => (this.room?.mesh ? this.room.frame() : null), goTo);
+    this.at("again").addEventListener("click", () => go({ scene: this.server.jobs.get(this.id).scene }));
     this.at("close").addEventListener("click", () => go({ [this.slot]: null }));
     this.at("log-details").addEventListener("toggle", () => this.showLog());
     this.at("beside").hidden = this.slot !== "job";
@@ -75,6 +76,7 @@ export class JobView {
     this.at("job-progress").value = job.state === "succeeded" ? 1 : job.progress;
     this.at("job-progress").hidden = TERMINAL.includes(job.state);
     this.at("reason").textContent = [job.reason, job.hint].filter(Boolean).join(". ");
+    this.at("again").hidden = !job.scene || job.kind === "render" || this.server.me.role === "viewer";
     this.showActions(job);
     this.showFigures(job);
     this.mixer.show(job);

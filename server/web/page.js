@@ -3,7 +3,7 @@
 import { $, bytes } from "./dom.js";
 import { get, onSignedOut } from "./ask.js";
 import { go, onMove, place } from "./address.js";
-import { forgetCheck, onStarted } from "./check.js";
+import { forgetCheck, onStarted, showScene } from "./check.js";
 import { JobView } from "./job.js";
 import { showList } from "./list.js";
 import { forgetPeople, showPeople } from "./people.js";
@@ -45,7 +45,7 @@ $("sign-out").addEventListener("click", async () => {
   server.jobs.clear();
   forgetCheck();
   forgetPeople();
-  go({ job: null, with: null });
+  go({ job: null, with: null, scene: null });
   start();
 });
 
@@ -73,6 +73,7 @@ function showPlace() {
   }
   $("jobs-shown").classList.toggle("two", $("jobs-shown").children.length > 1);
   showList(server.jobs);
+  if (server.me) showScene();
 }
 onMove(showPlace);
 
@@ -125,7 +126,7 @@ async function loadJobs() {
 
 onStarted((job) => {
   server.jobs.set(job.id, job);
-  go({ job: job.id, with: null });
+  go({ job: job.id, with: null, scene: null });
 });
 
 // --- start ----------------------------------------------------------------------------------

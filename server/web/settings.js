@@ -32,8 +32,8 @@ function input(setting) {
 
 function row(setting) {
   const line = element("div", null, { className: "setting" }), made = [input(setting)].flat();
-  const unit = setting.unit ? ` (${setting.unit})` : "";
-  line.append(element("label", setting.name.replaceAll("_", " ") + unit, { htmlFor: made[0].id }), ...made,
+  const unit = setting.unit ? ` (${setting.unit})` : "", name = setting.unit === "s" ? setting.name.replace(/_sec$/, "") : setting.name;
+  line.append(element("label", name.replaceAll("_", " ") + unit, { htmlFor: made[0].id }), ...made,
     element("p", setting.help, { className: "quiet", id: `${made[0].id}-help` }));
   made[0].setAttribute("aria-describedby", `${made[0].id}-help`);
   return line;

@@ -2,7 +2,8 @@
  * the id of a scene that is ready and its data folder; then reads commands, one a line, and answers each "ok" or
  * with an error's message:
  *
- *   start JOB | succeed JOB ATTEMPT | fail JOB ATTEMPT | stop JOB ATTEMPT | ready FACTS (of the scene)
+ *   start JOB | succeed JOB ATTEMPT | fail JOB ATTEMPT | stop JOB ATTEMPT
+ *   tell FACTS | ready FACTS | reject PROBLEMS (of the scene: facts while it is checked, the check's end)
  *
  * Ends with its input. */
 #include "tests/api/rig.h"
@@ -13,6 +14,10 @@ static enum status obey(struct rig *rig, const char *line, struct error *err) {
     int attempt = 0;
     if (strncmp(line, "ready ", 6) == 0)
         return store_scene_ready(rig->store, RIG_SCENE, NULL, line + 6, err);
+    if (strncmp(line, "tell ", 5) == 0)
+        return store_scene_tell(rig->store, RIG_SCENE, NULL, line + 5, err);
+    if (strncmp(line, "reject ", 7) == 0)
+        return store_scene_reject(rig->store, RIG_SCENE, NULL, line + 7, "{}", err);
     int count = sscanf(line, "%15s %lld %d", word, &job, &attempt);
     if (count == 2 && strcmp(word, "start") == 0)
         return store_job_start(rig->store, job, "process", &attempt, err);
