@@ -43,7 +43,7 @@ void html_number(struct buf *out, double value) {
 void html_value(struct buf *out, const cJSON *value) {
     if (cJSON_IsNumber(value)) {
         html_number(out, value->valuedouble);
-    } else if (cJSON_IsString(value)) {
+    } else if (cJSON_IsString(value) && value->valuestring[0] != '\0') {
         html_text(out, value->valuestring);
     } else if (cJSON_IsBool(value)) {
         buf_puts(out, cJSON_IsTrue(value) ? "yes" : "no");

@@ -93,18 +93,21 @@ static void put_figure(struct buf *out, const cJSON *figure) {
     buf_puts(out, " ");
     html_number(out, figure->valuedouble);
     buf_puts(out, good);
-    buf_puts(out, ";&ensp;");
 }
 
 /* Those that say most, or the others, in the order of the report. */
 static void put_figures(struct buf *out, const cJSON *view, bool main) {
     static const char *const chosen[] = {"msre", "psnr_db", "ssim"};
+    const char *between = "";
     for (const cJSON *m = view ? view->child : NULL; m; m = m->next) {
         bool is_chosen = false;
         for (size_t i = 0; i < sizeof chosen / sizeof *chosen; i++)
             is_chosen = is_chosen || strcmp(chosen[i], m->string) == 0;
-        if (cJSON_IsNumber(m) && is_chosen == main)
-            put_figure(out, m);
+        if (!cJSON_IsNumber(m) || is_chosen != main)
+            continue;
+        buf_puts(out, between);
+        put_figure(out, m);
+        between = ";&ensp;";
     }
 }
 

@@ -42,8 +42,8 @@ int main(void) {
     CHECK(says(bad, "brightness of 1 source of light cannot be told well: the standard deviation is up to 50 %"));
     CHECK(!says(bad, "No weakness is known"));
     const char *holes = "{\"holes\": {\"filled\": 2, \"filled_m2\": 3.25, \"openings_kept\": 1, \"openings_m2\": 0.5}}";
-    CHECK(says(holes, "2 holes of the mesh were filled, 3.2 m2"));
-    CHECK(says(holes, "1 opening of the mesh, 0.5 m2, is taken for a way out"));
+    CHECK(says(holes, "2 holes of the mesh were filled, 3.2 m²"));
+    CHECK(says(holes, "1 opening of the mesh, 0.5 m², is taken for a way out"));
     CHECK(!says(good, "of the mesh"));
     CHECK(!says(bad, "outlines") && !says(good, "outlines"));
     const char *outlines = "{\"metrics\": {\"held_out_views\": 1, \"psnr_db\": 25, \"msre\": 0.1, "
