@@ -341,10 +341,14 @@ static void sort_by_frame(struct pose_solver *s) {
     size_t *next = mem_array(s->frames + 1, sizeof *next);
     memcpy(next, s->first_of_frame, s->frames * sizeof *next);
     s->of_frame = mem_array(s->first_of_frame[s->frames] + 1, sizeof *s->of_frame);
+    s->lever = mem_array(s->first_of_frame[s->frames] + 1, sizeof *s->lever);
+    s->pull = mem_array(s->first_of_frame[s->frames] + 1, sizeof *s->pull);
+    s->place = mem_array(s->track_count * POSE_OBSERVATIONS_MAX + 1, sizeof *s->place);
     for (size_t t = 0; t < s->track_count; t++) {
         for (size_t k = 0; k < pose_observation_count(s->track[t]) && !pose_is_held_out(t); k++) {
             size_t i = t * POSE_OBSERVATIONS_MAX + k;
-            s->of_frame[next[s->observation[i].frame]++] = (uint32_t)i;
+            s->place[i] = (uint32_t)next[s->observation[i].frame]++;
+            s->of_frame[s->place[i]] = (uint32_t)i;
         }
     }
     mem_free(next);
@@ -366,7 +370,6 @@ void pose_solver_init(struct pose_solver *s, const struct tracks *tracks, struct
         }
     }
     s->observation = mem_calloc(s->track_count * POSE_OBSERVATIONS_MAX + 1, sizeof *s->observation);
-    s->pull = mem_array(s->track_count * POSE_OBSERVATIONS_MAX + 1, sizeof *s->pull);
     s->along = mem_calloc(s->track_count + 1, sizeof *s->along);
     for (size_t i = 0; i < s->track_count; i++)
         init_observations(s, i);
@@ -385,6 +388,8 @@ void pose_solver_release(struct pose_solver *s) {
     mem_free(s->observation);
     mem_free(s->first_of_frame);
     mem_free(s->of_frame);
+    mem_free(s->place);
+    mem_free(s->lever);
     mem_free(s->pull);
     mem_free(s->along);
 }

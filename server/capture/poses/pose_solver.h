@@ -65,6 +65,13 @@ struct pose_observation {
     float d[POSE_UNKNOWNS]; /* derivative of `value` by the frame's twist, per pixel */
 };
 
+/* What a frame needs of an observation. Frames read theirs one after the other: through of_frame a sum would wait for
+ * memory at each. */
+struct pose_lever {
+    float d[POSE_UNKNOWNS], weight;
+    uint32_t offset;
+};
+
 /* Prior of corrections along the order of the photographs: variances of a step, of each axis (pose_walk.h). */
 struct pose_walk {
     bool is_known, is_learnt;            /* learnt: pose_solve improves the variances */
@@ -81,7 +88,9 @@ struct pose_solver {
     struct pose_observation *observation; /* [track_count][POSE_OBSERVATIONS_MAX], the owner's first */
     size_t *first_of_frame;               /* [frames + 1] into of_frame */
     uint32_t *of_frame;       /* observations of tracks that are not held out, by frame, in the order of tracks */
-    double *pull;             /* [track_count][POSE_OBSERVATIONS_MAX] scratch of pose_solve */
+    uint32_t *place;          /* [track_count][POSE_OBSERVATIONS_MAX] of each in of_frame */
+    struct pose_lever *lever; /* of each in of_frame; scratch of pose_solve, as the next */
+    double *pull;             /* of each in of_frame: its weight times its error less the track's mean */
     float (*along)[2];        /* [track_count] mean change of the value per `right` and `down`, at this level */
     struct pose_frame *frame; /* [frames] */
     double *x;                /* [unknowns]: twist of each frame, then POSE_CELLS offsets of each */

@@ -57,18 +57,19 @@ static double error_of(const struct product *p, const struct pose_observation *o
 static void pull_of_track(const struct product *p, size_t track) {
     const struct pose_solver *s = p->solver;
     const struct pose_observation *observation = s->observation + track * POSE_OBSERVATIONS_MAX;
-    double *pull = s->pull + track * POSE_OBSERVATIONS_MAX, sum = 0.0, weight = 0.0;
+    const uint32_t *place = s->place + track * POSE_OBSERVATIONS_MAX;
+    double error[POSE_OBSERVATIONS_MAX], sum = 0.0, weight = 0.0;
     size_t count = pose_observation_count(s->track[track]);
     for (size_t k = 0; k < count; k++) {
         if (!(observation[k].weight > 0.0f))
             continue;
-        pull[k] = error_of(p, &observation[k]);
-        sum += (double)observation[k].weight * pull[k];
+        error[k] = error_of(p, &observation[k]);
+        sum += (double)observation[k].weight * error[k];
         weight += (double)observation[k].weight;
     }
     for (size_t k = 0; k < count; k++)
         if (observation[k].weight > 0.0f)
-            pull[k] = (double)observation[k].weight * (pull[k] - sum / weight);
+            s->pull[place[k]] = (double)observation[k].weight * (error[k] - sum / weight);
 }
 
 static void pull_of_chunk(void *user, size_t chunk, int thread) {
@@ -88,13 +89,12 @@ static void sum_frame(void *user, size_t f, int thread) {
     if (p->start)
         p->start(p->user, f, p->x, p->out);
     for (size_t i = s->first_of_frame[f]; i < s->first_of_frame[f + 1]; i++) {
-        const struct pose_observation *observation = &s->observation[s->of_frame[i]];
-        if (!(observation->weight > 0.0f))
+        const struct pose_lever *lever = &s->lever[i];
+        if (!(lever->weight > 0.0f))
             continue;
-        double r = s->pull[s->of_frame[i]];
         for (int j = 0; j < POSE_UNKNOWNS; j++)
-            twist[j] += r * (double)observation->d[j];
-        p->out[observation->offset] -= r;
+            twist[j] += s->pull[i] * (double)lever->d[j];
+        p->out[lever->offset] -= s->pull[i];
     }
 }
 
@@ -144,7 +144,8 @@ static void multiply(const void *user, const double *x, double *out) {
     project(s, out);
 }
 
-static void sum_blocks(void *user, size_t f, int thread) {
+/* Takes the frame's observations, and adds up its block of the matrix. */
+static void take_frame(void *user, size_t f, int thread) {
     (void)thread;
     const struct twist_system *system = user;
     const struct pose_solver *s = system->solver;
@@ -152,8 +153,12 @@ static void sum_blocks(void *user, size_t f, int thread) {
     double(*a)[POSE_UNKNOWNS] = p->block[f];
     for (size_t at = s->first_of_frame[f]; at < s->first_of_frame[f + 1]; at++) {
         const struct pose_observation *observation = &s->observation[s->of_frame[at]];
+        struct pose_lever *lever = &s->lever[at];
+        lever->weight = observation->weight;
         if (!(observation->weight > 0.0f))
             continue;
+        memcpy(lever->d, observation->d, sizeof lever->d);
+        lever->offset = observation->offset;
         double w = (double)observation->weight;
         p->diagonal[observation->offset] += w;
         for (int i = 0; i < POSE_UNKNOWNS; i++)
@@ -167,7 +172,7 @@ static void preconditioner_init(struct twist_system *system) {
     struct preconditioner *p = &system->preconditioner;
     p->block = mem_calloc(s->frames + 1, sizeof *p->block);
     p->diagonal = mem_calloc(s->unknowns + 1, sizeof *p->diagonal);
-    parallel_for(s->pool, s->frames, sum_blocks, system);
+    parallel_for(s->pool, s->frames, take_frame, system);
     for (size_t f = 0; f < s->frames; f++) {
         double walk[2] = {0.0, 0.0};
         if (s->walk.is_known)
