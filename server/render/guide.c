@@ -134,8 +134,12 @@ static float light_between(const struct guide_builder *l, const struct guide_poi
     return area * emitted * received / (distance * distance + area);
 }
 
-static void estimate_row(const struct guide_builder *l, size_t row) {
+/* Row 0 is by power. */
+static void estimate_row(void *user, size_t index, int thread) {
+    const struct guide_builder *l = user;
     const struct guide *g = l->g;
+    size_t row = index + 1;
+    (void)thread;
     for (size_t patch = 0; patch < g->patch_count; patch++) {
         float sum = 0.0f;
         for (size_t i = 0; i < l->point_count[row]; i++) {
@@ -168,7 +172,8 @@ static void plan_searches(struct guide *g) {
     g->stride = step > 0 ? 2 * step : 1;
 }
 
-struct guide *guide_new(const struct lights *lights, const struct mesh *mesh, const struct accel *accel) {
+struct guide *guide_new(const struct lights *lights, const struct mesh *mesh, const struct accel *accel,
+                        struct parallel *pool) {
     if (!(lights->triangles.total > 0.0))
         return NULL;
     struct guide *g = mem_calloc(1, sizeof *g);
@@ -188,8 +193,7 @@ struct guide *guide_new(const struct lights *lights, const struct mesh *mesh, co
     g->power = mem_array(g->patch_count, sizeof *g->power);
     plan_searches(g);
     g->cumulative = mem_calloc_large(g->row_count * g->stride, sizeof *g->cumulative);
-    for (size_t row = 1; row < g->row_count; row++)
-        estimate_row(&l, row);
+    parallel_for(pool, g->row_count - 1, estimate_row, &l);
     mem_free(l.point);
     mem_free(l.point_count);
     guide_update(g, lights);

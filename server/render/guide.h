@@ -14,6 +14,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "common/parallel.h"
 #include "common/vec.h"
 #include "server/render/accel.h"
 #include "server/render/light.h"
@@ -42,7 +43,8 @@ struct guide {
 };
 
 /* NULL when there are too many patches for a guide to pay off. */
-struct guide *guide_new(const struct lights *lights, const struct mesh *mesh, const struct accel *accel);
+struct guide *guide_new(const struct lights *lights, const struct mesh *mesh, const struct accel *accel,
+                        struct parallel *pool);
 void guide_free(struct guide *guide);
 
 /* Takes over changed radiances of the lights that the guide was made for. */

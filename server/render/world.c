@@ -35,6 +35,7 @@ enum status world_init(struct world *w, const struct mesh *mesh, const struct se
     w->segments = segments;
     w->atlas = atlas;
     w->materials = materials;
+    w->pool = pool;
     w->triangle = mem_calloc_large(mesh->triangle_count, sizeof *w->triangle);
     for (size_t i = 0; i < mesh->triangle_count; i++)
         bake_triangle(&w->triangle[i], w, i);
@@ -64,7 +65,7 @@ void world_update_lights(struct world *w) {
     bool others = lights_update(w->lights, w->mesh, w->segments, w->atlas, w->materials);
     if (others) {
         guide_free(w->guide);
-        w->guide = guide_new(w->lights, w->mesh, w->accel);
+        w->guide = guide_new(w->lights, w->mesh, w->accel, w->pool);
     } else if (w->guide) {
         guide_update(w->guide, w->lights);
     }

@@ -28,10 +28,11 @@ struct world_triangle {
 };
 
 struct world {
-    const struct mesh *mesh; /* borrowed, all four */
+    const struct mesh *mesh; /* borrowed, all five */
     const struct segments *segments;
     const struct atlas *atlas;
     const struct materials *materials; /* may change between batches; then call world_update_lights */
+    struct parallel *pool;             /* makes the guide */
     struct world_triangle *triangle;   /* [triangle_count] owned */
     struct accel *accel;               /* owned */
     struct lights *lights;             /* owned */
@@ -50,7 +51,7 @@ void world_release(struct world *world);
 void world_set_environment(struct world *world, const struct image *environment, struct parallel *pool);
 
 /* Takes over changed emission. If the set of emitting segments changed, the guide is rebuilt, in a fraction of a
- * second. */
+ * second, by the pool: not to be called from a body of it. */
 void world_update_lights(struct world *world);
 
 #endif

@@ -21,6 +21,7 @@ struct box {
     struct atlas atlas;
     struct materials materials;
     struct world world;
+    struct parallel *pool; /* of the world; owned; NULL: it was not built here */
 };
 
 static inline void box_quad(struct box *b, vec3 corner, vec3 u, vec3 v, uint32_t segment, float left, float top,
@@ -88,15 +89,15 @@ static inline void box_open(struct box *b) {
 
 /* After the geometry and materials are as they shall be. */
 static inline void box_build(struct box *b) {
-    struct parallel *pool = parallel_new(1);
     struct error err;
-    CHECK(world_init(&b->world, &b->mesh, &b->segments, &b->atlas, &b->materials, NULL, pool, &err) == STATUS_OK);
-    parallel_free(pool);
+    b->pool = parallel_new(1);
+    CHECK(world_init(&b->world, &b->mesh, &b->segments, &b->atlas, &b->materials, NULL, b->pool, &err) == STATUS_OK);
 }
 
 static inline void box_release(struct box *b) {
     if (b->world.accel)
         world_release(&b->world);
+    parallel_free(b->pool);
     mem_free(b->mesh.position);
     mem_free(b->mesh.index);
     mem_free(b->segments.of_triangle);

@@ -115,6 +115,11 @@ int main(void) {
     check_parts(&b);
     for (size_t row = 0; row < b.world.guide->row_count; row += 1 + b.world.guide->row_count / 8)
         check_density(&b, row);
+    struct parallel *three = parallel_new(3);
+    struct guide *same = guide_new(b.world.lights, &b.mesh, b.world.accel, three);
+    CHECK(memcmp(same->transfer, b.world.guide->transfer, same->row_count * same->patch_count * sizeof(float)) == 0);
+    guide_free(same);
+    parallel_free(three);
     /* Emission changed, and taken over. */
     b.materials.emission[1] = (rgb){0.5f, 2.0f, 0.1f};
     world_update_lights(&b.world);
