@@ -6,19 +6,9 @@
 #include "common/mem.h"
 #include "server/material/specular_misfit.h"
 #include "server/material/specular_observation.h"
+#include "server/material/specular_points.h"
 #include "server/material/specular_posterior.h"
 
-/* A segment is sampled well enough with this many points, or with one in PART_ENOUGH of those wanted if that is more.
- * With fewer, pixels nearer to edges are used too, then smaller patches. 32 points of 3 views decide between
- * candidates whose misfits differ by a fifth (1 / sqrt(32)) of a point's. */
-#define POINTS_ENOUGH 32 /* +25 %: no change */
-#define PART_ENOUGH 8    /* +25 %: 0 dB, roughness -0.14, specular -0.20 */
-#define MIN_VIEWS 3      /* observations of a point; to 4: +0.06 dB, roughness +1.45, specular +1.60 */
-/* Standard error, as a part of the misfit, from errors that all texels of a segment share: incident light, base colour
- * and, where every pixel is near an edge, light of other surfaces. Near window bars and door frames the true material's
- * misfit is up to a tenth above that of a diffuse one. */
-#define MISFIT_FLOOR 0.01      /* +25 %: -0.11 dB, roughness -1.35, specular +0.33 */
-#define MISFIT_FLOOR_EDGE 0.03 /* +25 %: 0 dB */
 /* Probability from which a segment is diffuse; below, the posterior mean has the smaller error. */
 #define DIFFUSE_CERTAIN 0.95 /* +25 %: 0 dB */
 /* Material of a segment with too few observations: half way to an ordinary dielectric, which limits the error of base
@@ -35,12 +25,6 @@
 static const float specular_of[SPECULARS] = {0.0f, 0.125f, 0.25f, 0.5f, 0.75f, 1.0f};
 
 static const struct specular_candidate_levels diffuse_candidate = {ROUGHNESSES - 1, 0};
-
-/* Points of one segment. */
-struct segment_points {
-    struct specular_points points; /* with room for [points wanted] samples */
-    bool is_observed;              /* its material can be fitted; otherwise these points only tell whether it is dark */
-};
 
 /* A sample to be fitted. */
 struct fitted_sample {
@@ -70,32 +54,6 @@ static void find_misfits(void *user, size_t index, int thread) {
     specular_predict(&job->observer, s, thread, prediction);
     specular_misfit_find(s, prediction, job->observer.in.views->median_radiance,
                          &job->left[job->used[index].first_left]);
-}
-
-/* Samples points of a segment; false where fewer than two have enough observations. */
-static bool sample_points(const struct specular_job *job, size_t segment, struct specular_criteria criteria) {
-    struct specular_points *e = &job->points[segment].points;
-    e->count = specular_observe(&job->observer, segment, criteria, e->sample);
-    e->floor = criteria.edge == 0 ? MISFIT_FLOOR : MISFIT_FLOOR_EDGE;
-    return e->count >= 2;
-}
-
-/* Relaxes the requirements until there are enough points: first pixels nearer to edges, then smaller patches. False
- * where there are fewer than two. */
-static bool sample_enough(const struct specular_job *job, size_t segment) {
-    struct specular_criteria criteria = {specular_widest_patch(&job->observer, segment), 0, MIN_VIEWS};
-    size_t enough = specular_points_wanted(&job->observer, segment) / PART_ENOUGH;
-    enough = enough < POINTS_ENOUGH ? POINTS_ENOUGH : enough;
-    for (;; criteria.patch = fmaxf(0.5f * criteria.patch, SPECULAR_MIN_PATCH)) {
-        bool enough_points = false;
-        for (criteria.edge = 0; criteria.edge < VIEWS_EDGE; criteria.edge++) {
-            enough_points = sample_points(job, segment, criteria);
-            if (job->points[segment].points.count >= enough)
-                return true;
-        }
-        if (criteria.patch <= SPECULAR_MIN_PATCH)
-            return enough_points;
-    }
 }
 
 /* The candidate of the least misfit. */
@@ -177,18 +135,6 @@ static void set_lobe(struct materials *materials, size_t segment, double roughne
     materials->specular[segment] = (float)specular;
 }
 
-/* Without clean observations mixed pixels and single photographs have to do: for the test of is_too_dark they suffice. */
-static void sample_segment(void *user, size_t segment, int thread) {
-    const struct specular_job *job = user;
-    struct segment_points *e = &job->points[segment];
-    (void)thread;
-    if (job->is_emitter[segment]) /* its own light hides what it reflects */
-        return;
-    e->is_observed = sample_enough(job, segment);
-    if (!e->is_observed && !sample_points(job, segment, (struct specular_criteria){SPECULAR_MIN_PATCH, VIEWS_EDGE, 1}))
-        e->points.count = 0;
-}
-
 /* Whether a segment without clean observations is darker than the material for unknown segments allows, which reflects
  * a window at grazing angles. This test is one-sided: base colour explains anything brighter. */
 static bool is_too_dark(const struct specular_points *e) {
@@ -265,7 +211,7 @@ void specular_fit(const struct specular_input *input, const bool *is_emitter, st
     specular_observer_init(&job.observer, input, parallel_thread_count(pool));
     job.evidence = mem_calloc(segments, sizeof *job.evidence);
     make_room(&job, segments);
-    parallel_for(pool, segments, sample_segment, &job);
+    specular_points_find(&job.observer, is_emitter, job.points, pool);
     list_used(&job, segments);
     parallel_for(pool, job.used_count, find_misfits, &job);
     parallel_for(pool, segments, measure_segment, &job);

@@ -154,15 +154,16 @@ float specular_widest_patch(const struct specular_observer *l, size_t segment) {
     return fmaxf(SPECULAR_MIN_PATCH, (float)fmin(side, MAX_PATCH * fmax(1.0, texture / 2048.0)));
 }
 
-size_t specular_observe(const struct specular_observer *l, size_t segment, struct specular_criteria criteria,
-                        struct specular_sample *sample) {
-    size_t points = specular_points_wanted(l, segment);
-    uint32_t texels = l->texels.first[segment + 1] - l->texels.first[segment];
+size_t specular_tries(const struct specular_observer *l, size_t segment) {
+    size_t tries = TRIES * specular_points_wanted(l, segment), texels = by_segment_count(&l->texels, segment);
+    return tries < texels ? tries : texels;
+}
+
+bool specular_observe(const struct specular_observer *l, size_t segment, size_t attempt,
+                      struct specular_criteria criteria, struct specular_sample *sample) {
+    uint32_t texels = (uint32_t)by_segment_count(&l->texels, segment);
     const uint32_t *texel = &l->texels.texel[l->texels.first[segment]];
-    size_t tries = TRIES * points, count = 0, step = choose_even_step(texels);
-    for (size_t i = 0; i < tries && i < texels && count < points; i++)
-        count += observe_texel(l, texel[i * step % texels], criteria, &sample[count]);
-    return count;
+    return observe_texel(l, texel[attempt * choose_even_step(texels) % texels], criteria, sample);
 }
 
 void specular_observer_init(struct specular_observer *l, const struct specular_input *input, int threads) {

@@ -76,9 +76,12 @@ float specular_widest_patch(const struct specular_observer *l, size_t segment);
 /* Points wanted of a segment. */
 size_t specular_points_wanted(const struct specular_observer *l, size_t segment);
 
-/* Fills sample[specular_points_wanted] with as many samples, or fewer; returns their number. */
-size_t specular_observe(const struct specular_observer *l, size_t segment, struct specular_criteria criteria,
-                        struct specular_sample *sample);
+/* Texels of a segment that are tried at most, for as many points as are wanted. */
+size_t specular_tries(const struct specular_observer *l, size_t segment);
+
+/* Observes the texel tried as number `attempt`; false where it does not fulfil the criteria. */
+bool specular_observe(const struct specular_observer *l, size_t segment, size_t attempt,
+                      struct specular_criteria criteria, struct specular_sample *sample);
 
 /* Fills prediction[sample->count]. */
 void specular_predict(const struct specular_observer *l, const struct specular_sample *sample, int thread,

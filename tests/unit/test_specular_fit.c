@@ -81,6 +81,11 @@ static void test_fit(const struct image *sky, const struct disc *disc, float rou
     specular_fit(&input, r->is_emitter, &r->materials, r->pool);
     printf("roughness %.3f specular %.3f, true %.3f %.3f\n", (double)r->materials.roughness[0],
            (double)r->materials.specular[0], (double)roughness, (double)specular);
+    float found[2] = {r->materials.roughness[0], r->materials.specular[0]};
+    struct parallel *three = parallel_new(3);
+    specular_fit(&input, r->is_emitter, &r->materials, three);
+    CHECK(found[0] == r->materials.roughness[0] && found[1] == r->materials.specular[0]);
+    parallel_free(three);
     float off = roughness > 0.7f ? 2.0f : 1.0f; /* so wide a highlight is not told apart that well */
     CHECK_NEAR(r->materials.specular[0], specular, 0.06f * off);
     if (specular > 0.0f)
