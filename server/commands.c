@@ -28,7 +28,8 @@ static const struct server_command table[] = {
     {"check-config", "[FILE]", "say what is wrong with a configuration", "",
      "  unbaked check-config /etc/unbaked.conf\n", check_config_flags, check_config_command},
     {"doctor", "", "say what works on this machine and what does not",
-     "Looks at libraries, limits, permissions, the disk and what the kernel offers for the sandbox.\n"
+     "Looks at libraries, limits, permissions, the disk, what the kernel offers for the sandbox, and of each\n"
+     "executor at its commands, its url, the program of its nodes and the folder that they share.\n"
      "Ends with 1 when something keeps the daemon from working.\n",
      "  unbaked doctor --config /etc/unbaked.conf\n", doctor_flags, doctor_command},
     {"executor", "list|test NAME", "list where jobs run, or try a cluster's scheduler",

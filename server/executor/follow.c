@@ -12,7 +12,6 @@
 
 #define LEASE_FACTOR 1.5 /* of the lease: what the node stops at, this side waits for half as long again */
 #define ORPHANS_MAX 16   /* cancelled after one listing */
-#define IDS_MAX 100000   /* bytes of all ids on a command line; the system takes 131,072 for a word */
 
 static double now_sec(const struct remote *m) { return m->parts.now(m->parts.user); }
 
@@ -94,7 +93,7 @@ static bool any_needs_status(const struct remote *m) {
 /* The ids that are known, with commas between. */
 static char *all_ids(const struct remote *m) {
     struct buf ids;
-    buf_init(&ids, IDS_MAX);
+    buf_init(&ids, SITE_IDS_BYTES); /* room for max_running of the longest: site.c */
     for (const struct remote_run *r = m->runs; r; r = r->next)
         if (r->row.external_id[0] && !r->has_verdict)
             buf_printf(&ids, "%s%s", ids.length > 0 ? "," : "", r->row.external_id);

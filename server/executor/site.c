@@ -231,11 +231,21 @@ static void check_plain(const struct site *s, const char *what, const char *text
         buf_printf(problems, "%s: %s may only have letters, digits and ._-/:@+,=%%[]\n", s->where, what);
 }
 
+/* One that did not fit into the question would seem to be gone. */
+static void check_ids(const struct site *s, struct buf *problems) {
+    const int most = SITE_IDS_BYTES / (int)sizeof((struct line_parts *)0)->id;
+    for (size_t i = 0; s->status && s->status[i]; i++)
+        if (strstr(s->status[i], "{ids}") && s->max_running > most)
+            buf_printf(problems, "%s: max_running must be %d at most where status has {ids}, not %.0f\n", s->where,
+                       most, s->max_running);
+}
+
 static void check_all(const struct site *s, const bool *seen, struct buf *problems) {
     for (size_t i = 0; i < KEY_COUNT; i++)
         if (!keys[i].fallback && !seen[i])
             buf_printf(problems, "%s: %s is missing\n", s->where, keys[i].name);
     check_templates(s, problems);
+    check_ids(s, problems);
     check_pattern(s, "submit_id", s->submit_id, "{id}", problems);
     check_pattern(s, "status_line", s->status_line, "{name}", problems);
     check_pattern(s, "status_line", s->status_line, "{state}", problems);

@@ -29,6 +29,9 @@ enum site_state {
     SITE_PREEMPTED /* the site has ended it for reasons of its own: for others, for the time, for a broken node */
 };
 
+/* Bytes of all ids, with commas, as one word of a command line: Linux takes 131,072 for a word. */
+#define SITE_IDS_BYTES 100000
+
 struct site {
     char name[32];                             /* of the file without ".conf": lower-case letters, digits, - */
     char user[64];                             /* under which this process calls the site's commands */

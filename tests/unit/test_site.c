@@ -60,6 +60,8 @@ static void test_faults(void) {
     expect("url = ftp://x\n" SCRIPT, "url must begin with http://, https:// or unix:/");
     expect(GOOD "ca = /a b\n" SCRIPT, "ca may only have letters");
     expect(GOOD "ca = /lab.pem\n" SCRIPT, "ca is for a url that begins with https://");
+    expect("status = s {ids}\nmax_running = 1600\n" SCRIPT,
+           "max_running must be 1562 at most where status has {ids}, not 1600");
     CHECK(site_name_is_good("slurm-2") && !site_name_is_good("process") && !site_name_is_good("a/b") &&
           !site_name_is_good("") && !site_name_is_good("-x"));
 }
