@@ -58,7 +58,7 @@ FUZZ_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(call built,$(FUZZ_SRC)))
 # The goals that build first and then run something build on all processors, unless told otherwise.
 BUILD = echo building... && $(MAKE) -s $(if $(filter -j%,$(MAKEFLAGS)),,-j$(shell nproc))
 
-.PHONY: all help deps man deb demo test tests check check-build benches bench fidelity light rooms sensitivity relight paper many chaos soak asan tsan asan-build tsan-build fuzz \
+.PHONY: all help deps man deb demo test tests blender check check-build benches bench fidelity light rooms sensitivity relight paper many chaos soak asan tsan asan-build tsan-build fuzz \
         fuzzers fuzz-build portable format coverage coverage-build install clean
 .SECONDARY:
 .DELETE_ON_ERROR:

@@ -3,6 +3,7 @@
 
 #include <math.h>
 
+#include "common/vec.h"
 #include "server/scene/coordinates.h"
 
 #define EQUATOR_M 6378137.0 /* WGS 84 */
@@ -11,7 +12,6 @@
 #define UTM_SCALE 0.9996
 #define UTM_EASTING_M 500000.0
 #define UTM_SOUTH_M 10000000.0
-#define PI 3.14159265358979323846
 #define STEP_M 100.0 /* over which convergence and scale are measured */
 
 /* Latitude, longitude and height: the iteration converges to less than a nanometre in six steps on the ground. */
@@ -81,8 +81,8 @@ void geodesy_from_utm(const double place[3], const struct utm *utm, double m[3][
             east[i] = place[i] + (side == 0 ? -STEP_M : STEP_M) * local[i][0];
         geodesy_to_utm(east, utm, end[side]);
     }
-    /* Of a conformal map the direction of north follows from that of east. Heights get its scale, too (.9996 to 1.001), so
-     * that lengths stay in proportion. */
+    /* Of a conformal map the direction of north follows from that of east. Heights get its scale, too (.9996 to 1.001),
+     * so that lengths stay in proportion. */
     double x = (end[1][0] - end[0][0]) / (2.0 * STEP_M), y = (end[1][1] - end[0][1]) / (2.0 * STEP_M);
     utm_from_local[0][0] = utm_from_local[1][1] = x;
     utm_from_local[1][0] = y;

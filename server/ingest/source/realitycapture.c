@@ -1,5 +1,6 @@
 /* realitycapture.c -- RealityCapture (RealityScan): "Internal/External camera parameters", a table of comma-separated
- * values with the header #name,x,y,alt,heading,pitch,roll,f,px,py,k1,k2,k3,k4,t1,t2, and XMP files beside the photographs.
+ * values with the header #name,x,y,alt,heading,pitch,roll,f,px,py,k1,k2,k3,k4,t1,t2, and XMP files beside the
+ * photographs.
  *
  * In the table a camera with all angles 0 looks down (-z) with north (y) up; its rotation is Rz(-heading) Rx(pitch)
  * Ry(roll) with OpenGL's camera axes. f is a focal length of 35 mm film: f / 36 of the longer side; px and py likewise.
@@ -14,6 +15,7 @@
 #include <strings.h>
 
 #include "common/mem.h"
+#include "common/vec.h"
 #include "server/ingest/path.h"
 #include "server/ingest/source/frame_list.h"
 #include "server/ingest/source/photo_folder.h"
@@ -23,7 +25,6 @@
 #define FILM_WIDTH_MM 36.0
 #define MAX_COLUMNS 64
 #define MAX_CSV_BYTES ((size_t)64 << 20)
-#define PI 3.14159265358979323846
 
 /* Focal length and principal point (from the centre) as shares of the picture's longer side, whose size is known only
  * when the picture is read; distortion k1 k2 k3 k4 t1 t2. */
