@@ -1,5 +1,5 @@
-/* client_room.h -- a room on its way to the server: measured, sent unless its content is there already, read as the user says,
- * checked.
+/* client_room.h -- a room on its way to the server: measured, sent unless its content is there already, read as the
+ * user says, checked.
  *
  *      client_room_open ──> client_room_send ──> client_room_wait
  *
@@ -33,8 +33,8 @@ struct client_room {
             "distortion or exposures"                                                                                  \
     }
 
-/* What is there of a room: of the folder or archive at `path`, or of the scene (one of them is NULL), which is to be read
- * as the options say. STATUS_OK also where it is not on the server. */
+/* What is there of a room: of the folder or archive at `path`, or of the scene (one of them is NULL), which is to be
+ * read as the options say. STATUS_OK also where it is not on the server. */
 enum status client_room_open(struct client_room *room, struct client *c, const struct options *o, const char *path,
                              const char *scene, struct reply *reply, struct error *err);
 void client_room_release(struct client_room *room);

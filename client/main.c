@@ -70,8 +70,8 @@ static int check_words(struct client *c, const struct command *command, const ch
     return client_fail(c, NULL, &err);
 }
 
-/* Sets the request's token for its server, and the certificates to trust. `entry`: the server's in the configuration, if
- * it has a name there. */
+/* Sets the request's token for its server, and the certificates to trust. `entry`: the server's in the configuration,
+ * if it has a name there. */
 static int present_token(struct client *c, const struct options *o, const struct server_entry *entry) {
     struct error err;
     const char *given = getenv("UNBAKE_TOKEN"), *ca = getenv("UNBAKE_CA");

@@ -1,9 +1,9 @@
 /* render.c -- `render` and `evaluate`: jobs on a reconstruction that is there already.
  *
- * 1. All that is wrong with a command line is said before anything is sent: the server checks the settings as a whole and
- *    stores nothing of a job that it refuses; files that settings name are opened here first.
- * 2. A setting that names a file has a path here and its last part there. The files are sent once the job is there, which
- *    waits for them; where one cannot be sent, the job is still there and can be removed. */
+ * 1. All that is wrong with a command line is said before anything is sent: the server checks the settings as a whole
+ *    and stores nothing of a job that it refuses; files that settings name are opened here first.
+ * 2. A setting that names a file has a path here and its last part there. The files are sent once the job is there,
+ *    which waits for them; where one cannot be sent, the job is still there and can be removed. */
 #include <errno.h>
 #include <fcntl.h>
 #include <string.h>

@@ -5,8 +5,8 @@
  * 2. A room is sent, unless its content is there already, and checked by the server (client_room.h). A job on a room
  *    that is rejected, or whose mesh and photographs do not fit, is not queued.
  * 3. Each job is queued under an idempotency key: however often the request is sent, one job results.
- * 4. Jobs of one command have one label `group`. Where the user has named it, jobs that are in the group already are not
- *    queued again: a command that was interrupted may be repeated. */
+ * 4. Jobs of one command have one label `group`. Where the user has named it, jobs that are in the group already are
+ *    not queued again: a command that was interrupted may be repeated. */
 #include <string.h>
 #include <sys/random.h>
 
@@ -121,7 +121,8 @@ static bool only_scene_is_missing(struct reply *reply) {
     return count > 0 && cJSON_GetArraySize(faults) == 0;
 }
 
-/* Has the server check the job. What is wrong with a scene that is about to be sent, or read otherwise, is no fault yet. */
+/* Has the server check the job. What is wrong with a scene that is about to be sent, or read otherwise, is no fault
+ * yet. */
 static enum status check_job(struct submission *s, const cJSON *job, bool is_to_change, struct reply *reply,
                              struct error *err) {
     struct request_call call = {.method = "POST", .path = "/v1/jobs?dry_run=1", .body = job, .same_twice = true};
@@ -250,8 +251,8 @@ static int fail(struct submission *s, const char *word, struct reply *reply, str
     return client_fail(s->client, reply, err);
 }
 
-/* Whether nothing else that was asked for can go well either: the user or the network has ended it, this user may not or
- * has no room left, or the settings are wrong. */
+/* Whether nothing else that was asked for can go well either: the user or the network has ended it, this user may not
+ * or has no room left, or the settings are wrong. */
 static bool is_hopeless(const struct submission *s, const struct reply *reply, const struct error *err) {
     return err->status == STATUS_CANCELLED || err->status == STATUS_UNAVAILABLE || reply->code == 401 ||
            reply->code == 403 || reply->code == 429 || reply->code == 507 || (!s->is_checked && reply->code == 422);

@@ -1,5 +1,5 @@
-/* background.h -- one thread beside those that answer requests, with the mutex and the condition that its owner shares with
- * it. It begins with background_start and ends with background_stop; all signals are blocked in it. */
+/* background.h -- one thread beside those that answer requests, with the mutex and the condition that its owner shares
+ * with it. It begins with background_start and ends with background_stop; all signals are blocked in it. */
 #ifndef UNBAKE_COMMON_BACKGROUND_H
 #define UNBAKE_COMMON_BACKGROUND_H
 

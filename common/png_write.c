@@ -11,9 +11,9 @@
 #include "common/mem.h"
 #include "common/png_memory.h"
 
-/* sRGB bytes of linear values, without a power for each: `least` has the least value of each byte, found by bisection, so
- * that bytes are those of image_linear_to_srgb; `guess` has the byte of the first value of each of 64 steps to an octave,
- * from which least[] is one or two comparisons away. */
+/* sRGB bytes of linear values, without a power for each: `least` has the least value of each byte, found by bisection,
+ * so that bytes are those of image_linear_to_srgb; `guess` has the byte of the first value of each of 64 steps to an
+ * octave, from which least[] is one or two comparisons away. */
 enum { STEP_BITS = 17, LOWEST = 127 - 13, STEPS = 13 << (23 - STEP_BITS) }; /* below 2^-13 all are 0 */
 struct bytes_of_linear {
     float least[257];

@@ -1,5 +1,5 @@
-/* arguments.h -- how the commands of `unbaked` begin: their command line, read by a table (common/options.h), and the numbers
- * in it. Messages go to stderr. */
+/* arguments.h -- how the commands of `unbaked` begin: their command line, read by a table (common/options.h), and the
+ * numbers in it. Messages go to stderr. */
 #ifndef UNBAKE_SERVER_ARGUMENTS_H
 #define UNBAKE_SERVER_ARGUMENTS_H
 

@@ -49,7 +49,8 @@ int command_begin(const char *file, struct invocation *in, int argc, char **argv
 }
 
 /* Asks the daemon, and prints its reply as JSON where that is asked for, else by print(action, reply). The end of a
- * command, whose `code` is not below 0 where it has failed already: frees `request` and *in, returns the exit status. */
+ * command, whose `code` is not below 0 where it has failed already: frees `request` and *in, returns the exit
+ * status. */
 static int ask(int code, struct invocation *in, cJSON *request, void print(const char *action, const cJSON *reply),
                const char *action) {
     struct error err;

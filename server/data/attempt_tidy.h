@@ -8,8 +8,8 @@
 #include "common/error.h"
 #include "server/store/store.h"
 
-/* Of all attempts of the job; of those that run, by the store, nothing: but for `ended` (0: none), whose end is still to
- * be entered. */
+/* Of all attempts of the job; of those that run, by the store, nothing: but for `ended` (0: none), whose end is still
+ * to be entered. */
 enum status attempt_tidy(const char *data_dir, struct store *store, int64_t job_id, int ended, struct error *err);
 
 #endif

@@ -3,8 +3,8 @@
  * The room is a bundle with truth/ beside its photographs: objects.json, and a picture of the parameters of each test
  * view (see demo/generate.h). Parameters are compared as the test cameras see them (score.h), emitters by object, and
  * the test views are re-rendered from the recovered room and compared with their photographs: MSRE = mean of (I -
- * R)^2 / (R^2 + 0.01 m^2), with m the median radiance of the training pixels, free of the re-renders' noise (metrics.h):
- * what the photographs' noise adds is in it. */
+ * R)^2 / (R^2 + 0.01 m^2), with m the median radiance of the training pixels, free of the re-renders' noise
+ * (metrics.h): what the photographs' noise adds is in it. */
 #ifndef UNBAKE_EVALUATE_EVALUATE_H
 #define UNBAKE_EVALUATE_EVALUATE_H
 

@@ -52,8 +52,8 @@ static bool smoothed_pixel(const struct image *photograph, const struct image *t
     return isfinite(sum[0]) && isfinite(sum[1]) && isfinite(sum[2]);
 }
 
-/* Makes two equal pictures of expected values (halves, metrics.h), NaN where the scene is not smooth, which metrics leave out. Returns the number
- * of smooth pixels. */
+/* Makes two equal pictures of expected values (halves, metrics.h), NaN where the scene is not smooth, which metrics
+ * leave out. Returns the number of smooth pixels. */
 static size_t smooth_picture(const struct image *photograph, const struct image *truth, struct image *smoothed) {
     const struct truth_channels at = {{image_channel(truth, "base_color.R"), image_channel(truth, "base_color.G"),
                                        image_channel(truth, "base_color.B")},

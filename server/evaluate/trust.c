@@ -9,8 +9,8 @@
 #include "server/evaluate/score.h"
 
 #define RADIUS 2 /* pixels, of the 5 x 5 window: specks are of 1 to 3 */
-/* Base colours of the truth that differ less are of one plain surface: mottled paint, not print. With .002 the demo room has
- * 705 such pixels in 8 views, nearly all of paintings; with .03 it has 36,759, nearly all of walls. */
+/* Base colours of the truth that differ less are of one plain surface: mottled paint, not print. With .002 the demo
+ * room has 705 such pixels in 8 views, nearly all of paintings; with .03 it has 36,759, nearly all of walls. */
 #define SAME_COLOR 0.03f
 #define WINDOW ((2 * RADIUS + 1) * (2 * RADIUS + 1))
 
@@ -29,7 +29,8 @@ static void judge(struct trust *trust, const float *found, const float *truth, c
     }
 }
 
-/* Whether the window shows one plain surface of the truth, seen in all its pixels; mean[] is then found's error over it. */
+/* Whether the window shows one plain surface of the truth, seen in all its pixels; mean[] is then found's error over
+ * it. */
 static bool is_plain(const struct image *found, const struct image *truth, const uint8_t *flags, uint32_t x, uint32_t y,
                      double mean[3]) {
     struct rgb_columns tc = pair_picture_columns(truth, "base_color."), fc = pair_picture_columns(found, "base_color.");

@@ -1,5 +1,5 @@
-/* courier.h -- who runs a site's commands and brings back what they said. The scheduler's thread sends and receives, and
- * never waits: a command may take its whole deadline. */
+/* courier.h -- who runs a site's commands and brings back what they said. The scheduler's thread sends and receives,
+ * and never waits: a command may take its whole deadline. */
 #ifndef UNBAKE_EXECUTOR_COURIER_H
 #define UNBAKE_EXECUTOR_COURIER_H
 
@@ -29,8 +29,8 @@ struct courier {
     struct errand *(*receive)(struct courier *courier);
 };
 
-/* One thread, which does one errand after the other. `wake` is called on it after each. NULL with *err where there is no
- * thread. */
+/* One thread, which does one errand after the other. `wake` is called on it after each. NULL with *err where there is
+ * no thread. */
 struct courier *courier_thread_new(double deadline_sec, void (*wake)(void *user), void *user, struct error *err);
 /* Ends the command that runs, and drops the other errands. */
 void courier_thread_free(struct courier *courier);

@@ -17,8 +17,8 @@ struct listed_jobs {
     size_t count;
 };
 
-/* Takes the lines that look as site->status_line says and whose name begins with NAME_PREFIX. False where it is garbage:
- * there are lines, and none looks so. */
+/* Takes the lines that look as site->status_line says and whose name begins with NAME_PREFIX. False where it is
+ * garbage: there are lines, and none looks so. */
 #define NAME_PREFIX "unbake-"
 bool listed_read(struct listed_jobs *listing, const struct site *site, const char *text);
 void listed_release(struct listed_jobs *listing);

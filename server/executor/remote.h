@@ -4,16 +4,16 @@
  *      start ─────────> waiting in the ─────────> its node reports ─────────> ended
  *                       site's queue              under a lease
  *
- * 1. The attempt's row (store/remote.h) is on disk before its submission is sent. Whether a submission has come through,
- *    its reply does not decide alone: a failed one is found by name in the site's listing, and repeated, under another
- *    name and token, only after ABSENT_MAX good listings without it.
+ * 1. The attempt's row (store/remote.h) is on disk before its submission is sent. Whether a submission has come
+ *    through, its reply does not decide alone: a failed one is found by name in the site's listing, and repeated, under
+ *    another name and token, only after ABSENT_MAX good listings without it.
  * 2. A status command that fails, comes too late or says nothing that can be understood changes nothing.
- * 3. An attempt is lost when UNKNOWN_MAX listings in a row do not have it alive, and its node has been silent for one and a
- *    half of its lease; both by a monotonic clock, which begins anew with the daemon. Then its row is closed, which shuts
- *    its node out, and only after its last writer has left it has ended.
+ * 3. An attempt is lost when UNKNOWN_MAX listings in a row do not have it alive, and its node has been silent for one
+ *    and a half of its lease; both by a monotonic clock, which begins anew with the daemon. Then its row is closed,
+ *    which shuts its node out, and only after its last writer has left it has ended.
  * 4. What the site has ended for its own reasons (pre-empted, out of time, a broken node), or started again, counts as
- *    pre-empted: the job goes on elsewhere and is not charged. But where its time was up before it had saved anything, the
- *    next one would fare no better: it waits for help (time_limit.h).
+ *    pre-empted: the job goes on elsewhere and is not charged. But where its time was up before it had saved anything,
+ *    the next one would fare no better: it waits for help (time_limit.h).
  * 5. A site's job that carries the name of an attempt that is over is cancelled when it is seen.
  * 6. A run outlives the daemon: freed before its end it goes on, and the next daemon resumes it.
  *

@@ -1,4 +1,5 @@
-/* remote_run.h -- what remote_runs.c, which keeps the runs, shares with follow.c, which judges by what the site says. */
+/* remote_run.h -- what remote_runs.c, which keeps the runs, shares with follow.c, which judges by what the site
+ * says. */
 #ifndef UNBAKE_EXECUTOR_REMOTE_RUN_H
 #define UNBAKE_EXECUTOR_REMOTE_RUN_H
 

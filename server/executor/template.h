@@ -1,5 +1,5 @@
-/* template.h -- what a site's administrator writes: commands as lists of words, texts with placeholders, and how a line of
- * a command's output looks. There is no shell anywhere. */
+/* template.h -- what a site's administrator writes: commands as lists of words, texts with placeholders, and how a line
+ * of a command's output looks. There is no shell anywhere. */
 #ifndef UNBAKE_EXECUTOR_TEMPLATE_H
 #define UNBAKE_EXECUTOR_TEMPLATE_H
 
@@ -8,12 +8,13 @@
 #include "common/buf.h"
 #include "common/error.h"
 
-/* Takes `text` apart at white space; "..." holds white space together and is removed, \" is a quotation mark. *words: NULL-terminated, the
- * caller's (words_free). STATUS_INPUT where a quotation mark is left over, or there is no word. */
+/* Takes `text` apart at white space; "..." holds white space together and is removed, \" is a quotation mark. *words:
+ * NULL-terminated, the caller's (words_free). STATUS_INPUT where a quotation mark is left over, or there is no word. */
 enum status words_parse(const char *text, char ***words, struct error *err);
 void words_free(char **words);
 
-/* A placeholder is {name}, of lower-case letters and _. "{{" stands for itself, and what follows it is no placeholder. */
+/* A placeholder is {name}, of lower-case letters and _. "{{" stands for itself, and what follows it is no
+ * placeholder. */
 struct placeholder {
     const char *name, *value;
 };

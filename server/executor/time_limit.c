@@ -21,8 +21,8 @@ static bool is_newer(const char *path, const struct remote_row *row) {
     return (double)info.st_mtim.tv_sec * 1e3 + (double)info.st_mtim.tv_nsec * 1e-6 > (double)row->claimed_ms;
 }
 
-/* A part of a checkpoint, or of a render the record of its pictures. Files are written when they arrive, and keep that time
- * when a later attempt takes the folder over. */
+/* A part of a checkpoint, or of a render the record of its pictures. Files are written when they arrive, and keep that
+ * time when a later attempt takes the folder over. */
 static bool has_saved(const char *data_dir, const struct remote_row *row) {
     char *dir = layout_attempt(data_dir, row->job_id, row->number), *folder = layout_checkpoint_folder(dir);
     char *record = layout_output(dir, PICTURE_RECORD), **names = NULL;

@@ -1,5 +1,5 @@
-/* time_limit.h -- attempts that a site ends because their time is up. Those go on elsewhere from their checkpoints, uncharged,
- * as often as it takes. One that has not saved anything in its whole time would do so for ever. */
+/* time_limit.h -- attempts that a site ends because their time is up. Those go on elsewhere from their checkpoints,
+ * uncharged, as often as it takes. One that has not saved anything in its whole time would do so for ever. */
 #ifndef UNBAKE_EXECUTOR_TIME_LIMIT_H
 #define UNBAKE_EXECUTOR_TIME_LIMIT_H
 

@@ -14,8 +14,8 @@ struct node_probe {
     const char *url;  /* of the daemon; NULL: it is not asked */
     const char *ca;   /* file of certificates to trust; NULL: the system's */
 };
-/* On the node: waits for TRY_JOB_SEC and writes to the file its host, version and time, and what is wrong on its way to the
- * daemon, as JSON. Without a file the latter is its status. */
+/* On the node: waits for TRY_JOB_SEC and writes to the file its host, version and time, and what is wrong on its way to
+ * the daemon, as JSON. Without a file the latter is its status. */
 enum status probe_run(const struct node_probe *probe, struct error *err);
 /* Whether a daemon answers there, be it with a refusal. */
 enum status probe_url(const char *url, const char *ca, struct error *err);

@@ -2,15 +2,15 @@
  *
  * A hole's surface is in its place: photographs from different places agree about each of its cells, but not about
  * directions, in which distant light would be the same from everywhere. And it goes on: across the hole's rim radiance
- * changes no more than beside it. Where photographs tell the two apart, the first decides; where the surface is plain, as
- * most walls are, the second. */
+ * changes no more than beside it. Where photographs tell the two apart, the first decides; where the surface is plain,
+ * as most walls are, the second. */
 #ifndef UNBAKE_HOLES_HOLE_EVIDENCE_H
 #define UNBAKE_HOLES_HOLE_EVIDENCE_H
 
 #include "server/holes/hole_observations.h"
 
-/* Variance of log radiance among photographs, over that of the plane's own surface, beyond which no surface is there: three
- * times the deviation. */
+/* Variance of log radiance among photographs, over that of the plane's own surface, beyond which no surface is there:
+ * three times the deviation. */
 #define HOLE_MOST_VARIANCE 9.0
 
 /* Mean of squared deviations of log radiance, and its degrees of freedom. */

@@ -8,7 +8,8 @@
 /* How far off its plane the points lie that a plane is fitted to; how far a surface that covers a cell; in cells. */
 #define FIT_CELLS 0.15f
 #define REACH_CELLS 0.5f
-/* How far planes go on beyond what was scanned, as a share of its extent: scanners reach 5 to 6 m, halls are 15 m long. */
+/* How far planes go on beyond what was scanned, as a share of its extent: scanners reach 5 to 6 m, halls are 15 m
+ * long. */
 #define BEYOND 0.5f
 
 static void place_cells(struct hole_grid *grid, struct hole_plane *p, vec3 lower, vec3 upper) {
@@ -41,7 +42,8 @@ struct cover_job {
     const struct accel *accel;
 };
 
-/* Looks for the mesh along the normal through the middle of a cell; a surface that turns away from it does not count. */
+/* Looks for the mesh along the normal through the middle of a cell; a surface that turns away from it does not
+ * count. */
 static void cover_cell(const struct cover_job *job, const struct hole_plane *p, uint32_t number) {
     struct hole_cell *cell = &job->grid->cell[p->first + number];
     uint32_t column = number % p->columns, row = number / p->columns;

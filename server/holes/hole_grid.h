@@ -51,8 +51,8 @@ struct hole_grid {
     struct hole_cell *cell; /* [cell_count] plane after plane, row after row; owned */
 };
 
-/* Finds planes, and which of their cells the mesh covers. within: the box that cells lie in, lower and upper corner; NULL:
- * any. */
+/* Finds planes, and which of their cells the mesh covers. within: the box that cells lie in, lower and upper corner;
+ * NULL: any. */
 void hole_grid_init(struct hole_grid *grid, const struct mesh *mesh, const struct accel *accel, const vec3 within[2],
                     struct parallel *pool);
 void hole_grid_release(struct hole_grid *grid);

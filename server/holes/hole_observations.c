@@ -7,8 +7,9 @@
 /* Pixels that are looked at: of a photograph, 320 x 240, which has a cell in a few; of all, for time and memory. */
 #define PIXELS 80000.0
 #define ALL_PIXELS 1e7
-/* Radiance, as a share of the photographs' median, below which a pixel shows nothing: a surface as dark adds a hundredth
- * to the light that it takes away. Also what logarithms are taken after it is added, so that they are finite. */
+/* Radiance, as a share of the photographs' median, below which a pixel shows nothing: a surface as dark adds a
+ * hundredth to the light that it takes away. Also what logarithms are taken after it is added, so that they are
+ * finite. */
 #define DARK_SHARE 0.01f
 #define LIKE_COSINE 0.7f /* between the normals of a plane and of a surface in it */
 
@@ -170,7 +171,8 @@ static uint32_t nearest_cell(const struct hole_observations *observations, const
     return nearest;
 }
 
-/* Cells are refused for good: an observation stays with its cell until that is, and one that has none left gets none again. */
+/* Cells are refused for good: an observation stays with its cell until that is, and one that has none left gets none
+ * again. */
 static void assign(struct hole_observation *observation, const struct hole_observations *observations,
                    const struct hole_grid *grid) {
     bool has_cell = observation->cell != HOLE_NO_CELL && !grid->cell[observation->cell].is_refused;

@@ -1,5 +1,6 @@
-/* hole_observations.h -- pixels of the training photographs that look through holes or openings of the mesh, and what all others
- * say of the cells of a grid (hole_grid.h): which they pass, and how bright the mesh is that lies in them. */
+/* hole_observations.h -- pixels of the training photographs that look through holes or openings of the mesh, and what
+ * all others say of the cells of a grid (hole_grid.h): which they pass, and how bright the mesh is that lies in
+ * them. */
 #ifndef UNBAKE_HOLES_HOLE_OBSERVATIONS_H
 #define UNBAKE_HOLES_HOLE_OBSERVATIONS_H
 

@@ -7,8 +7,8 @@
 #include "server/holes/hole_evidence.h"
 
 #define ROUNDS 200 /* at most: each refuses cells, and observations go on to the next plane */
-/* Rays that pass a cell, per ray that meets nothing in it, from which on no surface is there: edges of the mesh are ragged,
- * so that some pass. */
+/* Rays that pass a cell, per ray that meets nothing in it, from which on no surface is there: edges of the mesh are
+ * ragged, so that some pass. */
 #define MOST_PASSED 0.25
 #define LEAST_FREEDOM 4.0 /* of such a variance */
 #define LEAST_CONTACT 2   /* cells of a region that are beside covered ones */
@@ -50,7 +50,8 @@ static bool is_beside_surface(const struct hole_grid *grid, const struct hole_pl
     return any;
 }
 
-/* Refuses cells about which photographs disagree, and those away from the mesh that only one shows; true where any was. */
+/* Refuses cells about which photographs disagree, and those away from the mesh that only one shows; true where any
+ * was. */
 static bool refuse_scattered(struct hole_grid *grid) {
     bool any = false, *is_bad = mem_calloc(grid->cell_count + 1, sizeof *is_bad);
     for (size_t k = 0; k < grid->plane_count; k++) {

@@ -8,8 +8,8 @@
 #include "server/holes/hole_regions.h"
 #include "server/scene/segment.h"
 
-/* Adds them at the end of mesh and segments. They continue what is around: its segment, and its object_id where the mesh
- * has some; their face is MESH_NO_FACE. Returns the number of triangles. The mesh's arrays may be moved. */
+/* Adds them at the end of mesh and segments. They continue what is around: its segment, and its object_id where the
+ * mesh has some; their face is MESH_NO_FACE. Returns the number of triangles. The mesh's arrays may be moved. */
 size_t hole_surface_add(struct mesh *mesh, struct segments *segments, const struct hole_grid *grid,
                         const struct hole_regions *holes);
 

@@ -38,7 +38,8 @@ static struct room_plane plane_through(vec3 origin, vec3 normal) {
     return plane;
 }
 
-/* The plane of least squared heights over `plane` of the points that lie on it; `plane` itself where they are too few. */
+/* The plane of least squared heights over `plane` of the points that lie on it; `plane` itself where they are too
+ * few. */
 static struct room_plane fit_plane(const struct plane_points *p, const struct room_plane *plane, float reach_m) {
     double a[3][3] = {{0}}, x[3] = {0};
     for (size_t i = 0; i < POINTS; i++) {

@@ -15,8 +15,8 @@ struct room_plane {
     double share;        /* of the mesh's surface */
 };
 
-/* Up to ROOM_PLANES_MAX planes, widest first; `reach_m` is how far off a plane its surface may lie. Returns their number.
- * Deterministic. */
+/* Up to ROOM_PLANES_MAX planes, widest first; `reach_m` is how far off a plane its surface may lie. Returns their
+ * number. Deterministic. */
 size_t room_planes_find(const struct mesh *mesh, float reach_m, struct room_plane plane[ROOM_PLANES_MAX]);
 
 static inline float room_plane_height(const struct room_plane *plane, vec3 point) {

@@ -58,8 +58,8 @@ char *listing_first_with(const struct listing *l, const char *base, const char *
 /* Maps the file at `path` (from the root). `kind` as for mapping_open. */
 enum status listing_open(const struct listing *l, const char *path, const char *kind, struct mapping *m,
                          struct error *err);
-/* Its text as UTF-8, at most `limit` bytes, with a NUL and without the byte order mark that editors of Windows put before
- * it, or from UTF-16, as PowerShell writes it; the caller's (mem_free), NULL on error. */
+/* Its text as UTF-8, at most `limit` bytes, with a NUL and without the byte order mark that editors of Windows put
+ * before it, or from UTF-16, as PowerShell writes it; the caller's (mem_free), NULL on error. */
 enum status listing_text(const struct listing *l, const char *path, size_t limit, char **text, struct error *err);
 
 #endif

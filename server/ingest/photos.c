@@ -16,8 +16,8 @@
 #include "server/ingest/photo_pixels.h"
 #include "server/scene/photograph_reduce.h"
 
-/* Memory of a picture that is being decoded, bytes a pixel: 16 of four channels as float, 6 that are kept of it, and the
- * decoder's own coefficients or planes. An estimate; it only bounds how many are decoded at the same time. */
+/* Memory of a picture that is being decoded, bytes a pixel: 16 of four channels as float, 6 that are kept of it, and
+ * the decoder's own coefficients or planes. An estimate; it only bounds how many are decoded at the same time. */
 #define DECODE_PIXEL_BYTES 32
 
 /* Result of loading one frame; written by that frame's work item only. */

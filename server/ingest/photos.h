@@ -2,8 +2,8 @@
  *
  * EXR, Radiance and TIFF of floats are linear; others are sRGB unless an ICC profile or colour chunks say otherwise
  * (image.h), and are made linear; conversions are reported. EXIF orientation is applied where the stated sizes ask for
- * it (photo_fit.h), since otherwise poses refer to the stored pixels. HEIC and AVIF are read as every viewer shows them:
- * their rotation is part of the picture. */
+ * it (photo_fit.h), since otherwise poses refer to the stored pixels. HEIC and AVIF are read as every viewer shows
+ * them: their rotation is part of the picture. */
 #ifndef UNBAKE_INGEST_PHOTOS_H
 #define UNBAKE_INGEST_PHOTOS_H
 
@@ -27,8 +27,8 @@ struct photos_options {
 };
 
 /* Loads the picture and mask of every frame from folder `dir` into scene->photograph, in the frames' order; missing
- * pictures are left out with a warning, and so are some that are broken. Faults of the files become problems in *f; other
- * statuses than STATUS_OK are failures of the machine. `name` is that of the transforms file. */
+ * pictures are left out with a warning, and so are some that are broken. Faults of the files become problems in *f;
+ * other statuses than STATUS_OK are failures of the machine. `name` is that of the transforms file. */
 enum status photos_load(const char *dir, const char *name, const struct frames *t, const struct photos_options *options,
                         struct parallel *pool, struct scene *scene, struct findings *f, struct error *err);
 

@@ -18,9 +18,9 @@
  * files and 20 MiB. */
 #define RENDER_BYTES (64.0 * 0x1p20)
 #define RENDER_FACTOR 8.0
-/* And of files that were sent to it. A picture of an inserted mesh is resampled (relight/bake.h): 75 bytes for each of its
- * pixels, up to 1.15 GiB a mesh (measured: squares with pictures of 1024, 2048 and 2890 pixels a side took 75, 298 and
- * 588 MiB more than the room; one whose atlas is as large as may be, with all of colour, emission and roughness,
+/* And of files that were sent to it. A picture of an inserted mesh is resampled (relight/bake.h): 75 bytes for each of
+ * its pixels, up to 1.15 GiB a mesh (measured: squares with pictures of 1024, 2048 and 2890 pixels a side took 75, 298
+ * and 588 MiB more than the room; one whose atlas is as large as may be, with all of colour, emission and roughness,
  * 1148 MiB). How many pixels a file has is not known here: JPEG has 2 to 7 to the byte, PNG 0.3 to 2, both more where
  * they are plain. By hand: 16. */
 #define PIXEL_BYTES 75.0

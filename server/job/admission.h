@@ -1,8 +1,9 @@
 /* admission.h -- whether the job whose turn it is begins beside those that run, or waits for memory.
  *
  * 1. What it needs is what the check of its scene foretells (check/estimate.h), for the job's own texture size, at most
- *    worker_memory_mib; with all pixels of the photographs where it keeps more than those foretold for. Nothing is foretold of scenes that an older version has checked: jobs on them begin.
- *    A render needs what its source's outputs and the files that were sent to it become in memory, by their sizes.
+ *    worker_memory_mib; with all pixels of the photographs where it keeps more than those foretold for. Nothing is
+ *    foretold of scenes that an older version has checked: jobs on them begin. A render needs what its source's outputs
+ *    and the files that were sent to it become in memory, by their sizes.
  * 2. A job that runs alone is always admitted, whatever it needs.
  * 3. While one waits, none behind it begins: small jobs would keep a large one waiting for ever. */
 #ifndef UNBAKE_JOB_ADMISSION_H

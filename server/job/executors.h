@@ -1,6 +1,6 @@
-/* executors.h -- the executors that jobs may run on, in the order in which those come into question whose users have chosen
- * none, and how many jobs each of them has. Turns, quotas and priorities are the same for all of them: whose turn it is
- * depends on what is free only where a user has chosen. */
+/* executors.h -- the executors that jobs may run on, in the order in which those come into question whose users have
+ * chosen none, and how many jobs each of them has. Turns, quotas and priorities are the same for all of them: whose
+ * turn it is depends on what is free only where a user has chosen. */
 #ifndef UNBAKE_JOB_EXECUTORS_H
 #define UNBAKE_JOB_EXECUTORS_H
 

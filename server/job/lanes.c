@@ -31,8 +31,8 @@ void lanes_release(struct lanes *l) {
 
 void lanes_forget_reasons(struct lanes *l) { l->admission.told_id = l->small_admission.told_id = -1; }
 
-/* Threads of this machine for one more attempt: an equal share among those that run or could run now. A worker keeps the
- * threads it started with, so the shares are approximate. */
+/* Threads of this machine for one more attempt: an equal share among those that run or could run now. A worker keeps
+ * the threads it started with, so the shares are approximate. */
 static int thread_share(struct lanes *l) {
     int64_t limit = l->config->max_running > 0 ? l->config->max_running : 1, sharing = 1;
     if (store_attempts_wanted(l->store, &sharing, NULL) != STATUS_OK)
@@ -76,7 +76,8 @@ static enum status ask_admission(struct lanes *l, bool is_small, int64_t id, boo
     return status;
 }
 
-/* The job of the lane whose turn it is, of those that may begin somewhere, and where. STATUS_NOT_FOUND: there is none. */
+/* The job of the lane whose turn it is, of those that may begin somewhere, and where. STATUS_NOT_FOUND: there is
+ * none. */
 static enum status next_job(struct lanes *l, bool is_small, int64_t *id, const struct executor **where, double *need,
                             struct error *err) {
     struct job_lane lane = {.small_cost = l->config->small_render_cost, .is_small = is_small};

@@ -83,8 +83,8 @@ struct executor {     /* likewise */
     int max_running;  /* jobs at once */
     enum status (*start)(const struct executor *executor, const struct run_work *work, struct run **run,
                          struct error *err);
-    /* The run of an attempt that an earlier daemon has started; STATUS_NOT_FOUND: it was none, or cannot go on. NULL: no
-     * run outlives its daemon. */
+    /* The run of an attempt that an earlier daemon has started; STATUS_NOT_FOUND: it was none, or cannot go on. NULL:
+     * no run outlives its daemon. */
     enum status (*resume)(const struct executor *executor, int64_t job_id, int attempt, struct run **run,
                           struct error *err);
 };

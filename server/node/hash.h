@@ -7,8 +7,8 @@
 #include "common/error.h"
 #include "common/sha256.h"
 
-/* Hashes the whole open file, wherever its offset stands. Every HASH_STEP bytes go_on(user, err) is called: false ends it
- * with STATUS_CANCELLED. */
+/* Hashes the whole open file, wherever its offset stands. Every HASH_STEP bytes go_on(user, err) is called: false ends
+ * it with STATUS_CANCELLED. */
 enum status hash_file(int fd, bool (*go_on)(void *user, struct error *err), void *user, char hex[SHA256_HEX_SIZE],
                       struct error *err);
 

@@ -1,5 +1,5 @@
-/* link.h -- what a node and the daemon say to each other about one attempt, over HTTP, and the lease on it. README.md has
- * the protocol.
+/* link.h -- what a node and the daemon say to each other about one attempt, over HTTP, and the lease on it. README.md
+ * has the protocol.
  *
  *      claim ──> OPEN ──(a lease without an answer)──> EXPIRED
  *                  └────(the daemon says that it is over)──> REFUSED
@@ -7,9 +7,8 @@
  * 1. The lease runs from the moment at which the last report that was answered was sent (CLOCK_MONOTONIC): the daemon's
  *    own clock for it started later. Once it is over, nothing is written any more.
  * 2. Reports are numbered. One is repeated, as it was, until it is answered.
- * 3. While a long request is under way, `beat` is called a few times a second: it keeps the lease by link_report, over a
- *    connection of its own.
- * Not thread-safe. */
+ * 3. While a long request is under way, `beat` is called a few times a second: it keeps the lease by link_report, over
+ *    a connection of its own. Not thread-safe. */
 #ifndef UNBAKE_NODE_LINK_H
 #define UNBAKE_NODE_LINK_H
 
@@ -63,8 +62,8 @@ void link_release(struct attempt_link *l);
 /* Looks at the clock, too. */
 enum link_state link_state(struct attempt_link *l);
 
-/* Claims the attempt; tries for as long as a lease is, but only once where the daemon's certificate is not trusted. *order is the caller's. STATUS_CONFLICT: another has it, it is
- * over, or the versions differ; the message says so. */
+/* Claims the attempt; tries for as long as a lease is, but only once where the daemon's certificate is not trusted.
+ * *order is the caller's. STATUS_CONFLICT: another has it, it is over, or the versions differ; the message says so. */
 enum status link_claim(struct attempt_link *l, const char *host, int threads, cJSON **order, struct error *err);
 
 /* A line for the next report; longer ones than a line may be, or what is no UTF-8, are dropped. */
@@ -91,20 +90,20 @@ enum status link_end(struct attempt_link *l, const struct link_end *end, double 
 enum status link_list(struct attempt_link *l, const char *what, cJSON **list, struct error *err);
 /* Appends to the open file what is missing of the daemon's: "scene", "images/1.png". STATUS_NO_SPACE: the disk here. */
 enum status link_fetch(struct attempt_link *l, const char *what, const char *name, int fd, struct error *err);
-/* Sends the whole open file, whose SHA-256 is `hex`; `query` is "" or "?first=1". While the disk there is full it is tried
- * again for a while, in which the daemon finds room or asks to stop. STATUS_NO_SPACE: it did neither, and is_full_there is
- * set; STATUS_CANCELLED: it has asked. */
+/* Sends the whole open file, whose SHA-256 is `hex`; `query` is "" or "?first=1". While the disk there is full it is
+ * tried again for a while, in which the daemon finds room or asks to stop. STATUS_NO_SPACE: it did neither, and
+ * is_full_there is set; STATUS_CANCELLED: it has asked. */
 enum status link_send(struct attempt_link *l, const char *what, const char *name, const char *query, int fd,
                       const char *hex, struct error *err);
 
 /* For link_files.c: what the reply to any request tells of the link; returns `status`. */
 enum status link_note(struct attempt_link *l, enum status status, const struct reply *reply, const struct error *err);
-/* Where a head is cut off on the way, what is left may look like an answer without content: STATUS_UNAVAILABLE where the
- * answer to a successful request is not JSON with that member. */
+/* Where a head is cut off on the way, what is left may look like an answer without content: STATUS_UNAVAILABLE where
+ * the answer to a successful request is not JSON with that member. */
 enum status link_whole(const struct attempt_link *l, enum status status, const struct reply *reply, const char *member,
                        struct error *err);
-/* Whether the next try may fare better: the daemon was not reached, or had too much to do at once, as for one of many nodes
- * that share an address. Not where its certificate is not trusted. */
+/* Whether the next try may fare better: the daemon was not reached, or had too much to do at once, as for one of many
+ * nodes that share an address. Not where its certificate is not trusted. */
 bool link_is_busy(enum status status, const struct reply *reply);
 /* Waits before try number `tries`, with beats; false when the link is not open any more. */
 bool link_pause(struct attempt_link *l, int tries);

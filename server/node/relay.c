@@ -22,8 +22,8 @@
 #include "server/node/hash.h"
 #include "server/node/scene_cache.h"
 
-/* A batch system that cancels kills 30 s after SIGTERM (Slurm's KillWait): some of that is left to say what happened. One
- * that takes a machine back says so minutes before. */
+/* A batch system that cancels kills 30 s after SIGTERM (Slurm's KillWait): some of that is left to say what happened.
+ * One that takes a machine back says so minutes before. */
 #define STOP_SEC_TERM 20.0
 #define STOP_SEC_USR1 30.0
 #define LOOK_SEC 0.5     /* between looks at signals and clocks */

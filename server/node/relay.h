@@ -3,13 +3,13 @@
  *
  *   worker ──lines──> queue ──(its file has been sent)──> link ──reports──> daemon
  *
- * 1. The order of lines is kept. A line that announces a file is passed on after the file lies at the daemon's, whole; one
- *    whose file has been replaced meanwhile is dropped, since another follows.
+ * 1. The order of lines is kept. A line that announces a file is passed on after the file lies at the daemon's, whole;
+ *    one whose file has been replaced meanwhile is dropped, since another follows.
  * 2. A part of a checkpoint is sent, then removed here; a record of what is done is sent; their lines are for the node
  *    only.
  * 3. Once the lease is over, or the daemon says that the attempt is, the worker is killed and nothing is sent.
- * 4. SIGTERM and SIGUSR1 (blocked; from the scheduler that wants its machine back) stop the worker: it has STOP_SEC for a
- *    checkpoint, then it is killed. */
+ * 4. SIGTERM and SIGUSR1 (blocked; from the scheduler that wants its machine back) stop the worker: it has STOP_SEC for
+ *    a checkpoint, then it is killed. */
 #ifndef UNBAKE_NODE_RELAY_H
 #define UNBAKE_NODE_RELAY_H
 

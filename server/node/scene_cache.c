@@ -190,7 +190,8 @@ static enum status fetch(const char *files, const cJSON *list, const bool *missi
     return status;
 }
 
-/* With the lock for fetching. Another may have fetched it while this one waited for the lock: it is looked at only now. */
+/* With the lock for fetching. Another may have fetched it while this one waited for the lock: it is looked at only
+ * now. */
 static enum status complete(struct cached_scene *scene, const char *cache_dir, uint64_t cache_bytes, const cJSON *list,
                             const struct scene_source *source, struct error *err) {
     bool *missing = mem_calloc((size_t)cJSON_GetArraySize(list) + 1, sizeof *missing);

@@ -1,15 +1,15 @@
-/* scene_cache.h -- scenes on a node's disk, for all attempts that come to that machine, or to all machines that share the
- * folder.
+/* scene_cache.h -- scenes on a node's disk, for all attempts that come to that machine, or to all machines that share
+ * the folder.
  *
  *   CACHE/ID/        the scene's files; NAME.part: one that is being fetched
  *   CACHE/ID.use     locked (flock, shared) by whoever reads the scene, and alone by who removes it; its time is that of
  *                    the last use
  *   CACHE/ID.fetch   locked alone by who fetches files of it
  *
- * 1. A file has its name only when its digest was right. It is hashed again for every attempt: what is damaged is fetched
- *    again, and replaced by a rename, so that whoever reads it is not disturbed.
- * 2. In a folder in which everybody may make others (/var/tmp), CACHE is this user's or root's: whoever else made it could
- *    change scenes after they were hashed, and read them.
+ * 1. A file has its name only when its digest was right. It is hashed again for every attempt: what is damaged is
+ *    fetched again, and replaced by a rename, so that whoever reads it is not disturbed.
+ * 2. In a folder in which everybody may make others (/var/tmp), CACHE is this user's or root's: whoever else made it
+ *    could change scenes after they were hashed, and read them.
  * 3. A scene that is in use is not removed. Where it takes more than its bound, or the disk is full, the cache gives up
  *    those that have not been used for longest. */
 #ifndef UNBAKE_NODE_SCENE_CACHE_H
@@ -44,8 +44,8 @@ enum status scene_cache_take(struct cached_scene *scene, const char *cache_dir, 
                              struct error *err);
 void cached_scene_release(struct cached_scene *scene);
 
-/* Fetches one file to `path`, whose folder is there, going on with PATH.part; checks size and digest, and fetches it anew
- * once where they are wrong. */
+/* Fetches one file to `path`, whose folder is there, going on with PATH.part; checks size and digest, and fetches it
+ * anew once where they are wrong. */
 enum status scene_cache_fetch_file(const char *path, const cJSON *file, const struct scene_source *source,
                                    struct error *err);
 

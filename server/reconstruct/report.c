@@ -94,8 +94,8 @@ static uint32_t samples_of(const struct reconstruction *r, double pixels_left) {
     return (uint32_t)samples;
 }
 
-/* Standard deviation of the noise of a photograph, each of whose pixels is the mean of `step` x `step`, given its radiance
- * `image`; NaN where that is. */
+/* Standard deviation of the noise of a photograph, each of whose pixels is the mean of `step` x `step`, given its
+ * radiance `image`; NaN where that is. */
 static void photograph_noise(const struct reconstruction *r, const struct photograph *photo, uint32_t step,
                              const struct image *image, struct image *noise) {
     image_init_rgb(noise, image->width, image->height);
@@ -155,7 +155,8 @@ static struct metric compare(const struct photograph *photo, const struct held_o
     return metrics_msre(&view->photograph, halves, median);
 }
 
-/* Renders the view of a photograph, again where its error is not known well, unless a time limit says how much is done. */
+/* Renders the view of a photograph, again where its error is not known well, unless a time limit says how much is
+ * done. */
 static void render_view(struct reconstruction *r, struct photograph *photo, struct held_out *view, uint32_t samples,
                         double median, size_t views, const struct reconstruct_hooks *hooks) {
     const struct path_settings path = paths_of(r->settings);
@@ -186,7 +187,8 @@ static void render_view(struct reconstruction *r, struct photograph *photo, stru
     move_pixels(&view->render, r->scene->spill);
 }
 
-/* Compares a photograph with its view, at the size of camera_step; its exposure and gain are set where they are fitted. */
+/* Compares a photograph with its view, at the size of camera_step; its exposure and gain are set where they are
+ * fitted. */
 static void compare_view(struct reconstruction *r, struct photograph *photo, struct held_out *view, uint32_t samples,
                          double median, size_t views, const struct reconstruct_hooks *hooks) {
     uint32_t step = camera_step(&photo->camera);

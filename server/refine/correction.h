@@ -4,8 +4,9 @@
  * block of the atlas, sums observed and rendered radiance; their ratio is the factor by which its base colour must
  * change (to first order a surface's radiance is its base colour times its light). A single observation is off by a
  * third, so the logarithms of the factors are the maximum a posteriori of a Gaussian Markov random field
- * (markov_field.h): they are near 0, and near those of the neighbouring cells of the chart. Changes of tint have a narrower prior
- * than changes of lightness. Factors are interpolated between the centres of cells; texture within a cell stays.
+ * (markov_field.h): they are near 0, and near those of the neighbouring cells of the chart. Changes of tint have a
+ * narrower prior than changes of lightness. Factors are interpolated between the centres of cells; texture within a
+ * cell stays.
  *
  * The noise of a cell is measured on its observations; channels are weighted by the noise of all photographs (noise.h).
  * No factor changes base colour by more than a tenth: anything more is light that the renders lack or have too much

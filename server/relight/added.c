@@ -1,5 +1,5 @@
-/* added.c -- see added.h. A material without pictures has one texel in a square of four, so that no lookup mixes it with
- * others; a thing with pictures has a block as large as its atlas. */
+/* added.c -- see added.h. A material without pictures has one texel in a square of four, so that no lookup mixes it
+ * with others; a thing with pictures has a block as large as its atlas. */
 #include "server/relight/added.h"
 
 #include <string.h>
@@ -71,7 +71,8 @@ static void extend_textures(struct materials *m, const struct texel_plan *l) {
     t->height = l->height;
 }
 
-/* --- segments ------------------------------------------------------------------------------------------------------- */
+/* --- segments
+ * ------------------------------------------------------------------------------------------------------- */
 
 static void extend_segments(struct recovered *r, const struct things *things) {
     struct materials *m = &r->materials;
@@ -107,7 +108,8 @@ static void extend_segments(struct recovered *r, const struct things *things) {
     m->segment_count = r->segments.count = count;
 }
 
-/* --- texels --------------------------------------------------------------------------------------------------------- */
+/* --- texels
+ * --------------------------------------------------------------------------------------------------------- */
 
 /* The texel of material number i. */
 static vec2 set_cell(struct materials *m, const struct texel_plan *l, size_t i, rgb color) {
@@ -141,7 +143,8 @@ static void set_block(struct materials *m, const struct texel_plan *l, const str
     }
 }
 
-/* --- triangles ------------------------------------------------------------------------------------------------------ */
+/* --- triangles
+ * ------------------------------------------------------------------------------------------------------ */
 
 /* Where one mesh has normals, the others get zeros, which mean none. */
 static void append_mesh(struct mesh *mesh, const struct mesh *more) {

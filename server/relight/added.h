@@ -1,5 +1,5 @@
-/* added.h -- puts things into a recovered room: their triangles behind the room's, a segment for each of their materials, and
- * their texels below those of the room's textures. */
+/* added.h -- puts things into a recovered room: their triangles behind the room's, a segment for each of their
+ * materials, and their texels below those of the room's textures. */
 #ifndef UNBAKE_RELIGHT_ADDED_H
 #define UNBAKE_RELIGHT_ADDED_H
 

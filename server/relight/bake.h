@@ -1,5 +1,5 @@
-/* bake.h -- the pictures of a mesh's materials, resampled into an atlas of its own: what they tile, turn and share is laid out
- * one-to-one, as the textures of a room are. */
+/* bake.h -- the pictures of a mesh's materials, resampled into an atlas of its own: what they tile, turn and share is
+ * laid out one-to-one, as the textures of a room are. */
 #ifndef UNBAKE_RELIGHT_BAKE_H
 #define UNBAKE_RELIGHT_BAKE_H
 

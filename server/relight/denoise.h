@@ -1,5 +1,5 @@
-/* denoise.h -- Intel's Open Image Denoise, by the C API of its library, where that is installed (2.x or 1.x): for pictures
- * that people look at, never for what anything is computed from.
+/* denoise.h -- Intel's Open Image Denoise, by the C API of its library, where that is installed (2.x or 1.x): for
+ * pictures that people look at, never for what anything is computed from.
  *
  * The library is opened once, before a sandbox closes: it loads further libraries then. */
 #ifndef UNBAKE_RELIGHT_DENOISE_H
@@ -21,8 +21,8 @@ void denoiser_free(struct denoiser *denoiser);
 /* "Open Image Denoise 2.3.1". Borrowed. */
 const char *denoiser_version(const struct denoiser *denoiser);
 
-/* Takes the noise out of channels first, first + 1, first + 2 of `picture`, linear and unbounded, guided by the channels
- * base_color.R G B and normal.X Y Z of `guide` (film_render_first_hits), which is of the same size. */
+/* Takes the noise out of channels first, first + 1, first + 2 of `picture`, linear and unbounded, guided by the
+ * channels base_color.R G B and normal.X Y Z of `guide` (film_render_first_hits), which is of the same size. */
 enum status denoiser_run(const struct denoiser *denoiser, struct image *picture, uint32_t first,
                          const struct image *guide, struct error *err);
 

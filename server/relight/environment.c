@@ -92,7 +92,8 @@ static enum status read_sky(const struct relight_job *job, const struct compass 
     return STATUS_OK;
 }
 
-/* The part of what was found: the reconstruction writes the sky without its sun beside the whole, where there is a sun. */
+/* The part of what was found: the reconstruction writes the sky without its sun beside the whole, where there is a
+ * sun. */
 static enum status read_found(const struct relight_job *job, enum distant_part part, struct image *picture,
                               struct error *err) {
     char *whole = file_join(job->outputs, "environment.exr"), *without = file_join(job->outputs, "sky.exr");

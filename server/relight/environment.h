@@ -1,5 +1,5 @@
-/* environment.h -- the distant light of a render: found, none, a file's, or sun and sky. It is one light, or two that are
- * told apart: the sun, and the sky, which is all the rest. */
+/* environment.h -- the distant light of a render: found, none, a file's, or sun and sky. It is one light, or two that
+ * are told apart: the sun, and the sky, which is all the rest. */
 #ifndef UNBAKE_RELIGHT_ENVIRONMENT_H
 #define UNBAKE_RELIGHT_ENVIRONMENT_H
 
@@ -26,8 +26,8 @@ uint32_t environment_suns(const struct relight_job *job);
  * asked for. */
 enum status environment_sky(const struct relight_job *job, uint32_t sun, struct sky *sky, struct error *err);
 
-/* The map, or a part of it, under the settings sky and sun; *has false: there is none, and *map is empty. The sun is told
- * apart in environment=sky, and in what was found where the reconstruction has written a sky without it. */
+/* The map, or a part of it, under the settings sky and sun; *has false: there is none, and *map is empty. The sun is
+ * told apart in environment=sky, and in what was found where the reconstruction has written a sky without it. */
 enum status environment_read(const struct relight_job *job, const struct compass *compass, uint32_t sun,
                              enum distant_part part, bool *has, struct image *map, struct error *err);
 

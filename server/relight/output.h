@@ -36,8 +36,8 @@ void output_close(struct output *o);
 /* Whether the picture's files are there as its record says. */
 bool output_is_done(const struct output *o, uint64_t picture);
 
-/* Writes a pass (or a source's light, `name`) in those formats; data are EXR even where only PNG is asked for. Its files
- * go to the array `files` of the picture's record. Changes *image. */
+/* Writes a pass (or a source's light, `name`) in those formats; data are EXR even where only PNG is asked for. Its
+ * files go to the array `files` of the picture's record. Changes *image. */
 struct output_formats {
     bool is_exr, is_png;
 };

@@ -27,8 +27,8 @@ struct picture_quality {
 /* After each round of paths; false stops. */
 typedef bool picture_round(void *user, const struct image *so_far, struct picture_quality quality);
 
-/* *image: channels R G B, and direct.R G B where `has_direct`; the caller's. STATUS_CANCELLED: `round` said so. The same
- * bytes for the same goal and settings, unless a time limits it. */
+/* *image: channels R G B, and direct.R G B where `has_direct`; the caller's. STATUS_CANCELLED: `round` said so. The
+ * same bytes for the same goal and settings, unless a time limits it. */
 enum status picture_render(const struct world *world, const struct camera *camera, const struct path_settings *settings,
                            const struct picture_goal *goal, bool has_direct, picture_round *round, void *user,
                            struct parallel *pool, struct image *image, struct picture_quality *quality,

@@ -22,8 +22,8 @@ struct recovered {
     struct world world;
 };
 
-/* All but the world. `mesh` is borrowed until recovered_release. Roughness and specular are constant per segment and read at one of its
- * texels. Emission is the mean over a segment's texels, with a pattern where they differ. */
+/* All but the world. `mesh` is borrowed until recovered_release. Roughness and specular are constant per segment and
+ * read at one of its texels. Emission is the mean over a segment's texels, with a pattern where they differ. */
 enum status recovered_read(const char *dir, const struct mesh *mesh, struct parallel *pool, struct recovered *recovered,
                            struct error *err);
 /* With the world. */

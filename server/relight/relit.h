@@ -1,4 +1,5 @@
-/* relit.h -- the room of a reconstruction as a render sees it: with other light, things taken away, changed and added. */
+/* relit.h -- the room of a reconstruction as a render sees it: with other light, things taken away, changed and
+ * added. */
 #ifndef UNBAKE_RELIGHT_RELIT_H
 #define UNBAKE_RELIGHT_RELIT_H
 

@@ -1,5 +1,6 @@
 /* sky.h -- sun and sky by the model of Preetham, Shirley and Smits, A Practical Analytic Model for Daylight (1999), and
- * where the sun stands (Meeus, Astronomical Algorithms, 1998, chapter 25, low accuracy: .01 degrees; without refraction). */
+ * where the sun stands (Meeus, Astronomical Algorithms, 1998, chapter 25, low accuracy: .01 degrees; without
+ * refraction). */
 #ifndef UNBAKE_RELIGHT_SKY_H
 #define UNBAKE_RELIGHT_SKY_H
 
@@ -27,8 +28,8 @@ struct sky {
     double north; /* radians clockwise from above, from the compass's north */
 };
 
-/* Luminance (cd/m2) as linear Rec. 709 of the sky in a direction at zenith angle `theta` and angle `gamma` from the sun,
- * both radians; theta below pi / 2. The sun is above the horizon. */
+/* Luminance (cd/m2) as linear Rec. 709 of the sky in a direction at zenith angle `theta` and angle `gamma` from the
+ * sun, both radians; theta below pi / 2. The sun is above the horizon. */
 rgb sky_radiance(const struct sky *sky, double theta, double gamma);
 /* Of the sun's disc, after the atmosphere. */
 rgb sky_sun_radiance(const struct sky *sky);

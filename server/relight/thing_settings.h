@@ -1,4 +1,5 @@
-/* thing_settings.h -- the settings of one thing that is put into a room: "lamp.3.position" of family "lamp", number 3. */
+/* thing_settings.h -- the settings of one thing that is put into a room: "lamp.3.position" of family "lamp", number
+ * 3. */
 #ifndef UNBAKE_RELIGHT_THING_SETTINGS_H
 #define UNBAKE_RELIGHT_THING_SETTINGS_H
 

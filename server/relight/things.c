@@ -1,7 +1,8 @@
 /* things.c -- see things.h.
  *
- * A ball is an icosahedron whose triangles are split into four, three times. It is as large as makes its surface that of
- * the ball: the mean area that a convex body shows is a quarter of its surface (Cauchy), so it gives as much light. */
+ * A ball is an icosahedron whose triangles are split into four, three times. It is as large as makes its surface that
+ * of the ball: the mean area that a convex body shows is a quarter of its surface (Cauchy), so it gives as much
+ * light. */
 #include "server/relight/things.h"
 
 #include <math.h>

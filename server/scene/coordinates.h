@@ -1,4 +1,5 @@
-/* coordinates.h -- coordinate systems that a capture's files know besides that of its poses. The mesh may be in one of them. */
+/* coordinates.h -- coordinate systems that a capture's files know besides that of its poses. The mesh may be in one of
+ * them. */
 #ifndef UNBAKE_SCENE_COORDINATES_H
 #define UNBAKE_SCENE_COORDINATES_H
 

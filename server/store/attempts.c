@@ -12,8 +12,8 @@
  *      store_job_yield     running          queued                                    (none runs)
  *      store_reconcile     running          queued                                    restarted
  *
- * Of a job that is split this is what the end of one part's attempt would make of the job, and makes of the part: where the
- * others take it, parts.h says.
+ * Of a job that is split this is what the end of one part's attempt would make of the job, and makes of the part: where
+ * the others take it, parts.h says.
  *
  * Leaving `running`, a recorded request decides first: cancel turns every end into cancelled, pause turns queued into
  * paused. (A cancelled job that had just succeeded is cancelled: its user was told so.) The attempt's ending is that

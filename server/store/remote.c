@@ -1,4 +1,5 @@
-/* remote.c -- see remote.h. This file is the scheduler's side and what both sides share; remote_node.c is the node's. */
+/* remote.c -- see remote.h. This file is the scheduler's side and what both sides share; remote_node.c is the
+ * node's. */
 #include "server/store/remote.h"
 
 #include <stdio.h>

@@ -24,8 +24,8 @@
 
 /* --- from an upload to a scene ----------------------------------------------------------- */
 
-/* The reading that the upload said. Where jobs keep the scene from it, it stays as it was, which its owner can see of it:
- * the content has come all the same. */
+/* The reading that the upload said. Where jobs keep the scene from it, it stays as it was, which its owner can see of
+ * it: the content has come all the same. */
 static enum status give_reading(struct resumables *r, const struct upload_row *row, const char *scene_id,
                                 struct error *err) {
     const struct caller owner = {.user_id = row->owner_id, .role = ROLE_USER};

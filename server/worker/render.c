@@ -3,9 +3,9 @@
  *
  * 1. What is finished is the checkpoint: an attempt begins with the views that earlier ones have finished in its out/
  *    (data/attempt_folder.h), and the engine keeps those that are whole. A crash costs one view.
- * 2. A view is announced when it is whole under its final name. Those that the engine has kept are announced at the end:
- *    an attempt that died between a view's end and its announcement has told nobody of it. So is the engine's record of
- *    what is done, which grows until then.
+ * 2. A view is announced when it is whole under its final name. Those that the engine has kept are announced at the
+ *    end: an attempt that died between a view's end and its announcement has told nobody of it. So is the engine's
+ *    record of what is done, which grows until then.
  * 3. The preview of the picture that is being rendered has one name, and is replaced by that of the next.
  * 4. A render that is large enough may end before its first picture by saying in which parts it is better done; a part
  *    renders its own pictures, after those that are done, and says how many of all of its own there are. For another
@@ -128,7 +128,8 @@ static void tell_message(void *user, const char *text) {
 
 static int by_name(const void *a, const void *b) { return strcmp(*(char *const *)a, *(char *const *)b); }
 
-/* Announces the files below `folder` of out/ ("": out/ itself) that are not among told[sorted_count], which is sorted. */
+/* Announces the files below `folder` of out/ ("": out/ itself) that are not among told[sorted_count], which is
+ * sorted. */
 static enum status tell_kept(struct render_run *run, const char *folder, size_t sorted_count, struct error *err) {
     char *path = *folder ? file_join(run->out_dir, folder) : mem_strdup(run->out_dir), **names = NULL;
     size_t count = 0;

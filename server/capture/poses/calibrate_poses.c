@@ -18,7 +18,8 @@
 #define COARSEST_PX 75 /* +25 %: no change */
 /* Photographs that are surely moved, at least, for a drift to be looked for: two an unknown of a pose. */
 #define MIN_SURE 12
-/* Of corrections that follow a walk: independent ones have 1 +- .12 in 72 photographs, drifts of simulated phones .2. */
+/* Of corrections that follow a walk: independent ones have 1 +- .12 in 72 photographs, drifts of simulated phones
+ * .2. */
 #define MAX_ROUGHNESS 0.5
 #define DRIFT_SIGNIFICANCE 3.0 /* standard errors; of one decision, not of one a photograph */
 /* Of log residuals: 5 %. One for all photographs, so that their agreement compares. */

@@ -36,12 +36,12 @@ void job_request_faults(const cJSON *problems, cJSON *params);
 /* Applies the body's settings, if any, to *settings; faults as above, with "settings." before their names. */
 void job_request_settings(const struct job_request *w, struct settings *settings, cJSON *params);
 
-/* A problem where the settings name an executor that is not one of `names` (separated by spaces or commas; NULL: all are
- * known). */
+/* A problem where the settings name an executor that is not one of `names` (separated by spaces or commas; NULL: all
+ * are known). */
 void job_request_executor(const char *chosen, const char *names, cJSON *params);
 
-/* NULL where mesh and photographs of the scene fit, as far as is known, or the job takes them as they are; else 409, with
- * the remedy. */
+/* NULL where mesh and photographs of the scene fit, as far as is known, or the job takes them as they are; else 409,
+ * with the remedy. */
 struct response *job_request_fit(const struct request *r, const struct scene_row *scene,
                                  const struct settings *settings);
 

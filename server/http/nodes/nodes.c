@@ -1,5 +1,5 @@
-/* nodes.c -- the node's side of an attempt that runs elsewhere: it claims it, reports, ends it. What it reads and writes
- * besides: node_files.c. The protocol as a whole: server/node/README.md. */
+/* nodes.c -- the node's side of an attempt that runs elsewhere: it claims it, reports, ends it. What it reads and
+ * writes besides: node_files.c. The protocol as a whole: server/node/README.md. */
 #include <limits.h>
 #include <stdio.h>
 #include <string.h>

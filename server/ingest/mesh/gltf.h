@@ -2,10 +2,10 @@
  *
  * Reads all triangles of the default scene (else the first scene, else all nodes), with node transforms applied, in
  * the file's metres and axes; quantised, sparse and meshopt-compressed ones, and all instances (gltf_extensions.h).
- * Points, lines, materials, cameras and lights are skipped. Skinned meshes are read as they are stored, in the pose that
- * they were bound in, and without morph targets: rooms have neither, and both are told in the report. Normals are used
- * if all primitives have them. Each pair of node and material is an object_id with
- * their names (gltf_objects.h); no object_id if there is only one pair. */
+ * Points, lines, materials, cameras and lights are skipped. Skinned meshes are read as they are stored, in the pose
+ * that they were bound in, and without morph targets: rooms have neither, and both are told in the report. Normals are
+ * used if all primitives have them. Each pair of node and material is an object_id with their names (gltf_objects.h);
+ * no object_id if there is only one pair. */
 #ifndef UNBAKE_INGEST_MESH_GLTF_H
 #define UNBAKE_INGEST_MESH_GLTF_H
 

@@ -49,8 +49,8 @@ static enum status open_plain_view(const struct gltf_file *g, size_t v, const ch
     return STATUS_OK;
 }
 
-/* The member "bufferView" of `object`, from its "byteOffset" on; data is NULL where it has none. `user` is "WHERE[INDEX]",
- * for messages; `element` is the stride of views that do not state one. */
+/* The member "bufferView" of `object`, from its "byteOffset" on; data is NULL where it has none. `user` is
+ * "WHERE[INDEX]", for messages; `element` is the stride of views that do not state one. */
 static enum status open_view(struct gltf_file *g, const cJSON *object, const char *where, size_t index, size_t element,
                              struct gltf_bytes *bytes, struct error *err) {
     char user[64];

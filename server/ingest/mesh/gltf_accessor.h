@@ -1,5 +1,5 @@
-/* gltf_accessor.h -- reads numbers through a glTF file's accessors: plain, normalised, sparse, or in views compressed by
- * meshopt. An accessor is checked to lie within its buffers before it is read. */
+/* gltf_accessor.h -- reads numbers through a glTF file's accessors: plain, normalised, sparse, or in views compressed
+ * by meshopt. An accessor is checked to lie within its buffers before it is read. */
 #ifndef UNBAKE_INGEST_MESH_GLTF_ACCESSOR_H
 #define UNBAKE_INGEST_MESH_GLTF_ACCESSOR_H
 
@@ -22,7 +22,8 @@ struct gltf_span {
 enum status gltf_span(struct gltf_file *g, size_t index, const char *type, struct gltf_span *span, struct error *err);
 void gltf_span_release(struct gltf_span *span);
 
-/* The bytes of the member "bufferView" of `object`, which is WHERE[INDEX] in messages; data is NULL where it has none. */
+/* The bytes of the member "bufferView" of `object`, which is WHERE[INDEX] in messages; data is NULL where it has
+ * none. */
 enum status gltf_view(struct gltf_file *g, const cJSON *object, const char *where, size_t index,
                       struct gltf_bytes *bytes, struct error *err);
 

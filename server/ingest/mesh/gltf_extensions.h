@@ -5,7 +5,8 @@
  *   refused   those that are known to hold or move surfaces, wherever the file uses them, and any other that it
  *             requires
  *
- * The rest may be left out of a picture according to the file itself; gltf_extensions_unknown names it for a warning. */
+ * The rest may be left out of a picture according to the file itself; gltf_extensions_unknown names it for a
+ * warning. */
 #ifndef UNBAKE_INGEST_MESH_GLTF_EXTENSIONS_H
 #define UNBAKE_INGEST_MESH_GLTF_EXTENSIONS_H
 

@@ -55,8 +55,8 @@ enum status gltf_whole(const struct gltf_file *g, const cJSON *object, const cha
                        double fallback, double least, double most, uint64_t *value, struct error *err);
 
 #define GLTF_MAX_BYTES ((double)((uint64_t)1 << 40)) /* of offsets and lengths in files */
-/* The part of a buffer that bufferViews[view] or an extension of it names by "buffer", "byteOffset" and "byteLength", at
- * least `least` bytes long; not yet held against the buffer's size. `where` as for gltf_index. */
+/* The part of a buffer that bufferViews[view] or an extension of it names by "buffer", "byteOffset" and "byteLength",
+ * at least `least` bytes long; not yet held against the buffer's size. `where` as for gltf_index. */
 enum status gltf_buffer_part(const struct gltf_file *g, const cJSON *object, const char *where, size_t view,
                              double least, size_t *buffer, uint64_t *offset, uint64_t *length, struct error *err);
 

@@ -1,6 +1,6 @@
-/* gltf_look.h -- the materials of a glTF file (glTF 2.0 specification, 3.9; KHR_materials_emissive_strength, _ior, _specular;
- * KHR_texture_transform). What they have beside that is counted in the look. Emission is radiance: an emissive factor of 1
- * is radiance 1. */
+/* gltf_look.h -- the materials of a glTF file (glTF 2.0 specification, 3.9; KHR_materials_emissive_strength, _ior,
+ * _specular; KHR_texture_transform). What they have beside that is counted in the look. Emission is radiance: an
+ * emissive factor of 1 is radiance 1. */
 #ifndef UNBAKE_INGEST_MESH_GLTF_LOOK_H
 #define UNBAKE_INGEST_MESH_GLTF_LOOK_H
 

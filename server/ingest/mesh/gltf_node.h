@@ -20,7 +20,8 @@ enum status gltf_node_transform(const struct gltf_file *g, size_t node, struct a
 
 #define GLTF_MAX_INSTANCES ((size_t)1 << 20)
 
-/* From each instance's frame to the node's: instance[count], the caller's (mem_free). `extension` is the node's member. */
+/* From each instance's frame to the node's: instance[count], the caller's (mem_free). `extension` is the node's
+ * member. */
 enum status gltf_node_instances(struct gltf_file *g, size_t node, const cJSON *extension, struct affine **instance,
                                 size_t *count, struct error *err);
 

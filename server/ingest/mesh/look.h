@@ -1,5 +1,5 @@
-/* look.h -- what a mesh's file says of its surfaces: materials with factors and pictures, for meshes that are put into a
- * room. Rooms themselves are read without: their materials are what a reconstruction finds. */
+/* look.h -- what a mesh's file says of its surfaces: materials with factors and pictures, for meshes that are put into
+ * a room. Rooms themselves are read without: their materials are what a reconstruction finds. */
 #ifndef UNBAKE_INGEST_MESH_LOOK_H
 #define UNBAKE_INGEST_MESH_LOOK_H
 
@@ -64,7 +64,8 @@ void look_leave_out(struct mesh_look *look, const char *what);
 /* Tells it in the report, as one note. */
 void look_note(const struct mesh_look *look, struct faces_report *report);
 
-/* Reads an image, once for a name and kind (made linear where it is_color), from a file below a folder (NULL: none may be read), as it was named in the file `of`. STATUS_INPUT: it cannot be. */
+/* Reads an image, once for a name and kind (made linear where it is_color), from a file below a folder (NULL: none may
+ * be read), as it was named in the file `of`. STATUS_INPUT: it cannot be. */
 enum status look_read_image(struct mesh_look *look, const char *folder, const char *of, const char *name, bool is_color,
                             size_t *number, struct error *err);
 

@@ -164,8 +164,8 @@ static uint32_t resolve_spare(const char *text, char **end, size_t count) {
     return (uint32_t)(value > 0 ? value - 1 : (long)count + value);
 }
 
-/* "v", "v/vt", "v//vn", "v/vt/vn", the last of which may be empty: position and normal (or NONE), texture coordinate (or
- * NONE). */
+/* "v", "v/vt", "v//vn", "v/vt/vn", the last of which may be empty: position and normal (or NONE), texture coordinate
+ * (or NONE). */
 static enum status read_corner(struct obj_reader *r, char *token, uint32_t pair[2], uint32_t *texture) {
     char *end;
     pair[1] = *texture = NONE;

@@ -5,8 +5,8 @@
 #include "server/ingest/mesh/look.h"
 #include "server/ingest/mesh/obj_objects.h"
 
-/* Turns mesh->object_id, objects of o, into numbers of materials of the look, which are read from the library. A library or
- * material that is not there is told in the report. `name` is the OBJ file's, for messages. */
+/* Turns mesh->object_id, objects of o, into numbers of materials of the look, which are read from the library. A
+ * library or material that is not there is told in the report. `name` is the OBJ file's, for messages. */
 enum status obj_look_settle(const struct obj_objects *o, const char *name, const char *folder, struct mesh *mesh,
                             struct mesh_look *look, struct faces_report *report, struct error *err);
 

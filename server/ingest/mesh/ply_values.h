@@ -1,9 +1,9 @@
 /* ply_values.h -- the body of a PLY file as a sequence of numbers.
  *
  * An ASCII record begins on a line of its own. Extra values of its last line are ignored where the record is one line;
- * a record that goes on in further lines (some writers wrap them) must end where a line does, so that a missing value is
- * not taken from the next record. Where that fails and lines had extra values, lines may mean nothing, because a writer
- * has broken the numbers at a width: read as a stream, values follow each other, and none may be left over. */
+ * a record that goes on in further lines (some writers wrap them) must end where a line does, so that a missing value
+ * is not taken from the next record. Where that fails and lines had extra values, lines may mean nothing, because a
+ * writer has broken the numbers at a width: read as a stream, values follow each other, and none may be left over. */
 #ifndef UNBAKE_INGEST_MESH_PLY_VALUES_H
 #define UNBAKE_INGEST_MESH_PLY_VALUES_H
 

@@ -11,8 +11,8 @@ struct ply_vertices {
     vec2 *uv; /* [position.count] as in struct mesh; NULL: vertices have none; owned */
 };
 
-/* Reads the element at `in`; sets mesh->vertex_count and, where the file has them, mesh->normal. *vertices, which begins
- * as zeros but for position.offset, is the caller's (ply_vertices_release), also after a failure. */
+/* Reads the element at `in`; sets mesh->vertex_count and, where the file has them, mesh->normal. *vertices, which
+ * begins as zeros but for position.offset, is the caller's (ply_vertices_release), also after a failure. */
 enum status ply_read_vertices(struct ply_values *in, const struct ply_element *e, struct ply_vertices *vertices,
                               struct mesh *mesh);
 void ply_vertices_release(struct ply_vertices *vertices);

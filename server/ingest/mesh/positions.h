@@ -38,8 +38,8 @@ double positions_step(double coordinate);
  * range. The positions are empty then. */
 void positions_settle(struct positions *p, struct mesh *mesh);
 
-/* "unbake offset X Y Z" as our PLY and OBJ files have it in a comment, NUL-terminated; false, and *offset unchanged, when the
- * text is anything else. */
+/* "unbake offset X Y Z" as our PLY and OBJ files have it in a comment, NUL-terminated; false, and *offset unchanged,
+ * when the text is anything else. */
 bool positions_read_offset(const char *comment, double offset[3]);
 
 #endif

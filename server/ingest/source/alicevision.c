@@ -1,5 +1,5 @@
-/* alicevision.c -- Meshroom's .sfm or .json of AliceVision (aliceVision/sfmDataIO/jsonIO.cpp): views, intrinsics and poses;
- * numbers are strings.
+/* alicevision.c -- Meshroom's .sfm or .json of AliceVision (aliceVision/sfmDataIO/jsonIO.cpp): views, intrinsics and
+ * poses; numbers are strings.
  *
  * A pose's rotation is stored column by column and is that of the world into the camera, so that it reads row by row as
  * camera-to-world; camera axes are ours. The pose of a view of a rig is that of the rig times its own in the rig. Since
@@ -177,8 +177,8 @@ static bool read_pose(const cJSON *pose, double m[3][4]) {
     return true;
 }
 
-/* Of a view whose poseId is its rig's: the pose within the rig. NULL: of no rig, or of a pose of its own; *is_lost: of a
- * rig that does not know it. */
+/* Of a view whose poseId is its rig's: the pose within the rig. NULL: of no rig, or of a pose of its own; *is_lost: of
+ * a rig that does not know it. */
 static const cJSON *find_sub_pose(struct alice_file *file, const cJSON *view, bool *is_lost) {
     const cJSON *independent = cJSON_GetObjectItemCaseSensitive(view, "isPoseIndependant");
     const char *text = cJSON_GetStringValue(independent);

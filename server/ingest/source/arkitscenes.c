@@ -1,6 +1,6 @@
-/* arkitscenes.c -- ARKitScenes' raw and 3DOD data (github.com/apple/ARKitScenes, DATA.md): lowres_wide.traj with lines of
- * time, axis times angle, translation, world-to-camera with our camera axes; photographs lowres_wide/ID_TIME.png and a
- * lens each, lowres_wide_intrinsics/ID_TIME.pincam: w h fx fy cx cy. The mesh ID_3dod_mesh.ply is in the same world.
+/* arkitscenes.c -- ARKitScenes' raw and 3DOD data (github.com/apple/ARKitScenes, DATA.md): lowres_wide.traj with lines
+ * of time, axis times angle, translation, world-to-camera with our camera axes; photographs lowres_wide/ID_TIME.png and
+ * a lens each, lowres_wide_intrinsics/ID_TIME.pincam: w h fx fy cx cy. The mesh ID_3dod_mesh.ply is in the same world.
  * Photographs get the pose at their time, between those of the trajectory, which come at 10 Hz. wide/ (1920 x 1440) and
  * vga_wide/ (640 x 480) of the raw data are of the same camera and are preferred where they are there. */
 #include <math.h>

@@ -1,8 +1,8 @@
 /* bundler.c -- Bundler v0.3: bundle.out and list.txt (phototour.cs.washington.edu/bundler, section 5).
  *
  * Per camera: f k1 k2; a 3 x 3 rotation, row-major; a translation. World-to-camera, looking along -z with y up; pixel =
- * f (1 + k1 r^2 + k2 r^4) p with p = -P / P.z and the origin at the picture's centre. f = 0: the photograph has no pose.
- * Line i of list.txt begins with the name of camera i's photograph. */
+ * f (1 + k1 r^2 + k2 r^4) p with p = -P / P.z and the origin at the picture's centre. f = 0: the photograph has no
+ * pose. Line i of list.txt begins with the name of camera i's photograph. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -12,8 +12,8 @@ struct utm {
     bool is_south;
 };
 
-/* Of a code of EPSG's: WGS 84 (326zz, 327zz) and ETRS89 (258zz), which differ by less than a metre of all at once. False: none
- * of UTM. */
+/* Of a code of EPSG's: WGS 84 (326zz, 327zz) and ETRS89 (258zz), which differ by less than a metre of all at once.
+ * False: none of UTM. */
 bool geodesy_utm_of_epsg(int code, struct utm *utm);
 /* That of a geocentric place. */
 struct utm geodesy_utm_at(const double place[3]);
@@ -23,8 +23,8 @@ void geodesy_from_local(const double place[3], double geocentric_from_local[3][4
 /* To geocentric coordinates from easting, northing and height above the ellipsoid: what holds at `place`. */
 void geodesy_from_utm(const double place[3], const struct utm *utm, double geocentric_from_utm[3][4]);
 
-/* Easting, northing and height of a place: Krueger's series to the third power of the flattening, better than a millimetre
- * within the zone (Karney 2011, "Transverse Mercator with an accuracy of a few nanometers"). */
+/* Easting, northing and height of a place: Krueger's series to the third power of the flattening, better than a
+ * millimetre within the zone (Karney 2011, "Transverse Mercator with an accuracy of a few nanometers"). */
 void geodesy_to_utm(const double place[3], const struct utm *utm, double out[3]);
 
 #endif

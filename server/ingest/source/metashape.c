@@ -1,15 +1,16 @@
 /* metashape.c -- Agisoft Metashape's "Export Cameras", XML (Metashape manual, appendices C and D).
  *
- * A camera's transform is camera-to-chunk, 4 x 4, row-major, with our camera axes; the chunk's transform (or, since 2.0,
- * the camera's component's) takes it to the coordinates in which models are exported. That of a georeferenced chunk leads
- * to geocentric coordinates, in which models are seldom exported: theirs may also be the chunk's own ("chunk"), have
- * their origin in the chunk's region, x to the east and z up ("local"), or be easting, northing and height above the
- * ellipsoid of UTM ("projected"). A model in another projected system, or with heights above the sea, fits none of these.
+ * A camera's transform is camera-to-chunk, 4 x 4, row-major, with our camera axes; the chunk's transform (or, since
+ * 2.0, the camera's component's) takes it to the coordinates in which models are exported. That of a georeferenced
+ * chunk leads to geocentric coordinates, in which models are seldom exported: theirs may also be the chunk's own
+ * ("chunk"), have their origin in the chunk's region, x to the east and z up ("local"), or be easting, northing and
+ * height above the ellipsoid of UTM ("projected"). A model in another projected system, or with heights above the sea,
+ * fits none of these.
  *
- * Distortion: k1 to k4 of even powers, p1 (r^2 + 2 x^2) + 2 p2 x y for x: OpenCV's with p1 and p2 exchanged; cx, cy from
- * the picture's centre; fx = f + b1. A fisheye has the same of x and y scaled to the angle from the axis, which with p1
- * and p2 is COLMAP's THIN_PRISM_FISHEYE. b2 (skew) and p3, p4 (of higher order of p1, p2) are not modelled: what they
- * are at the picture's corner is told. */
+ * Distortion: k1 to k4 of even powers, p1 (r^2 + 2 x^2) + 2 p2 x y for x: OpenCV's with p1 and p2 exchanged; cx, cy
+ * from the picture's centre; fx = f + b1. A fisheye has the same of x and y scaled to the angle from the axis, which
+ * with p1 and p2 is COLMAP's THIN_PRISM_FISHEYE. b2 (skew) and p3, p4 (of higher order of p1, p2) are not modelled:
+ * what they are at the picture's corner is told. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

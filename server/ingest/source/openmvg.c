@@ -1,6 +1,7 @@
-/* openmvg.c -- OpenMVG's sfm_data.json (openMVG/src/openMVG/sfm/sfm_data_io_cereal.hpp): views, intrinsics and extrinsics,
- * each an array of {key, value}. A pose is the rotation of the world into the camera and the camera's centre, with our
- * camera axes. Distortion is OpenCV's, with the tangential coefficients in its order: x gets t2 (r^2 + 2 x^2) + 2 t1 x y. */
+/* openmvg.c -- OpenMVG's sfm_data.json (openMVG/src/openMVG/sfm/sfm_data_io_cereal.hpp): views, intrinsics and
+ * extrinsics, each an array of {key, value}. A pose is the rotation of the world into the camera and the camera's
+ * centre, with our camera axes. Distortion is OpenCV's, with the tangential coefficients in its order: x gets t2 (r^2 +
+ * 2 x^2) + 2 t1 x y. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

@@ -1,7 +1,7 @@
 /* opensfm.c -- OpenSfM and OpenDroneMap (opensfm.org/docs/dataset.html): reconstruction.json.
  *
- * Shots are world-to-camera, an axis times an angle and a translation, with our camera axes. Lengths of a lens are shares
- * of the picture's longer side. OpenDroneMap writes the reconstruction a second time in the coordinates of its
+ * Shots are world-to-camera, an axis times an angle and a translation, with our camera axes. Lengths of a lens are
+ * shares of the picture's longer side. OpenDroneMap writes the reconstruction a second time in the coordinates of its
  * georeferenced mesh (odm_textured_model_geo.obj): reconstruction.geocoords.json, which is preferred. Since version 2.0
  * it is that which it calls reconstruction.json, and the other one reconstruction.topocentric.json. */
 #include <math.h>

@@ -96,8 +96,8 @@ static void add_meant(struct meant *meant, int *best, int degree, const struct l
         meant->rival = file;
 }
 
-/* The picture in `folder` (a base) that `name` means there: exactly, else but for case and spelling of accents (name_key.h), else but for the extension, and
- * then rather a picture than the camera's raw file beside it. */
+/* The picture in `folder` (a base) that `name` means there: exactly, else but for case and spelling of accents
+ * (name_key.h), else but for the extension, and then rather a picture than the camera's raw file beside it. */
 static struct meant find_meant(const struct pictures *in, const char *folder, const char *name) {
     char *key = make_key(folder, name), *full = mem_printf("%s%s", folder, name);
     struct meant meant = {NULL, NULL};
@@ -260,7 +260,8 @@ size_t photo_folder_settle(const struct listing *l, const char *base, bool tells
 
 static int by_text(const void *a, const void *b) { return strcmp(*(char *const *)a, *(char *const *)b); }
 
-/* Leaves out the frames' photographs: where masks are missing, photographs of the same names must not stand for them. */
+/* Leaves out the frames' photographs: where masks are missing, photographs of the same names must not stand for
+ * them. */
 static void drop_photographs(struct pictures *in, const struct frames *t) {
     const char **path = mem_array(t->frame_count, sizeof *path);
     size_t kept = 0;

@@ -20,7 +20,8 @@ void pose_track_sort(struct pose_track *track);
 void pose_track_release(struct pose_track *track);
 
 /* Camera-to-world at a time: that of the pose before and the one behind, interpolated (positions linearly, rotations by
- * normalised quaternions). False when these are more than gap_sec apart, or the time is more than gap_sec / 2 outside. */
+ * normalised quaternions). False when these are more than gap_sec apart, or the time is more than gap_sec / 2
+ * outside. */
 bool pose_track_at(const struct pose_track *track, double time_sec, double gap_sec, double m[3][4]);
 
 #endif

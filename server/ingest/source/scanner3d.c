@@ -1,6 +1,6 @@
-/* scanner3d.c -- 3D Scanner App's "all data": frame_N.json with cameraPoseARFrame (4 x 4, row-major, camera-to-world with
- * OpenGL's camera axes in ARKit's world) and intrinsics (3 x 3, row-major), beside frame_N.jpg; the mesh of its export
- * (export.obj, textured_output.obj) is in the same world. Not every frame has a photograph. */
+/* scanner3d.c -- 3D Scanner App's "all data": frame_N.json with cameraPoseARFrame (4 x 4, row-major, camera-to-world
+ * with OpenGL's camera axes in ARKit's world) and intrinsics (3 x 3, row-major), beside frame_N.jpg; the mesh of its
+ * export (export.obj, textured_output.obj) is in the same world. Not every frame has a photograph. */
 #include <math.h>
 #include <stdio.h>
 

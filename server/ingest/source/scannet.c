@@ -1,6 +1,6 @@
-/* scannet.c -- ScanNet as its SensReader exports it: pose/N.txt, a camera-to-world matrix each, row-major, COLMAP's axes;
- * intrinsic/intrinsic_color.txt; photographs color/N.jpg. Pixel centres are at integers. Poses that are not finite
- * (tracking lost) are left out. */
+/* scannet.c -- ScanNet as its SensReader exports it: pose/N.txt, a camera-to-world matrix each, row-major, COLMAP's
+ * axes; intrinsic/intrinsic_color.txt; photographs color/N.jpg. Pixel centres are at integers. Poses that are not
+ * finite (tracking lost) are left out. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

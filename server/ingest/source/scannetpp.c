@@ -3,9 +3,9 @@
  * scans/mesh_aligned_0.05.ply.
  *
  * The poses are those of ns-process-data, whose x and y are the mesh's y and x, and z its -z, which the file does not
- * say; they are turned back. Photographs marked is_bad are left out, test_frames held out. The same file put flat beside
- * the mesh is known by the mesh's name. Where only the photographs without distortion are there, which the data set's
- * toolkit makes, their own file is read: names are the same, lenses are not. */
+ * say; they are turned back. Photographs marked is_bad are left out, test_frames held out. The same file put flat
+ * beside the mesh is known by the mesh's name. Where only the photographs without distortion are there, which the data
+ * set's toolkit makes, their own file is read: names are the same, lenses are not. */
 #include <string.h>
 
 #include "common/mem.h"

@@ -1,7 +1,7 @@
-/* sevenscenes.c -- Microsoft's 7-Scenes: seq-NN/frame-NNNNNN.color.png and .pose.txt, a camera-to-world matrix, row-major,
- * with our camera axes. The lens is in none of the files. The data set's page gives 585 pixels and 320, 240 for the depth
- * camera of 640 x 480; colour is not registered to it, and works that use it take 525 (Brachmann & Rother 2017), the
- * nominal one of the camera. */
+/* sevenscenes.c -- Microsoft's 7-Scenes: seq-NN/frame-NNNNNN.color.png and .pose.txt, a camera-to-world matrix,
+ * row-major, with our camera axes. The lens is in none of the files. The data set's page gives 585 pixels and 320, 240
+ * for the depth camera of 640 x 480; colour is not registered to it, and works that use it take 525 (Brachmann & Rother
+ * 2017), the nominal one of the camera. */
 #include <math.h>
 #include <string.h>
 

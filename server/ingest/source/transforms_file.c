@@ -1,6 +1,6 @@
-/* transforms_file.c -- transforms.json of nerfstudio and instant-ngp (transforms.h says what is read of it), and the same in
- * three files, as NeRF's synthetic scenes and BlenderNeRF have it: transforms_train.json, _val.json and _test.json, the
- * latter two held out. */
+/* transforms_file.c -- transforms.json of nerfstudio and instant-ngp (transforms.h says what is read of it), and the
+ * same in three files, as NeRF's synthetic scenes and BlenderNeRF have it: transforms_train.json, _val.json and
+ * _test.json, the latter two held out. */
 #include "server/ingest/source/transforms_file.h"
 
 #include <string.h>

@@ -1,10 +1,10 @@
 /* tum.c -- TUM RGB-D (cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats) and recordings of its form: rgb.txt with
- * "time name" lines, groundtruth.txt with "time tx ty tz qx qy qz qw", camera-to-world with our camera axes. Photographs
- * get the pose at their time; those without two poses at most GAP_SEC apart are left out.
+ * "time name" lines, groundtruth.txt with "time tx ty tz qx qy qz qw", camera-to-world with our camera axes.
+ * Photographs get the pose at their time; those without two poses at most GAP_SEC apart are left out.
  *
- * The lens is in none of the files. That of TUM's own recordings goes by the camera, freiburg1 to 3, which rgb.txt names
- * in its head; another's is read from calibration.txt: fx fy cx cy and perhaps k1 k2 p1 p2 k3. Pixel centres are at
- * integers. */
+ * The lens is in none of the files. That of TUM's own recordings goes by the camera, freiburg1 to 3, which rgb.txt
+ * names in its head; another's is read from calibration.txt: fx fy cx cy and perhaps k1 k2 p1 p2 k3. Pixel centres are
+ * at integers. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -18,7 +18,8 @@ struct xml_node {
     struct xml_node *parent, *first, *last, *next;
 };
 
-/* Parses text[size]; `name` is for messages. The root element is the caller's (xml_free). STATUS_INPUT with the line. */
+/* Parses text[size]; `name` is for messages. The root element is the caller's (xml_free). STATUS_INPUT with the
+ * line. */
 enum status xml_parse(const char *text, size_t size, const char *name, struct xml_node **root, struct error *err);
 void xml_free(struct xml_node *node); /* NULL is fine */
 
