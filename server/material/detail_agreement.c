@@ -11,9 +11,11 @@
 /* Splits of the photographs into halves; a split counts for a texel if the lesser half has this part of its weight. */
 #define SPLITS 4       /* +25 %: +0.01 dB */
 #define MIN_HALF 0.15f /* +25 %: +0.01 dB */
-/* Radius over which the halves' agreement is averaged, texels, and the weight of their disagreement as noise: it is low
- * because part of it is a difference of sharpness. */
+/* Radius over which the halves' agreement is averaged, texels. */
 #define AGREEMENT_RADIUS 4 /* +25 %: +0.02 dB */
+/* Of the halves' disagreement so many times what the photographs' noise is expected to make is noise: that is measured by a
+ * low quantile, and renderers' noise has long tails. The rest counts little: it is a difference of sharpness. */
+#define NOISE_MARGIN 4.0   /* +25 %: error of test_detail's tiles .0277 to .0279, elsewhere no change */
 #define DISAGREEMENT 0.04f /* +25 %: +0.01 dB */
 #define MIN_SHARE 0.05f    /* a lower share counts as 0; +25 %: 0 dB */
 /* Scales of the integer sums: COUNT_SCALE until the greatest sum of weights is known, then the largest that cannot
@@ -21,8 +23,8 @@
 #define COUNT_SCALE 4096.0f /* +25 %: 0 dB */
 #define MAX_SUM 1e9f        /* +25 %: 0 dB */
 
-enum { WEIGHT, RESIDUAL };   /* the sums in use here: weights, and weighted residuals */
-#define ALL_PHOTOGRAPHS (-1) /* in place of a split */
+enum { WEIGHT, RESIDUAL, NOISE }; /* the sums in use here: weights, weighted residuals, variance of these */
+#define ALL_PHOTOGRAPHS (-1)      /* in place of a split */
 
 /* Adds each pixel's weight and weighted residual to the texels of its footprint. */
 static void weigh_row(void *user, size_t row, int thread) {
@@ -40,6 +42,7 @@ static void weigh_row(void *user, size_t row, int thread) {
         for (size_t i = 0; i < t.count; i++) {
             detail_add(&d->sum[t.texel[i]][WEIGHT], weight * t.share[i]);
             detail_add(&d->sum[t.texel[i]][RESIDUAL], weight * t.share[i] * residual);
+            detail_add(&d->sum[t.texel[i]][NOISE], weight * t.share[i] * t.share[i]);
         }
     }
 }
@@ -53,14 +56,16 @@ static void sum_weighted(struct detail *d, int split, float scale) {
             detail_pixels_rows(d, t, weigh_row);
 }
 
-/* Sums over the splits: the square of a texel's mean residual, and the product of the halves' mean residuals. */
+/* Sums over the splits: the square of a texel's mean residual, the product of the halves' mean residuals, and the variance
+ * that the photographs' noise is expected to make of the mean residual. */
 struct agreement {
-    float square, common;
+    float square, common, noise;
 };
 
 struct agreement_job {
     struct detail *detail;
     float *residual;             /* [height][width] the sum over all photographs */
+    float *noise;                /* [height][width] expected variance of the mean residual of all */
     struct agreement *agreement; /* [height][width] */
 };
 
@@ -85,6 +90,7 @@ static void agree_chunk(void *user, size_t chunk, int thread) {
         double mean = (double)a->residual[texel] / all;
         a->agreement[texel].square += (float)(mean * mean);
         a->agreement[texel].common += (float)(residual[0] / weight[0] * (residual[1] / weight[1]));
+        a->agreement[texel].noise += a->noise[texel];
     }
 }
 
@@ -93,7 +99,7 @@ static float signal_share_of(const struct agreement_job *a, uint32_t texel) {
     const struct detail *d = a->detail;
     long width = (long)d->in.surface.inverse->width, height = (long)d->in.surface.inverse->height;
     long x0 = (long)texel % width, y0 = (long)texel / width;
-    double square = 0.0, common = 0.0;
+    double square = 0.0, common = 0.0, expected = 0.0;
     if (!(a->agreement[texel].square > 0.0f))
         return 0.0f;
     for (long y = y0 - AGREEMENT_RADIUS; y <= y0 + AGREEMENT_RADIUS; y++) {
@@ -103,9 +109,11 @@ static float signal_share_of(const struct agreement_job *a, uint32_t texel) {
                 continue;
             square += (double)a->agreement[at].square;
             common += (double)a->agreement[at].common;
+            expected += (double)a->agreement[at].noise;
         }
     }
-    double noise = DISAGREEMENT * fmax(square - common, 0.0);
+    double off = fmax(square - common, 0.0), noise = fmin(off, NOISE_MARGIN * expected);
+    noise += DISAGREEMENT * (off - noise);
     float share = common > 0.0 ? (float)(common / (common + noise)) : 0.0f;
     return share < MIN_SHARE ? 0.0f : share;
 }
@@ -136,14 +144,21 @@ void detail_agreement_find(struct detail *d) {
     sum_weights(d);
     struct agreement_job a = {.detail = d,
                               .residual = mem_calloc_large(texels, sizeof *a.residual),
+                              .noise = mem_calloc_large(texels, sizeof *a.noise),
                               .agreement = mem_calloc_large(texels, sizeof *a.agreement)};
-    for (size_t i = 0; i < d->in.surface.inverse->valid_count; i++)
-        a.residual[d->in.surface.inverse->valid[i]] = (float)scaled(d, d->in.surface.inverse->valid[i], RESIDUAL);
+    for (size_t i = 0; i < d->in.surface.inverse->valid_count; i++) {
+        uint32_t texel = d->in.surface.inverse->valid[i];
+        double weight = (double)d->weight_sum[texel];
+        a.residual[texel] = (float)scaled(d, texel, RESIDUAL);
+        a.noise[texel] =
+            weight > 0.0 ? (float)((double)d->variance * scaled(d, texel, NOISE) / (weight * weight)) : 0.0f;
+    }
     for (int split = 0; split < SPLITS; split++) {
         sum_weighted(d, split, d->sum_scale);
         parallel_for(d->in.pool, detail_chunks(d), agree_chunk, &a);
     }
     parallel_for(d->in.pool, detail_chunks(d), share_chunk, &a);
     mem_free(a.agreement);
+    mem_free(a.noise);
     mem_free(a.residual);
 }

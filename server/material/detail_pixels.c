@@ -161,6 +161,7 @@ static void choose_pixels(struct detail *d) {
             most = d->triangle[t][i] == DETAIL_NONE ? most : fmaxf(most, d->weight[t][i]);
         }
     }
+    d->variance = most > 0.0f ? SPECULAR_FLOOR * SPECULAR_FLOOR / most : 0.0f; /* weight_of */
     for (uint32_t t = 0; t < d->in.views->train_count; t++) {
         for (size_t i = 0, width = photograph_of(d, t)->camera.width; i < pixels_of(d, t); i++) {
             if (i % width == 0)

@@ -44,6 +44,7 @@ struct detail {
     float *signal_share;       /* share of the residual that is not noise; 0: the texel is not changed */
     uint16_t (*change)[2][3];  /* change of base colour after the last step and after the one before */
     float sum_scale;
+    float variance;    /* of the residual of a pixel of weight 1, by the photographs' noise */
     float t, momentum; /* FISTA's t and momentum */
 };
 

@@ -21,6 +21,11 @@
 #define PAINTED_FRAMES 24
 #define PAINTED_TEXTURE 256
 
+#define PAINTED_NOISE 0.0173f /* amplitude: 1 % in the root mean square */
+
+/* What the next room has. */
+static float painted_contrast = 1.0f, painted_noise = PAINTED_NOISE;
+
 struct painted {
     bool tiles;
     struct parallel *pool;
@@ -45,7 +50,7 @@ static inline rgb painted_radiance(const struct painted *room, int64_t object, v
     float fine = sinf(17.0f * p.x + 5.0f * p.z) * sinf(15.0f * p.y + 9.0f * p.z + 0.5f);
     int tile = (int)floorf(2.3f * p.x + 0.37f) + (int)floorf(2.3f * p.y + 0.37f) + (int)floorf(2.3f * p.z + 0.37f);
     float paint = room->tiles ? (tile & 1 ? 1.3f : 0.7f) : 1.0f + 0.35f * wave + 0.35f * fine;
-    return rgb_scale(wall_color[object], shade * paint);
+    return rgb_scale(wall_color[object], shade * (1.0f + painted_contrast * (paint - 1.0f)));
 }
 
 static inline void painted_take(struct painted *room, int frame) {
@@ -68,7 +73,7 @@ static inline void painted_take(struct painted *room, int frame) {
         }
         const float value[3] = {sum.r, sum.g, sum.b};
         for (size_t c = 0; c < 3; c++) {
-            float noise = 1.0f + 0.0173f * painted_random((uint64_t)frame, 3 * i + c);
+            float noise = 1.0f + painted_noise * painted_random((uint64_t)frame, 3 * i + c);
             photo->pixel[i][c] = image_half_from_float(value[c] * noise);
         }
     }
