@@ -4,11 +4,13 @@
 #include <unistd.h>
 
 #include "client/commands.h"
+#include "client/format.h"
 #include "client/outcome.h"
 #include "common/mem.h"
 
 const struct command_option open_options[] = {
     {"print", 'p', OPTION_FLAG, NULL, "only print the address"},
+    FORMAT_OPTION,
     {0},
 };
 

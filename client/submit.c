@@ -12,6 +12,7 @@
 
 #include "client/client_room.h"
 #include "client/commands.h"
+#include "client/format.h"
 #include "client/findings.h"
 #include "client/matrix.h"
 #include "client/new_job.h"
@@ -25,6 +26,7 @@ const struct command_option submit_options[] = {
     {"matrix", 'm', OPTION_LIST, "KEY=A,B,...",
      "a job for each value (A;B where values have commas); several: for each combination"},
     NEW_JOB_OPTIONS,
+    FORMAT_OPTION,
     ROOM_OPTIONS(OPTION_LIST),
     {"share", 0, OPTION_FLAG, NULL, "let every user of the server look at the job and its room"},
     WATCH_OPTION,

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "client/commands.h"
+#include "client/format.h"
 #include "client/outcome.h"
 #include "client/view.h"
 #include "common/clock.h"
@@ -16,6 +17,7 @@
 const struct command_option wait_options[] = {
     {"any", 0, OPTION_FLAG, NULL, "until the first of them has ended, not all"},
     {"timeout", 't', OPTION_SECONDS, "SEC", "at most so long; then ends with 9"},
+    FORMAT_OPTION,
     {0},
 };
 

@@ -19,6 +19,12 @@ equal "$(sort <<<"$out")" "1 succeeded"$'\n'"2 succeeded"
 run 0 wait last
 has "$out" "job 2 succeeded"
 run 0 wait 1 2 --json
+all=$out
+for form in "-o json" "--format json"; do
+    # shellcheck disable=SC2086
+    run 0 wait 1 2 $form
+    equal "$out" "$all" "wait $form"
+done
 equal "$(jq -s -c 'map([.id, .state])' <<<"$out")" '[[1,"succeeded"],[2,"succeeded"]]'
 run 0 submit "$work/room" $long -q
 run 9 wait 3 --timeout 0.2 -q
