@@ -19,7 +19,7 @@ static struct object measure_object(const struct mesh *mesh, const struct recove
     for (size_t t = 0; t < mesh->triangle_count; t++) {
         if (mesh->object_id[t] != id)
             continue;
-        double area = 0.5 * (double)vec3_length(mesh_cross(mesh, t));
+        double area = (double)mesh_triangle_area(mesh, t);
         uint32_t segment = recovered->segments.of_triangle[t];
         object.area += area;
         if (!rgb_is_black(recovered->materials.emission[segment]))

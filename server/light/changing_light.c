@@ -10,9 +10,7 @@
 #include "server/render/sampler.h"
 #include "server/scene/surface.h"
 
-#define PLACES 96 /* texels that are asked */
-#define PLACES_LEAST 24
-#define PHOTOGRAPHS_LEAST 4.0f
+#define PLACES 96 /* texels that are asked; a quarter of them at least by enough photographs */
 /* Standard deviation of the logarithm of what photographs show, from which on it is worth asking. */
 #define SPREAD_LEAST 0.8f
 #define SHARE_LEAST 0.1f /* of the places; where fewer spread so far none is asked */
@@ -25,8 +23,9 @@
  * changes. Within a picture it is darker here and there. */
 #define RING_PIXELS 6.0f
 #define RING_LIT 0.35f
-#define MIN_OBSERVATIONS 2    /* of either kind */
-#define OBSERVATIONS_TESTED 4 /* whether they may be highlights */
+#define MIN_OBSERVATIONS 2 /* of either kind */
+/* So many of either kind together; and of the lit ones, twice as many as are needed, are tested for highlights. */
+#define BOTH_KINDS (2 * MIN_OBSERVATIONS)
 /* The glossiest surface that is no metal; what is lit must be so many times brighter than its highlight. */
 #define SPECULAR 1.0f
 #define BRIGHTER 2.0f
@@ -79,11 +78,11 @@ static bool changed(const struct divide *d, uint32_t texel, int thread) {
     struct {
         uint32_t train;
         float shown;
-    } lit[OBSERVATIONS_TESTED];
+    } lit[BOTH_KINDS];
     struct best drawn;
-    struct best_item item[OBSERVATIONS_TESTED];
+    struct best_item item[BOTH_KINDS];
     size_t black_count = 0, own = 0;
-    best_init(&drawn, item, OBSERVATIONS_TESTED);
+    best_init(&drawn, item, BOTH_KINDS);
     if (!surface_at_texel(s->mesh, s->atlas, s->inverse, texel, &at) || !divide_lambert(d, texel, &white))
         return false;
     for (uint32_t t = 0; t < d->views->train_count; t++) {
@@ -110,12 +109,12 @@ float changing_light(const struct divide *d, const uint32_t *texel, size_t count
     size_t places = 0, spread = 0, changes = 0;
     for (size_t i = 0; i < PLACES && count >= PLACES; i++) {
         uint32_t at = texel[spaced(i, count, PLACES)];
-        if (fused->count[at] < PHOTOGRAPHS_LEAST)
+        if (fused->count[at] < (float)BOTH_KINDS)
             continue;
         spread += fused->spread[at] > SPREAD_LEAST;
         place[places++] = at;
     }
-    if (places < PLACES_LEAST || (float)spread < SHARE_LEAST * (float)places)
+    if (places < PLACES / 4 || (float)spread < SHARE_LEAST * (float)places)
         return 0.0f;
     for (size_t i = 0; i < places; i++)
         changes += fused->spread[place[i]] > SPREAD_LEAST && changed(d, place[i], thread);

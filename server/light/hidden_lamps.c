@@ -12,11 +12,7 @@
 /* A few points of the room are asked about every candidate and few points of it; all are asked about the likeliest. */
 #define FEW_POINTS 2048
 #define FEW_SOURCE_POINTS 8
-#define LIKELIEST 8
-#define FITTED 4 /* of which are fitted together with all other sources */
-#define SOLVE_STEPS 8
-/* Prior odds: lamps expected among all candidates. */
-#define LAMPS_EXPECTED 1.0
+#define LIKELIEST 8 /* half of which are fitted together with all other sources */
 /* Logarithm of the odds that are asked for: 20 to 1, as a false lamp costs more than a missed one. */
 #define SURE 3.0
 #define NO_LIGHT (-1e3) /* the logarithm of no radiance to speak of */
@@ -111,11 +107,12 @@ static int by_gain(const void *a, const void *b) {
     return (first->segment > second->segment) - (first->segment < second->segment);
 }
 
-/* Logarithm of the odds that a lamp, one of `count` candidates, is there, over those that are asked for, if the loss is
- * `gain` lower with it. How alike patches are is measured with it: without, what it lights agrees. */
+/* Logarithm of the odds that a lamp is there, of which one is expected among `count` candidates, over those that are
+ * asked for, if the loss is `gain` lower with it. How alike patches are is measured with it: without, what it lights
+ * agrees. */
 static double odds(struct light_model *m, double gain, size_t count) {
     light_model_measure(m);
-    return gain / m->patches_alike - log((double)count / LAMPS_EXPECTED) - SURE;
+    return gain / m->patches_alike - log((double)count) - SURE;
 }
 
 /* Gives what unseen surfaces send its prior value: it must not keep explaining what a lamp explains better. */
@@ -143,7 +140,7 @@ static size_t find_likeliest(struct lamp_search *s) {
     forget_guesses(&m->fit, m->first_guess);
     parallel_for(m->r->pool, likeliest, try_candidate, s);
     qsort(s->candidate, likeliest, sizeof *s->candidate, by_gain);
-    return likeliest < FITTED ? likeliest : FITTED;
+    return likeliest < LIKELIEST / 2 ? likeliest : LIKELIEST / 2;
 }
 
 /* Fits the likeliest candidates each together with all sources; adds the best one if the evidence suffices. */
@@ -156,7 +153,7 @@ static bool add_best(struct lamp_search *s) {
     size_t likeliest = find_likeliest(s);
     for (size_t i = 0; i < likeliest && s->candidate[i].gain > 0.0; i++) {
         joint_fit_add(&m->fit, &s->candidate[i].source, s->candidate[i].all);
-        double likely = odds(m, without - joint_fit_solve(&m->fit, SOLVE_STEPS), s->count);
+        double likely = odds(m, without - joint_fit_solve(&m->fit, JOINT_STEPS_NEAR), s->count);
         if (likely > greatest) {
             greatest = likely, best = i;
             memcpy(fitted, m->fit.source, bytes);
@@ -196,7 +193,7 @@ static bool remove_one(struct lamp_search *s) {
         if (odds(m, gain, s->count + 1) > 0.0)
             continue;
         light_model_remove_hidden(m, i);
-        joint_fit_solve(&m->fit, SOLVE_STEPS);
+        joint_fit_solve(&m->fit, JOINT_STEPS_NEAR);
         return true;
     }
     return false;
@@ -208,7 +205,7 @@ void hidden_lamps_find(struct light_model *m) {
     choose_few(&s);
     find_candidates(&s);
     renew_few(&s);
-    while (s.count > 0 && m->lamps.count - before < LIGHT_HIDDEN_MOST && add_best(&s))
+    while (s.count > 0 && m->lamps.count - before < LIGHT_MOST && add_best(&s))
         continue;
     while (m->lamps.count > before && remove_one(&s))
         continue;

@@ -4,10 +4,9 @@
 #include "common/mem.h"
 #include "server/light/joint_fit.h"
 
-/* Values of a source that is tried: from one that adds this share of known light to what it lights, on average, each a
- * factor stronger; then nearer to the best. */
+/* Values of a source that is tried: from one that adds this share of known light to what it lights, on average, octaves
+ * apart; then nearer to the best. */
 #define TRIED_FAINTEST 0.01
-#define TRIED_FACTOR 2.0
 #define TRIED 18
 #define TRIED_NEARER 4
 
@@ -46,7 +45,7 @@ static double faintest(const struct trial *t) {
 }
 
 static double search(struct trial *t, struct joint_source *source) {
-    double before = loss_with(t, 0.0), least = before, best = -INFINITY, step = log(TRIED_FACTOR);
+    double before = loss_with(t, 0.0), least = before, best = -INFINITY, step = log(2.0);
     double first = log(fmax(faintest(t), 1e-30));
     for (int i = 0; i < TRIED + 2 * TRIED_NEARER; i++) {
         if (i >= TRIED && i % 2 == TRIED % 2)

@@ -8,8 +8,6 @@
 #include "server/light/light_finish.h"
 #include "server/state/evidence.h"
 
-#define SOLVE_STEPS 30
-
 /* --- handing over ------------------------------------------------------------------------------------------ */
 
 static void keep_source(struct reconstruction *r, enum estimated_kind kind, uint32_t segment, rgb radiance,
@@ -64,9 +62,9 @@ static void hand_over(struct light_model *m) {
 
 static void estimate(struct light_model *m, const struct views *views) {
     light_model_survey(m, views, NULL, NULL);
-    joint_fit_solve(&m->fit, SOLVE_STEPS);
+    joint_fit_solve(&m->fit, JOINT_STEPS);
     hidden_lamps_find(m);
-    joint_fit_solve(&m->fit, SOLVE_STEPS);
+    joint_fit_solve(&m->fit, JOINT_STEPS);
     light_finish(m);
     hand_over(m);
 }
@@ -88,7 +86,7 @@ void light_estimate_again(struct reconstruction *r, const struct views *views, c
         return;
     light_model_init(&m, r, views, true);
     light_model_survey(&m, views, field, diffuse);
-    joint_fit_solve(&m.fit, SOLVE_STEPS);
+    joint_fit_solve(&m.fit, JOINT_STEPS);
     light_finish(&m);
     hand_over(&m);
     light_model_release(&m);

@@ -9,7 +9,6 @@
  * 6,500 K are .5 off in blue, coloured lamps twice as much. */
 #define COLOR_DEVIATION 1.0
 #define MEASURED_DEVIATION 0.02 /* of a channel that does not saturate */
-#define COLOR_STEPS 8
 /* Of a lamp, by what the model lacks: the root mean square of errors of ten hidden lamps of the rooms for choices is .23,
  * nearly all of it upwards. */
 #define SYSTEMATIC_DEVIATION 0.25
@@ -43,7 +42,7 @@ static void fit_channel(struct light_model *m, int channel) {
         source.value = fmax(source.value, source.least);
         joint_fit_add(&fit, &source, lamp->lit);
     }
-    joint_fit_solve(&fit, COLOR_STEPS);
+    joint_fit_solve(&fit, JOINT_STEPS_NEAR);
     for (size_t i = 0; i < m->lamps.count; i++)
         (&m->lamps.lamp[i].radiance.r)[channel] = (float)exp(fit.source[1 + i].value);
     joint_fit_release(&fit);

@@ -40,7 +40,7 @@ static bool is_near(float a, float b, float share) { return fabsf(a - b) <= shar
 /* Whether a segment has the size, the observed radiance and the saturated channels of a lamp. */
 static bool is_alike(const struct light_lamps *l, const struct light_lamp *lamp, uint32_t segment) {
     const struct emitter_evidence *e = &l->r->evidence[segment];
-    if (lamp->kind != ESTIMATED_SATURATED || lamp->segment_count == LIGHT_ALIKE_MOST ||
+    if (lamp->kind != ESTIMATED_SATURATED || lamp->segment_count == LIGHT_MOST ||
         !is_near(l->light.area_m2[lamp->segment[0]], l->light.area_m2[segment], ALIKE_AREA))
         return false;
     for (int c = 0; c < 3; c++) {
@@ -134,7 +134,7 @@ static size_t sort_bright(const struct light_lamps *l, bool saturated, struct br
 static void choose_saturated(struct light_lamps *l) {
     struct bright *found;
     size_t count = sort_bright(l, true, &found);
-    for (size_t i = 0; i < count && l->count <= LIGHT_SATURATED_MOST; i++)
+    for (size_t i = 0; i < count && l->count <= LIGHT_MOST; i++)
         add_saturated(l, found[i].segment);
     mem_free(found);
 }
@@ -143,7 +143,7 @@ static void choose_saturated(struct light_lamps *l) {
 static void choose_seen(struct light_lamps *l) {
     struct bright *found;
     size_t count = sort_bright(l, false, &found);
-    for (size_t i = 0; i < count && i < LIGHT_SEEN_MOST && l->count < LIGHT_LAMPS_MOST - LIGHT_HIDDEN_MOST; i++) {
+    for (size_t i = 0; i < count && i < LIGHT_SEEN_MOST && l->count < LIGHT_LAMPS_MOST - LIGHT_MOST; i++) {
         const struct emitter_evidence *e = &l->r->evidence[found[i].segment];
         l->is_lamp[found[i].segment] = true;
         l->lamp[l->count++] = (struct light_lamp){ESTIMATED_SEEN,          1,

@@ -7,12 +7,10 @@
 #include "server/light/segment_light.h"
 #include "server/state/estimated_light.h"
 
-#define LIGHT_SATURATED_MOST 16 /* lamps of each kind */
-#define LIGHT_HIDDEN_MOST 16
-#define LIGHT_SEEN_MOST 24
-#define LIGHT_LAMPS_MOST (LIGHT_SATURATED_MOST + LIGHT_HIDDEN_MOST + LIGHT_SEEN_MOST + ENVIRONMENT_HALVES)
-#define LIGHT_ALIKE_MOST 16 /* segments that are one lamp */
-_Static_assert(LIGHT_SATURATED_MOST *LIGHT_ALIKE_MOST + LIGHT_HIDDEN_MOST + ENVIRONMENT_HALVES <= ESTIMATED_MOST,
+#define LIGHT_MOST 16      /* saturated lamps; hidden ones; segments that are one lamp */
+#define LIGHT_SEEN_MOST 24 /* lamps that are seen */
+#define LIGHT_LAMPS_MOST (2 * LIGHT_MOST + LIGHT_SEEN_MOST + ENVIRONMENT_HALVES)
+_Static_assert(LIGHT_MOST *LIGHT_MOST + LIGHT_MOST + ENVIRONMENT_HALVES <= ESTIMATED_MOST,
                "all lamps and the sky are reported");
 
 /* Standard deviation of the logarithm of a radiance of which photographs tell no more than where to begin: a lower bound,
@@ -24,7 +22,7 @@ _Static_assert(LIGHT_SATURATED_MOST *LIGHT_ALIKE_MOST + LIGHT_HIDDEN_MOST + ENVI
 struct light_lamp {
     enum estimated_kind kind;
     size_t segment_count;
-    uint32_t segment[LIGHT_ALIKE_MOST];
+    uint32_t segment[LIGHT_MOST];
     rgb least;           /* observed radiance, a lower bound; 0 for hidden lamps */
     bool is_measured[3]; /* by channel: not saturated, so that `least` is the radiance */
     rgb radiance;        /* the estimate */

@@ -10,12 +10,8 @@
 #include "server/render/sampler.h"
 
 #define RAYS_PER_POINT 128 /* directions a point */
-#define AROUND 640 /* the texels around one, each way as far as this part of the atlas's width, tell what it shows */
-#define KEY_SUN 29 /* keeps these random numbers apart from others of the texel */
 /* Bound of a residual, logarithm of base colour. */
 #define MAX_RESIDUAL 1.0f
-/* Light added everywhere, part of the room's median. */
-#define DARK 0.01f
 
 struct places_gathering {
     const struct survey *survey;
@@ -29,12 +25,13 @@ static void gather_place(void *user, size_t index, int thread) {
     struct light_place *p = &g->place[index];
     uint32_t texel = survey->texel[index];
     struct irradiance light;
-    *p = (struct light_place){.segment = reconstruction_segment(r, texel),
-                              .shown = fused_around(&r->fused, &r->atlas, &r->inverse, texel, r->atlas.width / AROUND),
-                              .weight = 1.0f};
+    *p = (struct light_place){
+        .segment = reconstruction_segment(r, texel),
+        .shown = fused_around(&r->fused, &r->atlas, &r->inverse, texel, r->atlas.width / SURVEY_AROUND),
+        .weight = 1.0f};
     if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &p->at))
         return;
-    irradiance_gather(&light, &survey->scratch[thread], &survey->field, &p->at, sampler_key(KEY_SUN, texel, 0),
+    irradiance_gather(&light, &survey->scratch[thread], &survey->field, &p->at, sampler_key(SURVEY_KEY, texel, 0),
                       RAYS_PER_POINT);
     sun_add_light(&r->sun, r->world.accel, &p->at, &light);
     p->white = irradiance_diffuse(&light, p->at.shading, 1.0f, p->at.shading);
@@ -66,7 +63,7 @@ static void floor_light(struct light_places *s) {
     float *mean = mem_array(s->count + 1, sizeof *mean);
     for (size_t i = 0; i < s->count; i++)
         mean[i] = rgb_mean(s->place[i].shown);
-    float dark = fmaxf(DARK * quantile(mean, s->count, 0.5), 1e-20f);
+    float dark = fmaxf(SURVEY_DARK * quantile(mean, s->count, 0.5), 1e-20f);
     for (size_t i = 0; i < s->count; i++) {
         s->place[i].shown = rgb_add(s->place[i].shown, rgb_gray(dark));
         s->place[i].white = rgb_add(s->place[i].white, rgb_gray(dark));

@@ -9,15 +9,9 @@
 #include "server/gather/sun.h"
 #include "server/render/sampler.h"
 
-#define RAYS_PER_POINT 512
 #define SKY_RAYS 2048
-#define KEY_POINT 29 /* keep these random numbers apart from others of the texel */
-#define KEY_SKY 37
-/* The texels around one, each way as far as this part of the atlas's width, give its observed radiance. */
-#define AROUND 640
-/* Light that is not modelled, as a part of the room's median radiance: added everywhere, which keeps logarithms finite;
- * and its standard deviation, by which dim places say less. */
-#define DARK 0.01f
+#define KEY_SKY 37 /* keeps these random numbers apart from others of the texel */
+/* Standard deviation of light that is not modelled, as a part of the room's median radiance: dim places say less. */
 #define DARK_DEVIATION 0.05f
 /* A patch is a cube of this part of the square root of the room's surface: some .3 m. */
 #define PATCH_PART 0.022f
@@ -37,7 +31,7 @@ struct gathering {
 
 static rgb observed_at(const struct gathering *g, uint32_t texel) {
     const struct reconstruction *r = g->survey->r;
-    uint32_t around = r->atlas.width / AROUND;
+    uint32_t around = r->atlas.width / SURVEY_AROUND;
     rgb own = g->observed ? fused_around(g->observed, &r->atlas, &r->inverse, texel, around) : rgb_gray(0.0f);
     return rgb_is_black(own) ? fused_around(&r->fused, &r->atlas, &r->inverse, texel, around) : own;
 }
@@ -68,11 +62,11 @@ static void set_guesses_apart(const struct gathering *g, struct incident *in, st
     const struct reconstruction *r = g->survey->r;
     float light[LIGHT_REGIONS][3] = {{0}};
     rgb sum = rgb_gray(0.0f);
-    for (size_t i = 0; i < RAYS_PER_POINT; i++)
+    for (size_t i = 0; i < SURVEY_RAYS; i++)
         in->ray[i] = (struct accel_ray){accel_offset(p->at.position, p->at.normal, in->direction[i]), 0.0f,
                                         in->direction[i], INFINITY};
-    accel_intersect_many(r->world.accel, RAYS_PER_POINT, in->ray, in->hit);
-    for (size_t i = 0; i < RAYS_PER_POINT; i++) {
+    accel_intersect_many(r->world.accel, SURVEY_RAYS, in->ray, in->hit);
+    for (size_t i = 0; i < SURVEY_RAYS; i++) {
         const struct accel_hit *hit = &in->hit[i];
         if (hit->triangle == ACCEL_NONE)
             continue;
@@ -82,7 +76,7 @@ static void set_guesses_apart(const struct gathering *g, struct incident *in, st
         if (!is_front || r->fused.count[texel] > 0.0f || r->world.lights->area_density[t->segment] > 0.0f ||
             (g->survey->field.specular_only && g->survey->field.specular_only[t->segment]))
             continue;
-        rgb radiance = rgb_scale(rgb_from_half(g->survey->field.radiance[texel]), 1.0f / RAYS_PER_POINT);
+        rgb radiance = rgb_scale(rgb_from_half(g->survey->field.radiance[texel]), 1.0f / SURVEY_RAYS);
         float *of_region = light[region_of(g, vec3_mad(in->ray[i].origin, hit->distance_m, in->direction[i]))];
         for (size_t c = 0; c < 3; c++)
             of_region[c] += (&radiance.r)[c];
@@ -100,7 +94,7 @@ static void look_at_sky(const struct gathering *g, struct incident *in, struct l
     const struct accel *accel = g->survey->r->world.accel;
     float cell[SKY_CELLS] = {0};
     bool escapes = false;
-    for (size_t i = 0; i < RAYS_PER_POINT; i++)
+    for (size_t i = 0; i < SURVEY_RAYS; i++)
         escapes = escapes || in->escapes[i];
     if (!escapes)
         return;
@@ -135,8 +129,8 @@ static void gather_point(void *user, size_t index, int thread) {
         return;
     move_inside(&r->scene->mesh, &p->at);
     p->patch = patch_of(g, &p->at);
-    memset(in->escapes, 0, RAYS_PER_POINT * sizeof *in->escapes); /* inside closed bodies no ray is traced */
-    irradiance_gather(&light, in, &g->survey->field, &p->at, sampler_key(KEY_POINT, texel, 0), RAYS_PER_POINT);
+    memset(in->escapes, 0, SURVEY_RAYS * sizeof *in->escapes); /* inside closed bodies no ray is traced */
+    irradiance_gather(&light, in, &g->survey->field, &p->at, sampler_key(SURVEY_KEY, texel, 0), SURVEY_RAYS);
     sun_add_light(&r->sun, r->world.accel, &p->at, &light);
     p->known = irradiance_diffuse(&light, p->at.shading, 1.0f, p->at.shading);
     look_at_sky(g, in, p, sampler_key(KEY_SKY, texel, 0));
@@ -223,7 +217,7 @@ void light_points_init(struct light_points *p, const struct survey *survey, cons
     parallel_for(survey->r->pool, survey->count, gather_point, &g);
     *p = (struct light_points){survey->count, g.point, g.edge_m};
     qsort(p->point, p->count, sizeof *p->point, by_patch);
-    float dark = fmaxf(DARK * median_radiance, 1e-20f);
+    float dark = fmaxf(SURVEY_DARK * median_radiance, 1e-20f);
     for (size_t i = 0; i < p->count; i++) {
         p->point[i].observed = rgb_add(p->point[i].observed, rgb_gray(dark));
         p->point[i].known = rgb_add(p->point[i].known, rgb_gray(dark));

@@ -7,10 +7,9 @@
 #include "common/quantile.h"
 #include "server/light/albedo.h"
 
-/* Strengths tried: from one on that adds this share of the light that is known to what is lit, on average, each so
- * much stronger; then nearer and nearer to the best. */
+/* Strengths tried: from one on that adds this share of the light that is known to what is lit, on average, octaves apart;
+ * then nearer and nearer to the best. */
 #define FAINTEST 0.01
-#define STRONGER 2.0f
 #define STRENGTHS 20
 #define NEARER 5
 /* Rounds in which the strength tells what places it is asked of, and they tell the strength. */
@@ -116,8 +115,8 @@ static float faintest_strength(const struct missing_light *m, int channel) {
 
 float missing_light_strength(const struct missing_light *m, int channel, double *explained) {
     double without = misfit(m, 0.0f, channel), least = without;
-    float best = 0.0f, step = STRONGER, strength = faintest_strength(m, channel);
-    for (int i = 0; i < STRENGTHS; i++, strength *= STRONGER) {
+    float best = 0.0f, step = 2.0f, strength = faintest_strength(m, channel);
+    for (int i = 0; i < STRENGTHS; i++, strength *= 2.0f) {
         double here = misfit(m, strength, channel);
         if (here < least)
             least = here, best = strength;

@@ -9,8 +9,7 @@
 #include "server/scene/surface.h"
 #include "server/state/evidence.h"
 
-#define PLACES 64
-#define RAYS_PER_POINT 64
+#define PLACES 64 /* and rays of each */
 #define KEY_DOUBT 0x5d0b7u
 
 /* Cosine-weighted mean radiance from unobserved sky at a place. */
@@ -18,16 +17,16 @@ static float unseen_light_at(const struct reconstruction *r, uint32_t texel) {
     struct surface_point at;
     if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at))
         return 0.0f;
-    struct accel_ray ray[RAYS_PER_POINT];
+    struct accel_ray ray[PLACES];
     float sum = 0.0f;
-    incident_cosine_rays(&at, sampler_key(KEY_DOUBT, texel, 0), RAYS_PER_POINT, ray);
-    for (size_t i = 0; i < RAYS_PER_POINT; i++) {
+    incident_cosine_rays(&at, sampler_key(KEY_DOUBT, texel, 0), PLACES, ray);
+    for (size_t i = 0; i < PLACES; i++) {
         vec3 d = ray[i].direction;
         if (vec3_dot(d, at.normal) > 0.0f && !environment_is_seen(&r->environment, d) &&
             !accel_occluded(r->world.accel, ray[i].origin, d, 0.0f, INFINITY))
             sum += rgb_mean(lights_environment(r->world.lights, d));
     }
-    return sum / RAYS_PER_POINT;
+    return sum / PLACES;
 }
 
 float sky_doubt(const struct reconstruction *r, const uint32_t *texel, size_t count) {

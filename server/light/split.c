@@ -90,8 +90,6 @@ static void connect(const struct split_level *l, bool (*belongs)(const struct sp
 
 /* --- a part --------------------------------------------------------------------------------------- */
 
-static float area_of(const struct split_job *job, uint32_t t) { return mesh_triangle_area(&job->r->scene->mesh, t); }
-
 struct split_measure {
     float pixels, shown; /* what they fill together; the median of what they show */
 };
@@ -124,9 +122,9 @@ static void fill_holes(const struct split_level *l, size_t lit_count, uint32_t p
     for (size_t i = 0; i < l->triangle_count; i++)
         job->size[l->triangle[i]] = 0.0f;
     for (size_t i = 0; i < l->triangle_count; i++)
-        job->size[root_of(job->parent, l->triangle[i])] += area_of(job, l->triangle[i]);
+        job->size[root_of(job->parent, l->triangle[i])] += mesh_triangle_area(&job->r->scene->mesh, l->triangle[i]);
     for (size_t i = 0; i < lit_count; i++)
-        area += area_of(job, l->lit[i]);
+        area += mesh_triangle_area(&job->r->scene->mesh, l->lit[i]);
     for (size_t i = 0; i < lit_count; i++) {
         for (uint32_t h = 3 * l->lit[i]; h < 3 * l->lit[i] + 3; h++) {
             uint32_t other = job->adjacency.next[h] / 3;

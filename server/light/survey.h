@@ -10,6 +10,15 @@
 #include "server/gather/incident.h"
 #include "server/state/reconstruction.h"
 
+/* Rays of a point by which light is estimated. */
+#define SURVEY_RAYS 512
+/* Keeps the random numbers of points apart from others of the texel. */
+#define SURVEY_KEY 29
+/* The texels around one, each way as far as this part of the atlas's width, give its observed radiance. */
+#define SURVEY_AROUND 640
+/* Light added everywhere, which keeps logarithms finite, as a part of the median. */
+#define SURVEY_DARK 0.01f
+
 struct survey {
     struct reconstruction *r; /* borrowed */
     bool has_lights;          /* it made some of bright segments */

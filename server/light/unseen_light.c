@@ -10,8 +10,7 @@
 #include "server/render/sampler.h"
 
 #define POINTS 2048
-#define RAYS_PER_POINT 512 /* directions a point */
-#define KEY_UNSEEN 23      /* keeps these random numbers apart from others of the texel */
+#define KEY_UNSEEN 23 /* keeps these random numbers apart from others of the texel */
 /* Part of the light at a grey card that the unseen one must be, as guessed: what is wrong with the rest is taken for its
  * scale. Between a room whose light is all unseen and one where it is all seen (test_grey_card.c) it may be anything: .15 and .25 give
  * the same there. */
@@ -44,20 +43,20 @@ static void look_from(const struct unseen *u, uint32_t texel, int thread, struct
     *p = (struct unseen_point){.segment = reconstruction_segment(r, texel)};
     if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at))
         return;
-    incident_cosine_rays(&at, key, RAYS_PER_POINT, in->ray);
-    for (size_t i = 0; i < RAYS_PER_POINT; i++)
+    incident_cosine_rays(&at, key, SURVEY_RAYS, in->ray);
+    for (size_t i = 0; i < SURVEY_RAYS; i++)
         in->direction[i] = in->ray[i].direction;
-    incident_trace(in, field, &at, key, 0, RAYS_PER_POINT);
-    for (size_t i = 0; i < RAYS_PER_POINT; i++) {
+    incident_trace(in, field, &at, key, 0, SURVEY_RAYS);
+    for (size_t i = 0; i < SURVEY_RAYS; i++) {
         if (!in->escapes[i])
             continue;
-        float share = 1.0f / RAYS_PER_POINT; /* of the ray, that is unseen */
+        float share = 1.0f / SURVEY_RAYS; /* of the ray, that is unseen */
         if (r->environment.map.pixel)
             share *= 1.0f - light_sky_kept(&u->sky, environment_cell(&r->environment, in->direction[i]));
         unseen_add_ray(p, in->direction[i], share, rgb_mean(in->radiance[i]));
     }
     struct irradiance light;
-    irradiance_gather(&light, in, field, &at, key, RAYS_PER_POINT);
+    irradiance_gather(&light, in, field, &at, key, SURVEY_RAYS);
     sun_add_light(&r->sun, r->world.accel, &at, &light);
     p->known = fmaxf(rgb_mean(irradiance_diffuse(&light, at.shading, 1.0f, at.shading)) - p->filled, 0.0f);
     p->shown = rgb_mean(fused_radiance(&r->fused, texel));
