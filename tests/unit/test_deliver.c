@@ -14,7 +14,7 @@ static bool is_public(const char *text) {
     return deliver_is_public((struct sockaddr *)&v6);
 }
 
-int main(void) {
+static void check_addresses(void) {
     static const char *const private[] = {"0.0.0.0",
                                           "10.1.2.3",
                                           "100.64.0.1",
@@ -50,7 +50,9 @@ int main(void) {
         CHECK_THAT(!is_public(private[i]), "%s", private[i]);
     for (size_t i = 0; i < sizeof public / sizeof *public; i++)
         CHECK_THAT(is_public(public[i]), "%s", public[i]);
+}
 
+static void check_urls(void) {
     struct url url;
     struct error err;
     CHECK(url_parse("https://example.org", &url, &err) == STATUS_OK && url.is_tls);
@@ -83,7 +85,9 @@ int main(void) {
                                       "http://[::1]x/"};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
         CHECK_THAT(url_parse(bad[i], &url, &err) == STATUS_INPUT, "%s", bad[i]);
+}
 
+static void check_statuses(void) {
     CHECK(deliver_status("HTTP/1.1 200 OK\r\n") == 200);
     CHECK(deliver_status("HTTP/1.0 404 Not Found\n") == 404);
     CHECK(deliver_status("HTTP/1.1 204\r\n") == 204);
@@ -103,7 +107,9 @@ int main(void) {
                                             "ICY 200 OK"};
     for (size_t i = 0; i < sizeof no_status / sizeof *no_status; i++)
         CHECK_THAT(deliver_status(no_status[i]) == 0, "%s", no_status[i]);
+}
 
+static void check_signatures(void) {
     /* From: printf %s 'msg_1.1700000000.{}' | openssl dgst -sha256 -hmac a-secret-of-mine -binary | base64 */
     char signature[64];
     deliver_sign("a-secret-of-mine", "msg_1", 1700000000, "{}", signature);
@@ -118,5 +124,12 @@ int main(void) {
     CHECK_STRING(signature, "v1,koCIHAY4tYn2iV1PPmIh7AOgu8PKTu6e3Xbx4gtT1/U=");
     deliver_sign("whsec_c2hvcnQ=", "msg_1", 1700000000, "{}", signature);
     CHECK_STRING(signature, "v1,bFx7oQp2f0M93cVABJzGWZmxzNeel7tgrb2RxeE+jmo=");
+}
+
+int main(void) {
+    check_addresses();
+    check_urls();
+    check_statuses();
+    check_signatures();
     return check_result();
 }

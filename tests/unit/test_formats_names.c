@@ -3,6 +3,34 @@
 #include "common/utf8.h"
 #include "tests/unit/formats_rig.h"
 
+/* Labels have the characters of a name that are safe in all formats, and bounded length. Changes name[1] for a while. */
+static void check_labels(const struct segments *named, struct segments *automatic, const struct mesh *room,
+                         char *name[3]) {
+    char label[PARTS_LABEL_BYTES];
+    CHECK(named->id[0] == 0 && named->id[1] == 1);
+    parts_label(named, room, 2, label);
+    CHECK_STRING(label, "segment_2_\xe5\xa2\x99");
+    name[1] = "a\xff" /* no UTF-8 */ "b\xe2\x80\x8f\xe2\x80\xa8"
+              "c";
+    parts_label(named, room, 1, label);
+    CHECK_STRING(label, "segment_1_a_b_c");
+    char longest[61 + 3 * 32] = {0};
+    memset(longest, 'x', 60);
+    for (int i = 0; i < 12; i++)
+        memcpy(longest + 60 + 3 * i, "\xe5\xa2\x99", 3);
+    name[1] = longest;
+    parts_label(named, room, 1, label);
+    CHECK_THAT(utf8_valid(label, strlen(label), NULL) && strlen(label) > PARTS_LABEL_BYTES - 5, "%s", label);
+    name[1] = "";
+    CHECK(segments_name(named, room, 1) == NULL && segments_name(automatic, room, 0) == NULL);
+    automatic->name = (char *[]){"wall (2)"};
+    automatic->name_count = 1;
+    parts_label(automatic, room, 0, label);
+    CHECK_STRING(label, "segment_0_wall_2");
+    parts_label(automatic, room, 1, label);
+    CHECK_STRING(label, "segment_1");
+}
+
 /* Names of the input go into every file, with the segment's number. */
 static void test_named(const char *dir, struct export_input *in, struct mesh *room, const struct parts *parts) {
     static const struct {
@@ -23,35 +51,13 @@ static void test_named(const char *dir, struct export_input *in, struct mesh *ro
     };
     char *name[] = {"wall/north-side 1", "", "\xe5\xa2\x99"};
     struct segments named = *in->segments, *before = (struct segments *)in->segments;
-    char label[PARTS_LABEL_BYTES];
     room->name = name;
     room->name_count = 3;
     struct segments automatic = named;
     automatic.is_given = false;
     named.is_given = true;
     in->segments = &named;
-    CHECK(named.id[0] == 0 && named.id[1] == 1);
-    parts_label(&named, room, 2, label);
-    CHECK_STRING(label, "segment_2_\xe5\xa2\x99");
-    name[1] = "a\xff" /* no UTF-8 */ "b\xe2\x80\x8f\xe2\x80\xa8"
-              "c";
-    parts_label(&named, room, 1, label);
-    CHECK_STRING(label, "segment_1_a_b_c");
-    char longest[61 + 3 * 32] = {0};
-    memset(longest, 'x', 60);
-    for (int i = 0; i < 12; i++)
-        memcpy(longest + 60 + 3 * i, "\xe5\xa2\x99", 3);
-    name[1] = longest;
-    parts_label(&named, room, 1, label);
-    CHECK_THAT(utf8_valid(label, strlen(label), NULL) && strlen(label) > PARTS_LABEL_BYTES - 5, "%s", label);
-    name[1] = "";
-    CHECK(segments_name(&named, room, 1) == NULL && segments_name(&automatic, room, 0) == NULL);
-    automatic.name = (char *[]){"wall (2)"};
-    automatic.name_count = 1;
-    parts_label(&automatic, room, 0, label);
-    CHECK_STRING(label, "segment_0_wall_2");
-    parts_label(&automatic, room, 1, label);
-    CHECK_STRING(label, "segment_1");
+    check_labels(&named, &automatic, room, name);
     for (size_t i = 0; i < sizeof table / sizeof *table; i++) {
         struct error err = {.message = ""};
         struct buf file;

@@ -22,7 +22,7 @@ static void refuse(const char *raw) {
     target_release(&t);
 }
 
-int main(void) {
+static void check_paths(void) {
     accept_path("/", 0, "");
     accept_path("/v1/jobs", 2, "v1/jobs");
     accept_path("/v1/jobs/7/outputs/preview/base_color.png", 6, "v1/jobs/7/outputs/preview/base_color.png");
@@ -32,6 +32,9 @@ int main(void) {
     accept_path("/a+b", 1, "a+b");
     accept_path("http://localhost/v1/jobs", 2, "v1/jobs");
     accept_path("HTTPS://[::1]:8443", 0, "");
+}
+
+static void check_refused(void) {
     static const char *const bad[] = {
         "",
         "*",
@@ -76,7 +79,9 @@ int main(void) {
     };
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
         refuse(bad[i]);
+}
 
+static void check_queries(void) {
     struct target t;
     CHECK(target_parse(&t, "/a?name=my+room%21&empty=&flag&x=%3D%26", NULL) == STATUS_OK);
     CHECK_STRING(target_query(&t, "name"), "my room!");
@@ -93,12 +98,21 @@ int main(void) {
     CHECK_STRING(t.path, "/");
     CHECK_STRING(target_query(&t, "name"), "x");
     target_release(&t);
+}
 
+static void check_encoded(void) {
     char *text = target_encode("a b/\xC3\xA4~", 1);
     CHECK_STRING(text, "a%20b/%C3%A4~");
     mem_free(text);
     text = target_encode("a/b", 0);
     CHECK_STRING(text, "a%2Fb");
     mem_free(text);
+}
+
+int main(void) {
+    check_paths();
+    check_refused();
+    check_queries();
+    check_encoded();
     return check_result();
 }
