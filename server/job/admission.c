@@ -26,7 +26,7 @@
 #define PIXEL_BYTES 75.0
 #define PIXELS_PER_BYTE 16.0
 #define PICTURES_MOST (1.15 * 0x1p30) /* of a mesh; an environment's picture takes no more */
-#define HINT "It begins when others have ended. A smaller texture_size needs less memory."
+#define HINT "It begins when others have ended. Smaller textures, or of a render smaller files, need less memory."
 
 void admission_init(struct admission *a, uint64_t limit_bytes, uint64_t worker_limit_bytes) {
     *a = (struct admission){.limit_bytes = limit_bytes, .worker_limit_bytes = worker_limit_bytes, .told_id = -1};
