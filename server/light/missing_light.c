@@ -10,7 +10,6 @@
 /* Strengths tried: from one on that adds this share of the light that is known to what is lit, on average, octaves apart;
  * then nearer and nearer to the best. */
 #define FAINTEST 0.01
-#define STRENGTHS 20
 #define NEARER 5
 /* Rounds in which the strength tells what places it is asked of, and they tell the strength. */
 #define ROUNDS 4
@@ -22,16 +21,28 @@ static void ask_all(struct missing_light *m) {
         m->weight[i] = 1.0f;
 }
 
-void missing_light_init(struct missing_light *m, const struct light_places *places, float white) {
-    *m = (struct missing_light){.places = places, .max_albedo = white};
-    m->base = mem_array(places->count + 1, sizeof *m->base);
-    m->sorted = mem_array(places->count + 1, sizeof *m->sorted);
+static void find_segments(struct missing_light *m) {
+    m->first = mem_array(m->places->count + 1, sizeof *m->first);
+    for (size_t first = 0; first < m->places->count; first = light_places_end(m->places, first))
+        m->first[m->segment_count++] = first;
+    m->first[m->segment_count] = m->places->count;
+}
+
+void missing_light_init(struct missing_light *m, const struct light_places *places, float white,
+                        struct parallel *pool) {
+    *m = (struct missing_light){.places = places, .max_albedo = white, .pool = pool};
+    find_segments(m);
+    m->base = mem_array(MISSING_STRENGTHS * places->count + 1, sizeof *m->base);
+    m->sorted = mem_array(MISSING_STRENGTHS * places->count + 1, sizeof *m->sorted);
+    m->misfit = mem_array(MISSING_STRENGTHS * m->segment_count + 1, sizeof *m->misfit);
     m->weight = mem_array(places->count + 1, sizeof *m->weight);
     ask_all(m);
 }
 
 void missing_light_release(struct missing_light *m) {
+    mem_free(m->first);
     mem_free(m->weight);
+    mem_free(m->misfit);
     mem_free(m->sorted);
     mem_free(m->base);
     *m = (struct missing_light){0};
@@ -53,54 +64,66 @@ static double oddity(float off, float spread) {
     return e * e / (1.0 + e * e);
 }
 
-/* Median of base[first, end), of MEDIAN_POINTS of them at most. */
-static float median_of(const struct missing_light *m, size_t first, size_t end) {
-    size_t stride = (end - first + MEDIAN_POINTS - 1) / MEDIAN_POINTS, count = 0;
-    for (size_t i = first; i < end; i += stride)
-        m->sorted[count++] = m->base[i];
-    return quantile(m->sorted, count, 0.5);
+/* Median of base[count], of MEDIAN_POINTS of them at most. */
+static float median_of(const float *base, size_t count, float *sorted) {
+    size_t stride = (count + MEDIAN_POINTS - 1) / MEDIAN_POINTS, taken = 0;
+    for (size_t i = 0; i < count; i += stride)
+        sorted[taken++] = base[i];
+    return quantile(sorted, taken, 0.5);
 }
 
-/* Fills base[first, end) with logarithms. */
-static void find_base(const struct missing_light *m, size_t first, size_t end, float strength, int channel) {
-    for (size_t i = first; i < end; i++) {
-        const struct light_place *p = &m->places->place[i];
-        m->base[i] = logf(channel_of(p->shown, channel) / (channel_of(p->white, channel) + strength * p->lit));
-    }
+/* Fills base[count] with logarithms. */
+static void find_base(const struct light_place *place, size_t count, float strength, int channel, float *base) {
+    for (size_t i = 0; i < count; i++)
+        base[i] =
+            logf(channel_of(place[i].shown, channel) / (channel_of(place[i].white, channel) + strength * place[i].lit));
 }
 
 /* Spread of base colours about a median: a highlight, not known yet, makes dark surfaces less alike. */
 static float spread_about(float median) { return (float)ALBEDO_WITHIN + ALBEDO_HIGHLIGHT * expf(-median); }
 
-/* Misfit of place i, given the median base colour of its segment. */
-static double place_misfit(const struct missing_light *m, size_t i, float median, float spread) {
-    double within = oddity(m->base[i] - median, spread);
-    double beyond = oddity(fmaxf(m->base[i] - logf(m->max_albedo), 0.0f), (float)ALBEDO_PATCH);
+/* Misfit of place i, given its base colour's logarithm and the median of its segment's. */
+static double place_misfit(const struct missing_light *m, size_t i, float base, float median, float spread) {
+    double within = oddity(base - median, spread);
+    double beyond = oddity(fmaxf(base - logf(m->max_albedo), 0.0f), (float)ALBEDO_PATCH);
     return (double)(m->weight[i] * m->places->place[i].weight) * (within + beyond);
 }
 
-/* Misfit of a segment. */
-static double segment_misfit(const struct missing_light *m, size_t first, size_t end, float strength, int channel) {
-    double sum = 0.0;
-    find_base(m, first, end, strength, channel);
-    float median = median_of(m, first, end), spread = spread_about(median);
-    for (size_t i = first; i < end; i++)
-        sum += place_misfit(m, i, median, spread);
-    return sum;
+struct strengths {
+    const struct missing_light *m;
+    int channel;
+    const float *strength;
+};
+
+/* Misfit of a segment at a strength; 0 where the light does not reach it. */
+static void find_misfit(void *user, size_t index, int thread) {
+    const struct strengths *s = user;
+    const struct missing_light *m = s->m;
+    size_t row = index / m->segment_count, segment = index % m->segment_count;
+    size_t first = m->first[segment], count = m->first[segment + 1] - first;
+    float *base = m->base + row * m->places->count + first, *sorted = m->sorted + row * m->places->count + first;
+    bool any = false;
+    (void)thread;
+    m->misfit[index] = 0.0;
+    for (size_t i = first; i < first + count; i++)
+        any = any || m->places->place[i].lit > 0.0f;
+    if (!any)
+        return;
+    find_base(m->places->place + first, count, s->strength[row], s->channel, base);
+    float median = median_of(base, count, sorted), spread = spread_about(median);
+    for (size_t i = 0; i < count; i++)
+        m->misfit[index] += place_misfit(m, first + i, base[i], median, spread);
 }
 
-/* Misfit of all segments that the light reaches. */
-static double misfit(const struct missing_light *m, float strength, int channel) {
-    double sum = 0.0;
-    for (size_t first = 0, end; first < m->places->count; first = end) {
-        bool any = false;
-        end = light_places_end(m->places, first);
-        for (size_t i = first; i < end; i++)
-            any = any || m->places->place[i].lit > 0.0f;
-        if (any)
-            sum += segment_misfit(m, first, end, strength, channel);
+/* Misfit of all segments that the light reaches, at each of strength[count], of MISSING_STRENGTHS at most. */
+static void misfits(const struct missing_light *m, const float *strength, size_t count, int channel, double *misfit) {
+    struct strengths s = {m, channel, strength};
+    parallel_for(m->pool, count * m->segment_count, find_misfit, &s);
+    for (size_t row = 0; row < count; row++) {
+        misfit[row] = 0.0;
+        for (size_t k = 0; k < m->segment_count; k++)
+            misfit[row] += m->misfit[row * m->segment_count + k];
     }
-    return sum;
 }
 
 static float faintest_strength(const struct missing_light *m, int channel) {
@@ -114,21 +137,26 @@ static float faintest_strength(const struct missing_light *m, int channel) {
 }
 
 float missing_light_strength(const struct missing_light *m, int channel, double *explained) {
-    double without = misfit(m, 0.0f, channel), least = without;
-    float best = 0.0f, step = 2.0f, strength = faintest_strength(m, channel);
-    for (int i = 0; i < STRENGTHS; i++, strength *= 2.0f) {
-        double here = misfit(m, strength, channel);
-        if (here < least)
-            least = here, best = strength;
+    const float none = 0.0f;
+    float strength[MISSING_STRENGTHS], best = 0.0f, step = 2.0f;
+    double here[MISSING_STRENGTHS], without, least;
+    misfits(m, &none, 1, channel, &without);
+    least = without;
+    strength[0] = faintest_strength(m, channel);
+    for (int i = 1; i < MISSING_STRENGTHS; i++)
+        strength[i] = strength[i - 1] * 2.0f;
+    misfits(m, strength, MISSING_STRENGTHS, channel, here);
+    for (int i = 0; i < MISSING_STRENGTHS; i++) {
+        if (here[i] < least)
+            least = here[i], best = strength[i];
     }
     for (int i = 0; i < NEARER && best > 0.0f; i++) {
         step = sqrtf(step);
-        float middle = best;
-        for (int side = -1; side <= 1; side += 2) {
-            float other = side < 0 ? middle / step : middle * step;
-            double here = misfit(m, other, channel);
-            if (here < least)
-                least = here, best = other;
+        const float beside[2] = {best / step, best * step};
+        misfits(m, beside, 2, channel, here);
+        for (int side = 0; side < 2; side++) {
+            if (here[side] < least)
+                least = here[side], best = beside[side];
         }
     }
     *explained = without - least;

@@ -28,9 +28,10 @@ int main(void) {
     struct light_place place[WALL + DESK];
     struct light_places places = {.count = WALL + DESK, .place = place};
     struct missing_light missing;
+    struct parallel *pool = parallel_new(1), *three = parallel_new(3);
     double explained, again;
     place_room(place);
-    missing_light_init(&missing, &places, 1.2f);
+    missing_light_init(&missing, &places, 1.2f, pool);
     float alike = missing_light_strength(&missing, MISSING_MEAN, &explained);
     CHECK_THAT(alike > 1.5f * STRENGTH, "the wall is most alike at %g", (double)alike);
     CHECK(explained > 0.0 && explained < WALL + DESK);
@@ -41,5 +42,10 @@ int main(void) {
     missing_light_strength(&missing, MISSING_MEAN, &again);
     CHECK_THAT(again == explained, "all places count again after it");
     missing_light_release(&missing);
+    missing_light_init(&missing, &places, 1.2f, three);
+    CHECK(missing_light_strength(&missing, MISSING_MEAN, &again) == alike && again == explained);
+    missing_light_release(&missing);
+    parallel_free(three);
+    parallel_free(pool);
     return check_result();
 }
