@@ -212,7 +212,8 @@ static void add_sun(const struct sky *sky, vec3 sun, const struct compass *compa
     vec3_frame(sun, &s, &t);
     rgb part = rgb_scale(sky_sun_radiance(sky), (float)(SKY_SUN_ANGLE / (RINGS * SPOKES)));
     for (int k = 0; k < RINGS * SPOKES; k++) {
-        double radius = SUN_RADIUS * sqrt((k / SPOKES + 0.5) / RINGS), around = 2.0 * PI * (k % SPOKES + 0.5) / SPOKES;
+        double radius = SUN_RADIUS * sqrt((k / SPOKES + 0.5) / (double)RINGS),
+               around = 2.0 * PI * (k % SPOKES + 0.5) / (double)SPOKES;
         vec3 d = vec3_mad(vec3_mad(sun, (float)(radius * cos(around)), s), (float)(radius * sin(around)), t);
         float x, y;
         latlong_place(map->width, map->height, compass_from_map(compass, vec3_normalize(d)), &x, &y);
