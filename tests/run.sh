@@ -19,7 +19,7 @@ render/test_held_out_light render/test_large_held_out render/test_saturated_ligh
 render/test_fireflies_left_out render/test_grey_card render/test_sun render/test_split api/test_resume api/test_readme
 render/test_emitters render/test_hidden_lamp render/test_changing_light render/test_sky_doubt render/test_holes
 unit/test_outputs_read_back unit/test_fit unit/test_check_pictures api/test_http_faults chaos/test_clock
-api/test_backup api/test_axe api/test_page api/test_webhook_library
+api/test_backup api/test_axe api/test_page api/test_page_check api/test_webhook_library unit/test_many_photographs
 chaos/test_start_faults chaos/test_worker_calls chaos/test_worker_kill chaos/test_node api/test_node_site api/test_node_disk chaos/test_slurm
 api/test_render api/test_render_parts chaos/test_render_kill api/test_retention render/test_calibrate_light unit/test_atlas unit/test_inverse_uv
 unit/test_worker_faults chaos/test_disk_faults unit/test_attempt_faults api/test_client_sweep chaos/test_daemon_kill
@@ -41,7 +41,7 @@ in_one_thread() {
 # api/test_webhooks, of a small room, do not tell.
 slow_tsan="$slow_asan render/test_relight_forms render/test_sun_caustics
 unit/test_checkpoint_faults unit/test_checkpoint_parts unit/test_export unit/test_store_faults
-api/test_one_job api/test_older_data render/test_gather unit/test_corrections unit/test_checkpoint unit/test_captures api/test_client_check unit/test_many_photographs unit/test_bundle unit/test_segment
+api/test_one_job api/test_older_data render/test_gather unit/test_corrections unit/test_checkpoint unit/test_captures api/test_client_check unit/test_bundle unit/test_segment
 unit/test_evaluate api/test_metrics
 api/test_http_durable api/test_http_threads unit/test_luminance_unit render/test_inserts unit/test_demo
 chaos/test_memory_faults api/test_node_tls
