@@ -192,7 +192,7 @@ static enum status page_query(struct store *store, const struct caller *who, int
 enum status store_event_page(struct store *store, const struct caller *who, int64_t job_id, int64_t after, size_t limit,
                              size_t byte_limit, void (*each)(void *user, const struct event_row *row), void *user,
                              struct event_page *page, struct error *err) {
-    sqlite3_stmt *stmt;
+    sqlite3_stmt *stmt = NULL;
     size_t bytes = 0;
     *page = (struct event_page){.last_id = after};
     store_lock(store);
