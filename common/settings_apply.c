@@ -70,7 +70,7 @@ static bool check_words(const struct setting *t, const char *text, struct settin
     case SETTING_REAL:
     case SETTING_BOOL: break;
     }
-    assert(!"a setting that is given as a string");
+    assert(false && "a setting that is given as a string");
     return false;
 }
 

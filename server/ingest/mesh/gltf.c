@@ -53,11 +53,11 @@ static enum status add_mesh(struct gltf_reader *r, size_t node, size_t mesh, con
     cJSON_ArrayForEach(item, primitives) {
         const cJSON *mode = cJSON_GetObjectItemCaseSensitive(item, "mode");
         const cJSON *own = cJSON_GetObjectItemCaseSensitive(item, "material");
-        double kind = mode ? cJSON_GetNumberValue(mode) : GLTF_TRIANGLES;
+        double kind = mode ? cJSON_GetNumberValue(mode) : (double)GLTF_TRIANGLES;
         double number = own ? cJSON_GetNumberValue(own) : -1.0;
         char where[64];
         snprintf(where, sizeof where, "meshes[%zu].primitives[%zu]", mesh, i++);
-        if (kind != GLTF_TRIANGLES && kind != GLTF_STRIP && kind != GLTF_FAN)
+        if (kind != (double)GLTF_TRIANGLES && kind != (double)GLTF_STRIP && kind != (double)GLTF_FAN)
             continue;
         if (is_first || (number != material && !r->objects.are_pages))
             gltf_objects_start(&r->objects, node, mesh, number);

@@ -78,7 +78,9 @@ static void set_wrap(const struct gltf_file *g, const cJSON *texture, struct loo
     const cJSON *sampler = item_at(g, "samplers", member(texture, "sampler"));
     for (int i = 0; i < 2; i++) {
         double how = number_or(sampler, key[i], 0.0);
-        map->wrap[i] = how == CLAMP_TO_EDGE ? LOOK_CLAMP : how == MIRRORED_REPEAT ? LOOK_MIRROR : LOOK_REPEAT;
+        map->wrap[i] = how == (double)CLAMP_TO_EDGE     ? LOOK_CLAMP
+                       : how == (double)MIRRORED_REPEAT ? LOOK_MIRROR
+                                                        : LOOK_REPEAT;
     }
 }
 
