@@ -166,6 +166,7 @@ static void fill(struct uv_bake *b) {
     memcpy(to->roughness, from->roughness, count * sizeof *to->roughness);
     memcpy(to->specular, from->specular, count * sizeof *to->specular);
     memcpy(to->emission, from->emission, count * sizeof *to->emission);
+    to->spread = from->spread;
     if (from->deviation)
         materials_start_deviation(to);
     if (from->emission_pattern)

@@ -183,13 +183,14 @@ static void keep_texture(struct wiener *w) {
     }
 }
 
-/* Adds the error of detail that is too fine to be resolved: where the finest that is resolved has edges. */
+/* Adds the error of detail that is too fine to be resolved: where the finest that is resolved has edges. Where there is
+ * no texture there are none: peaks of noise alone, above what is subtracted, have a quarter of its power in the mean. */
 static void add_unresolved(struct wiener *w, size_t step, float part) {
     size_t samples = w->width * w->height;
     for (size_t at = 0; at < samples; at++) {
         bool is_there = counts(w, at);
         float power = is_there ? detail_power(w, WIENER_VALUE, at) - NOISE_SAFETY * noise_variance(w, at) : 0.0f;
-        w->power[at] = fmaxf(power, 0.0f);
+        w->power[at] = power > 0.0f && texture_power(w, at) > 0.0f ? power : 0.0f;
         w->bounded_power[at] = is_there ? 1.0f : 0.0f;
     }
     window_sums(w->power, w->scratch, w->width, w->height, step);

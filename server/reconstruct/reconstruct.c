@@ -1,6 +1,7 @@
 /* reconstruct.c -- the stages in their order; see reconstruct.h. */
 #include "server/reconstruct/reconstruct.h"
 
+#include <math.h>
 #include <stdio.h>
 
 #include "common/clock.h"
@@ -12,6 +13,7 @@
 #include "server/light/sun_find.h"
 #include "server/light/unseen_light.h"
 #include "server/material/emission_pattern.h"
+#include "server/material/plain_spread.h"
 #include "server/reconstruct/inputs.h"
 #include "server/reconstruct/prepare.h"
 #include "server/reconstruct/report.h"
@@ -107,6 +109,13 @@ static struct optimiser *optimiser_of_method(struct stage_run *run) {
     return listing1_new(&input);
 }
 
+/* What the stated deviations of base colour are at least. */
+static void measure_spread(struct reconstruction *r) {
+    const struct surface surface = reconstruction_surface(r);
+    float spread = plain_spread(&surface, &r->materials.base_color, r->fused.count, r->is_emitter);
+    r->materials.spread = hypotf(isfinite(spread) ? spread : MATERIALS_SPREAD, light_deviation(r));
+}
+
 /* The stages that checkpoints cover; those that are done are skipped. */
 static enum status run_resumable(struct stage_run *run, struct error *err) {
     bool found = false, solves = settings_is(run->r->settings, "method", "solve");
@@ -125,13 +134,17 @@ static enum status run_resumable(struct stage_run *run, struct error *err) {
         sun_draw(&run->r->sun, &run->r->environment);
         prepare_environment(run->r);
     }
-    if (status == STATUS_OK)
+    if (status == STATUS_OK) {
+        measure_spread(run->r);
         status = run_stage(run, "refine", optimise, err);
+    }
     optimiser_free(run->optimiser);
     return status;
 }
 
 static enum status report(struct stage_run *run, struct error *err) {
+    measure_spread(run->r);
+    json_add_number(run->r->report, "base_color_deviation", (double)run->r->materials.spread);
     world_update_lights(&run->r->world);
     report_emitters(run->r);
     light_report(run->r);

@@ -6,9 +6,6 @@
 #include "common/image.h"
 #include "common/mem.h"
 
-/* Relative error of base colour that photographs do not tell: of the light that surfaces get (what gathered rays found
- * between and behind things, lamps' outlines), of lobes that the model lacks. */
-#define MODEL_DEVIATION 0.01f
 #define MAX_POLISHED_ROUGHNESS 0.5f /* roughness, at most */
 
 void materials_init(struct materials *m, const struct inverse_uv *inverse, size_t segment_count, rgb base_color,
@@ -17,6 +14,7 @@ void materials_init(struct materials *m, const struct inverse_uv *inverse, size_
     m->segment_count = segment_count;
     m->emission_pattern = NULL;
     m->deviation = NULL;
+    m->spread = MATERIALS_SPREAD;
     m->cone = NULL;
     m->metallic = NULL;
     m->gloss = NULL;
@@ -50,8 +48,8 @@ void materials_start_deviation(struct materials *m) {
 rgb materials_deviation(const struct materials *m, size_t texel) {
     float measured = m->deviation ? image_float_from_half(m->deviation[texel]) : 0.0f;
     const float *c = m->base_color.texel[texel];
-    rgb model = rgb_scale(rgb_make(c[0], c[1], c[2]), MODEL_DEVIATION);
-    return measured > 0.0f ? rgb_make(hypotf(measured, model.r), hypotf(measured, model.g), hypotf(measured, model.b))
+    rgb least = rgb_scale(rgb_make(c[0], c[1], c[2]), m->spread);
+    return measured > 0.0f ? rgb_make(fmaxf(measured, least.r), fmaxf(measured, least.g), fmaxf(measured, least.b))
                            : rgb_gray(0.0f);
 }
 

@@ -22,6 +22,9 @@ struct emission_cone {
 
 #define MATERIALS_BY_TEXEL -1.0f
 
+/* Den, gallery and the demo room have .008, .042 and .045. */
+#define MATERIALS_SPREAD 0.01f
+
 struct materials {
     struct texture base_color; /* linear reflectance in [0, 1] */
     size_t segment_count;
@@ -33,6 +36,8 @@ struct materials {
                                       * segment, positive; 0 where unknown, which reads as 1. NULL: none. Owned */
     uint16_t *deviation; /* [height][width] half precision: standard deviation of base colour by measurement, over its
                           * channels; 0: unknown. NULL: none. Owned */
+    float spread;        /* relative standard deviation of base colour along plain surface (plain_spread.h), and by the
+                          * deviations that lamps' radiances have; MATERIALS_SPREAD until it is known */
     /* Of things that were added to a room; no derivative knows of metals. NULL: none. Owned. */
     float *metallic; /* [segment_count] share of the surface that is metal, which reflects in the base colour and not
                            * diffusely; MATERIALS_BY_TEXEL: that and roughness are in gloss */
@@ -51,8 +56,8 @@ bool materials_is_polished(const struct materials *m, uint32_t segment);
 /* Allocates the deviations, all unknown. */
 void materials_start_deviation(struct materials *m);
 
-/* Standard deviation of a texel's base colour, by channel: that of its measurement and that of the model. Black where it
- * is unknown. */
+/* Standard deviation of a texel's base colour, by channel: that of its measurement, and no less than plain surface of this
+ * room has, which contains the errors that no texel's own measurement tells. Black where it is unknown. */
 rgb materials_deviation(const struct materials *m, size_t texel);
 
 /* Allocates a pattern of unknown texels, or frees it. Untouched pages of the former take no memory. */
