@@ -8,7 +8,7 @@
  * Deconvolution amplifies noise. Each texel's correction is shrunk by the share of noise in its residual, measured by
  * one half of the photographs against the other (halves.h). Several splits are used, since in one the only sharp
  * photograph of a place may be alone in its half; where one half always has almost no weight a texel is not changed.
- * Photographs of different sharpness disagree, too: it is as much noise as the photographs' own noise (noise.h) explains.
+ * Halves of noise alone agree by chance; as much as the photographs' own noise (noise.h) explains is taken off.
  * The noise sample in `measured` includes the differences of blur between photographs, so it is reduced by the same
  * share. (A noise sample drawn per pixel and deconvolved alike takes texture for noise.) */
 #ifndef UNBAKE_MATERIAL_DETAIL_H
