@@ -24,7 +24,8 @@ chaos/test_start_faults chaos/test_worker_calls chaos/test_worker_kill chaos/tes
 api/test_render api/test_render_parts chaos/test_render_kill api/test_retention render/test_calibrate_light unit/test_atlas unit/test_inverse_uv
 unit/test_worker_faults chaos/test_disk_faults unit/test_attempt_faults api/test_client_sweep chaos/test_daemon_kill
 chaos/test_power_cut unit/test_scheduler_faults unit/test_scheduler_retries unit/test_delivery render/test_detail
-api/test_client_commands api/test_client_scripts render/test_sampling"
+api/test_client_commands api/test_client_scripts render/test_sampling api/test_admin unit/test_corrections
+unit/test_luminance_unit api/test_older_data"
 # Names of the tests that have one thread: neither they nor a header that they include name threads, nor does the unit of
 # such a header begin one.
 in_one_thread() {
@@ -41,10 +42,10 @@ in_one_thread() {
 # api/test_webhooks, of a small room, do not tell.
 slow_tsan="$slow_asan render/test_relight_forms render/test_sun_caustics
 unit/test_checkpoint_faults unit/test_checkpoint_parts unit/test_export unit/test_store_faults
-api/test_one_job api/test_older_data render/test_gather unit/test_corrections unit/test_checkpoint unit/test_captures api/test_client_check unit/test_bundle unit/test_segment
+api/test_one_job render/test_gather unit/test_checkpoint unit/test_captures api/test_client_check unit/test_bundle unit/test_segment
 unit/test_evaluate api/test_metrics
-api/test_http_durable api/test_http_threads unit/test_luminance_unit render/test_inserts unit/test_demo
-chaos/test_memory_faults api/test_node_tls
+api/test_http_durable api/test_http_threads render/test_inserts unit/test_demo
+chaos/test_memory_faults api/test_node_tls api/test_scenes render/test_furnace
 $(cd tests && echo fuzz/test_*.c | sed 's/\.c//g') $(in_one_thread)"
 
 if [ "$only" = --slow ]; then
