@@ -26,3 +26,15 @@ export async function look(page, axe, pictures, name) {
     console.log(`${name}: wider than the window`, ++faults);
   return faults;
 }
+
+// look, in a light and in a dark browser, on a wide and on a narrow screen.
+export async function lookAll(page, axe, pictures, name) {
+  let faults = 0;
+  for (const scheme of ["light", "dark"])
+    for (const width of [1400, 390]) {
+      await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: scheme }]);
+      await page.setViewport({ width, height: 900 });
+      faults += await look(page, axe, pictures, `${name}-${scheme}-${width}`);
+    }
+  return faults;
+}

@@ -6,7 +6,7 @@
 import { spawn } from "node:child_process";
 import { cpSync } from "node:fs";
 import { createInterface } from "node:readline";
-import { launch, look, modules as loaded } from "./browser.mjs";
+import { launch, look, lookAll, modules as loaded } from "./browser.mjs";
 
 const [modules, chromium, idlePath, folder, pictures] = process.argv.slice(2);
 const idle = spawn(idlePath, { stdio: ["pipe", "pipe", "inherit"] }), lines = createInterface(idle.stdout)[Symbol.asyncIterator]();
@@ -36,15 +36,6 @@ async function open(hash) {
   await page.setViewport({ width: 1400, height: 900 });
   await page.goto(`${url}/${hash}`);
   return page;
-}
-
-async function lookAll(page, name) {
-  for (const scheme of ["light", "dark"])
-    for (const width of [1400, 390]) {
-      await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: scheme }]);
-      await page.setViewport({ width, height: 900 });
-      faults += await look(page, axe, pictures, `${name}-${scheme}-${width}`);
-    }
 }
 
 // What one sees of it.
@@ -100,7 +91,7 @@ async function doubt(page) {
   const lacking = await page.evaluate((names) => names.filter((name) =>
     !document.getElementById(`setting-${name}`) || document.getElementById(`setting-${name}-help`).textContent === ""), settings.map(({ name }) => name));
   check(settings.length > 30 && lacking.length === 0, `settings without a field or help: ${lacking}`);
-  await lookAll(page, "check-doubtful");
+  faults += await lookAll(page, axe, pictures, "check-doubtful");
 }
 
 // Pictures open large, and the arrow keys go from one to the next.
@@ -120,7 +111,7 @@ async function refuse(page) {
   const now = await shown(page);
   check(now.words === "Mesh and photographs do not fit." && now.isBad && now.start === "Start all the same", `a refused room: ${JSON.stringify(now)}`);
   check(now.evidence.includes("93 of 100") && now.remedy.includes("y-up") && now.applies, `its remedy: ${JSON.stringify(now)}`);
-  await lookAll(page, "check-refused");
+  faults += await lookAll(page, axe, pictures, "check-refused");
   await page.$eval("#apply-remedy", (button) => button.click());
   await until(page, () => document.getElementById("check-progress").checkVisibility());
   const { reading, state } = await (await fetch(`${url}/v1/scenes/${scene}`)).json();

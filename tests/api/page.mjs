@@ -2,7 +2,7 @@
 //
 // node page.mjs NODE_MODULES CHROMIUM URL PICTURES ROOM: ROOM is a folder that can be sent; job 1 is a room with lamps; a line for each fault
 import { readdirSync, readFileSync } from "node:fs";
-import { launch, look, modules as loaded } from "./browser.mjs";
+import { launch, lookAll, modules as loaded } from "./browser.mjs";
 
 const [modules, chromium, url, pictures, room] = process.argv.slice(2);
 const { puppeteer, axe } = loaded(modules), browser = await launch(puppeteer, chromium);
@@ -34,16 +34,6 @@ async function open(hash, viewport = { width: 1200, height: 900 }) {
   await page.setViewport(viewport);
   await page.goto(`${url}/${hash}`);
   return page;
-}
-
-// axe-core in a light and in a dark browser, on a wide and on a narrow screen.
-async function lookAll(page, name) {
-  for (const scheme of ["light", "dark"])
-    for (const width of [1400, 390]) {
-      await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: scheme }]);
-      await page.setViewport({ width, height: 900 });
-      faults += await look(page, axe, pictures, `${name}-${scheme}-${width}`);
-    }
 }
 
 // --- the light mixer --------------------------------------------------------------------------
@@ -170,7 +160,7 @@ async function mixLights() {
   const mixed = await meanShown(page), size = await page.$eval("#job .mixer-canvas", (canvas) => `${canvas.width} x ${canvas.height}`);
   check(Math.abs(mixed[0] - before[0]) > 2, `the mixture is ${mixed}, as before`);
   console.log(`mixed ${lights.length} lights at ${size} in ${await page.$eval("#job .mixer-canvas", (canvas) => canvas.dataset.ms)} ms`);
-  await lookAll(page, "mixer");
+  faults += await lookAll(page, axe, pictures, "mixer");
   await page.$eval("#job .mixer-save", (button) => button.click());
   await page.waitForFunction(() => document.querySelector("#job .name").textContent.endsWith(", mixed"));
   const id = Number(new URLSearchParams((await page.evaluate(() => location.hash)).slice(1)).get("job")), job = await settled(id);
