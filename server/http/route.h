@@ -25,7 +25,7 @@ struct route {
     struct response *(*handle)(struct api *api, struct request *r);
     enum route_body body;
     enum request_pace pace; /* of the handler */
-    const char *query;      /* names of the query's parameters, separated by spaces */
+    const char *query; /* its parameters, separated by spaces; unknown ones get 400. NULL: takes any and ignores them */
 };
 
 #endif

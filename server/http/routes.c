@@ -18,12 +18,12 @@
 #include "server/uploads/upload.h"
 
 static const struct route table[] = {
-    {METHOD_GET, "/", ROUTE_PUBLIC, system_root, 0, PACE_AT_ONCE, ""},
-    {METHOD_GET, "/web/{name}", ROUTE_PUBLIC, page_file, 0, PACE_AT_ONCE, ""},
-    {METHOD_GET, "/healthz", ROUTE_PUBLIC, system_healthz, 0, PACE_AT_ONCE, ""},
-    {METHOD_GET, "/readyz", ROUTE_PUBLIC, system_readyz, 0, PACE_SLOW, ""},
-    {METHOD_GET, "/metrics", ROUTE_VIEWER, system_metrics, 0, PACE_QUICK, ""},
-    {METHOD_GET, "/openapi.json", ROUTE_PUBLIC, system_openapi, 0, PACE_AT_ONCE, ""},
+    {METHOD_GET, "/", ROUTE_PUBLIC, system_root, 0, PACE_AT_ONCE, NULL},
+    {METHOD_GET, "/web/{name}", ROUTE_PUBLIC, page_file, 0, PACE_AT_ONCE, NULL},
+    {METHOD_GET, "/healthz", ROUTE_PUBLIC, system_healthz, 0, PACE_AT_ONCE, NULL},
+    {METHOD_GET, "/readyz", ROUTE_PUBLIC, system_readyz, 0, PACE_SLOW, NULL},
+    {METHOD_GET, "/metrics", ROUTE_VIEWER, system_metrics, 0, PACE_QUICK, NULL},
+    {METHOD_GET, "/openapi.json", ROUTE_PUBLIC, system_openapi, 0, PACE_AT_ONCE, NULL},
     {METHOD_GET, "/v1/version", ROUTE_VIEWER, system_version, 0, PACE_QUICK, ""},
     {METHOD_GET, "/v1/session", ROUTE_VIEWER, session_get, 0, PACE_QUICK, ""},
     {METHOD_POST, "/v1/session", ROUTE_PUBLIC, session_add, ROUTE_BODY_JSON, PACE_QUICK, ""},
@@ -148,7 +148,7 @@ static struct response *no_route(const struct request *r) {
 }
 
 static struct response *check_query(const struct request *r) {
-    for (size_t i = 0; i < r->target.query_count; i++) {
+    for (size_t i = 0; r->route->query && i < r->target.query_count; i++) {
         const char *name = r->target.names[i];
         size_t length = strlen(name);
         const char *at = length ? r->route->query : "";

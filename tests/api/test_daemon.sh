@@ -42,6 +42,11 @@ for file in server/web/*.css server/web/*.js; do
 done
 call GET /web/three.module.js; expect 200; cmp -s "$work/body" /usr/share/javascript/three/three.module.js || fail "three.js is another"
 call GET /web/none.js; expect 404
+# Links get parameters on their way, for a cache or a count of visitors; requests of the API are refused with unknown ones.
+for path in '/?utm_source=mail' '/?x' '/web/page.js?v=2' '/healthz?1' '/readyz?1' '/metrics?1' '/openapi.json?1'; do
+    call GET "$path" -H 'Accept: text/html,*/*;q=0.8'; expect 200 "$path"
+done
+call GET '/v1/jobs?lmit=2'; expect 400 "an unknown parameter"
 for id in $(cat server/web/*.js | grep -o '\$("[a-z-]*")' | tr -d '$()"' | sort -u); do
     grep -q "id=\"$id\"" server/web/index.html || fail "the page has no $id"
 done
