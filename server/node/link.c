@@ -60,6 +60,7 @@ void link_init(struct attempt_link *l, const struct link_config *config) {
                                .bulk = connect_to(config),
                                .path = mem_printf("/v1/attempts/%lld/%d", (long long)config->job_id, config->number),
                                .beat = config->beat,
+                               .may_begin = config->may_begin,
                                .user = config->user,
                                .lease_sec = LEASE_SEC,
                                .answered_at = clock_sec(),

@@ -30,6 +30,8 @@ struct link_config {
     int64_t job_id;
     int number;
     void (*beat)(void *user);
+    /* Asked as often while something is fetched; false, with *err set, ends that with STATUS_CANCELLED. NULL: never. */
+    bool (*may_begin)(void *user, struct error *err);
     void *user;
 };
 
@@ -38,6 +40,7 @@ struct attempt_link {
     char *path;         /* "/v1/attempts/JOB/NUMBER" */
     char claimant[128]; /* the header field */
     void (*beat)(void *user);
+    bool (*may_begin)(void *user, struct error *err);
     void *user;
     enum link_state state;
     bool is_claimed;
@@ -84,7 +87,7 @@ struct link_end {
 /* Everything has been said: the end, tried until it is answered or the lease is over. */
 enum status link_end(struct attempt_link *l, const struct link_end *end, double cpu_sec, struct error *err);
 
-/* link_files.c: files. They are tried again while the link is open. */
+/* link_files.c: files. They are tried again while the link is open; what is fetched, while the attempt may begin. */
 
 /* GET of "scene" or "checkpoint": {"files":[{"name","bytes","sha256"},...]}; the caller's. */
 enum status link_list(struct attempt_link *l, const char *what, cJSON **list, struct error *err);

@@ -28,6 +28,7 @@ struct transfer {
     uint64_t bytes;
     struct error *err;
     enum status status; /* of the file here */
+    bool is_fetch;
 };
 
 static void tick(void *user, double sent) {
@@ -36,7 +37,15 @@ static void tick(void *user, double sent) {
     t->link->beat(t->link->user);
 }
 
-static bool is_open(void *user) { return link_state(((struct transfer *)user)->link) == LINK_OPEN; }
+/* Once the lease is over nothing is written any more; nothing is fetched for an attempt that is to stop. */
+static enum status may_go_on(const struct transfer *t, struct error *err) {
+    struct attempt_link *l = t->link;
+    if (link_state(l) != LINK_OPEN)
+        return error_set(err, STATUS_CANCELLED, "%s", l->why);
+    return !t->is_fetch || !l->may_begin || l->may_begin(l->user, err) ? STATUS_OK : STATUS_CANCELLED;
+}
+
+static bool go_on(void *transfer) { return may_go_on(transfer, NULL) == STATUS_OK; }
 
 static char *path_of(const struct attempt_link *l, const char *what, const char *name, const char *query) {
     struct buf path;
@@ -57,21 +66,21 @@ static bool waits_for_room(struct attempt_link *l) {
     return l->wanted < LINK_STOP && clock_sec() < l->full_until;
 }
 
-/* Runs the call until it succeeds, is refused, or the link is no longer open. `begin` (may be NULL) prepares each try;
- * `member` (likewise) is one that the answer has. */
+/* Runs the call until it succeeds, is refused, or may not go on. `begin` (may be NULL) prepares each try; `member`
+ * (likewise) is one that the answer has. */
 static enum status run(struct attempt_link *l, struct request_call *call, struct transfer *t, const char *member,
                        enum status (*begin)(struct request_call *call, struct transfer *t, struct error *err),
                        struct reply *reply, struct error *err) {
     enum status status;
     call->header[0] = l->claimant;
     call->tick = tick;
-    call->go_on = is_open; /* once the lease is over nothing is written any more */
+    call->go_on = go_on;
     call->user = t;
     call->once = true;
     for (int tries = 0;; tries++) {
-        if (link_state(l) != LINK_OPEN)
-            return error_set(err, STATUS_CANCELLED, "%s", l->why);
-        status = begin ? begin(call, t, err) : STATUS_OK;
+        status = may_go_on(t, err);
+        if (status == STATUS_OK && begin)
+            status = begin(call, t, err);
         if (status != STATUS_OK)
             return status;
         status = request_run(l->bulk, call, reply, err);
@@ -80,6 +89,10 @@ static enum status run(struct attempt_link *l, struct request_call *call, struct
         link_note(l, status, reply, err);
         if (t->status != STATUS_OK)
             return t->status;
+        if (status == STATUS_CANCELLED) {
+            may_go_on(t, err); /* says why */
+            return status;
+        }
         bool is_again =
             link_is_busy(status, reply) ? tries < TRIES_MAX : reply->code == HTTP_NO_SPACE && waits_for_room(l);
         if (!is_again || !link_pause(l, tries))
@@ -89,7 +102,7 @@ static enum status run(struct attempt_link *l, struct request_call *call, struct
 
 enum status link_list(struct attempt_link *l, const char *what, cJSON **list, struct error *err) {
     struct reply reply;
-    struct transfer t = {.link = l};
+    struct transfer t = {.link = l, .is_fetch = true};
     char *path = path_of(l, what, NULL, "");
     struct request_call call = {.path = path, .silence_sec = LIST_SILENCE_SEC};
     reply_init(&reply);
@@ -141,7 +154,7 @@ static enum status begin_fetch(struct request_call *call, struct transfer *t, st
 
 enum status link_fetch(struct attempt_link *l, const char *what, const char *name, int fd, struct error *err) {
     struct reply reply;
-    struct transfer t = {.link = l, .fd = fd, .err = err};
+    struct transfer t = {.link = l, .fd = fd, .err = err, .is_fetch = true};
     char *path = path_of(l, what, name, "");
     struct request_call call = {.path = path, .sink = take_bytes, .silence_sec = FETCH_SILENCE_SEC};
     reply_init(&reply);

@@ -37,10 +37,12 @@ static void signals_of_ours(sigset_t *set) {
 }
 
 static void beat(void *relay);
+static bool may_begin(void *relay, struct error *err) { return relay_may_begin(relay, err) == STATUS_OK; }
 
 void relay_init(struct relay *r, const struct link_config *config) {
     struct link_config own = *config;
     own.beat = beat;
+    own.may_begin = may_begin;
     own.user = r;
     *r = (struct relay){.job_id = config->job_id, .number = config->number};
     link_init(&r->link, &own);
