@@ -1,7 +1,7 @@
 // address.js -- what is looked at is in the address, after #: a reload, a bookmark and the back button keep it.
 //
 //   job: the number of the job that is looked at; with: of the one beside it; scene: the room whose check is shown;
-//   q, state: what the list shows
+//   like: the job whose settings a new one on that room begins with; q, state: what the list shows
 
 const listeners = new Set();
 

@@ -5,7 +5,7 @@ import { $, element, showEach } from "./dom.js";
 import { go, place } from "./address.js";
 import { get, load, post, send } from "./ask.js";
 import { openLarge } from "./pictures.js";
-import { givenSettings, showSettings } from "./settings.js";
+import { givenSettings, showSettings, useSettings } from "./settings.js";
 import { bundle, chosenFiles, droppedFiles } from "./tar.js";
 import { upload } from "./upload.js";
 
@@ -26,8 +26,10 @@ async function sendFiles(files) {
     });
     for (const id of ["archive", "folder"]) $(id).value = "";
     named = scene.id;
+    model = null;
+    await fillForm();
     watchCheck(scene);
-    go({ scene: named });
+    go({ scene: named, like: null });
   } catch (problem) {
     $("submit-problem").textContent = problem.message;
   }
@@ -64,23 +66,35 @@ const VERDICTS = {
 const CHECK_LOOK_MS = 700;
 let checked = null; // the scene whose check is shown
 let named = null;   // its id, as the address has it
+let model = null;   // number of the job whose settings the form begins with, likewise
 
 // The room that the address names, if any.
 export async function showScene() {
-  const id = place().scene ?? null;
-  if (id === named) return;
+  const { scene: id = null, like = null } = place();
+  if (id === named && like === model) return;
   forgetCheck();
   named = id;
+  model = like;
   if (id === null) return;
   $("new").open = true;
   try {
     const scene = await get(`v1/scenes/${encodeURIComponent(id)}`);
-    if (named !== id) return; // another was chosen meanwhile
+    await fillForm();
+    if (named !== id || model !== like) return; // another was chosen meanwhile
     watchCheck(scene);
     $("check").scrollIntoView();
   } catch (problem) {
     if (named === id) $("submit-problem").textContent = problem.message;
   }
+}
+
+// Defaults, or the settings of the job that the address names; one that is gone has none.
+async function fillForm() {
+  const like = model, job = like && await get(`v1/jobs/${encodeURIComponent(like)}`).catch(() => null);
+  await showSettings($("first-settings"), $("other-settings"));
+  if (like !== model) return;
+  const others = useSettings($("start"), job?.settings ?? {});
+  $("start-like").textContent = job ? `Settings of job ${job.id}${others && ", also "}${others}.` : "";
 }
 
 // Until its check has ended; one that waits for room on the server's disk says so.
@@ -109,7 +123,7 @@ function describeCheck(scene, fit) {
 }
 
 export function forgetCheck() {
-  checked = named = null;
+  checked = named = model = null;
   $("submit-problem").textContent = "";
   showCheck();
 }
@@ -132,7 +146,6 @@ function showCheck() {
   $("remedy-text").textContent = (fit?.taken ? "Done by itself: " : "") + (fit?.remedy_text ?? JSON.stringify(fit?.remedy ?? ""));
   $("apply-remedy").hidden = !fit?.remedy || Boolean(fit.taken) || scene.state === "checking";
   $("start").hidden = !isReady;
-  if (isReady) showSettings($("first-settings"), $("other-settings"));
   $("start-button").textContent = fit?.verdict === "no" ? "Start all the same" : "Start";
   showEach($("check-pictures"), previews, ({ name }) => name, makePreview, fillPreview);
   $("check-facts").hidden = table.length === 0;

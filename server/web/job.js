@@ -48,7 +48,7 @@ export class JobView {
     this.roomRender = null;
     this.slider = new Slider(this.at("compare"));
     this.mixer = new Mixer(this.at("mixer"), this.server, () => (this.room?.mesh ? this.room.frame() : null), goTo);
-    this.at("again").addEventListener("click", () => go({ scene: this.server.jobs.get(this.id).scene }));
+    this.at("again").addEventListener("click", () => go({ scene: this.server.jobs.get(this.id).scene, like: this.id }));
     this.at("close").addEventListener("click", () => go({ [this.slot]: null }));
     this.at("log-details").addEventListener("toggle", () => this.showLog());
     this.at("beside").hidden = this.slot !== "job";

@@ -45,7 +45,7 @@ $("sign-out").addEventListener("click", async () => {
   server.jobs.clear();
   forgetCheck();
   forgetPeople();
-  go({ job: null, with: null, scene: null });
+  go({ job: null, with: null, scene: null, like: null });
   start();
 });
 
@@ -126,7 +126,7 @@ async function loadJobs() {
 
 onStarted((job) => {
   server.jobs.set(job.id, job);
-  go({ job: job.id, with: null, scene: null });
+  go({ job: job.id, with: null, scene: null, like: null });
 });
 
 // --- start ----------------------------------------------------------------------------------

@@ -1,5 +1,6 @@
 // settings.js -- the settings of a job as a form, made from the server's table: those that everybody wants first, all
-// others with their help behind a fold. What stays at its default is not sent.
+// others with their help behind a fold. What stays at its default is not sent. Settings of single segments
+// ("emitters.27") have no field: they are carried along from the job that the form began with, and named.
 
 import { element } from "./dom.js";
 import { get } from "./ask.js";
@@ -8,6 +9,7 @@ const FIRST = ["texture_size", "quality", "time_limit_sec"];
 const SIZES = [512, 1024, 2048, 4096, 8192];
 
 let table = null;
+let carried = {}; // settings without a field
 
 function input(setting) {
   const id = `setting-${setting.name}`;
@@ -47,11 +49,24 @@ export async function showSettings(first, others) {
   others.append(...table.filter((s) => !FIRST.includes(s.name)).map(row));
 }
 
+const fieldOf = (form, setting) => form.querySelector(`#setting-${setting.name}`);
+
+// Puts {texture_size: 2048, ...} into the form, and defaults into the other fields. Returns what has no field, in words.
+export function useSettings(form, given) {
+  carried = { ...given };
+  for (const setting of table ?? []) {
+    const field = fieldOf(form, setting);
+    field.value = given[setting.name] ?? (field.tagName === "SELECT" ? setting.default : "");
+    delete carried[setting.name];
+  }
+  return Object.entries(carried).map(([name, value]) => `${name} = ${value}`).join(", ");
+}
+
 // {texture_size: 2048, ...}: what was given.
 export function givenSettings(form) {
-  const given = {};
+  const given = { ...carried };
   for (const setting of table ?? []) {
-    const field = form.querySelector(`#setting-${setting.name}`), text = field.value.trim();
+    const text = fieldOf(form, setting).value.trim();
     if (text === "" || text === String(setting.default)) continue;
     given[setting.name] = setting.type === "bool" ? text === "true"
       : setting.type === "int" || setting.type === "real" ? Number(text) : text;

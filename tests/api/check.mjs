@@ -119,7 +119,14 @@ async function refuse(page) {
   await move("ready", { fit: { verdict: "yes", evidence: [] }, table: TABLE, previews: PREVIEWS });
 }
 
-// What is not a default is sent, and the page goes to the job.
+// From the job that is looked at back to its room.
+async function again(page) {
+  await page.waitForFunction(() => document.querySelector("#job .again")?.checkVisibility());
+  await page.$eval("#job .again", (button) => button.click());
+  await until(page, () => document.getElementById("start").checkVisibility());
+}
+
+// What is not a default is sent, and the page goes to the job. Another on its room begins with its settings.
 async function start(page) {
   await until(page, () => document.getElementById("check-state").textContent === "Mesh and photographs fit.");
   await page.$eval("#setting-texture_size", (field) => { field.value = 512; });
@@ -128,8 +135,21 @@ async function start(page) {
   check(await page.evaluate(() => location.hash) === "#job=1", "the address is not the job's");
   const { settings } = await (await fetch(`${url}/v1/jobs/1`)).json();
   check(JSON.stringify(settings) === '{"texture_size":512}', `settings: ${JSON.stringify(settings)}`);
-  await page.$eval("#job .again", (button) => button.click()); // and back to its room
-  await until(page, () => document.getElementById("start").checkVisibility());
+  const also = { texture_size: 1024, calibrate: false, "emitters.3": "on" };
+  await fetch(`${url}/v1/jobs`, { method: "POST", headers: { "Content-Type": "application/json" },
+    body: JSON.stringify({ scene, settings: also }) });
+  await page.reload();
+  await page.evaluate(() => { location.hash = "#job=2"; });
+  await again(page);
+  const like = await page.$eval("#start-like", (line) => line.textContent);
+  check(like === "Settings of job 2, also emitters.3 = on.", `what the form begins with: ${like}`);
+  await page.$eval("#setting-texture_size", (field) => { field.value = 512; });
+  await page.$eval("#start-button", (button) => button.click());
+  await page.waitForFunction(() => location.hash === "#job=3");
+  const next = await (await fetch(`${url}/v1/jobs/3`)).json();
+  const wanted = { ...also, texture_size: 512 };
+  check(Object.keys(wanted).every((name) => next.settings[name] === wanted[name]), `settings of the next: ${JSON.stringify(next.settings)}`);
+  await again(page);
 }
 
 async function reject(page) {
