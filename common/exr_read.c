@@ -81,8 +81,8 @@ static enum status read_pixels(const struct exr_reader *r, struct image *image, 
     return status;
 }
 
-/* To Rec. 709 where the file says that its primaries are others; without `chromaticities` they are Rec. 709's (Technical
- * Introduction to OpenEXR, "RGB Color"). */
+/* To Rec. 709 where the file says that its primaries are others; without `chromaticities` they are Rec. 709's
+ * (Technical Introduction to OpenEXR, "RGB Color"). */
 static void convert(const struct exr_reader *r, struct image *image, struct image_info *info) {
     exr_attr_chromaticities_t c;
     float matrix[3][3];

@@ -35,8 +35,8 @@ enum status file_make_dirs(const char *path, struct error *err);
  * only some of them that is an error, and there are none. */
 enum status file_list(const char *dir, char ***names, size_t *count, struct error *err);
 void file_free_names(char **names, size_t count);
-/* The numbers that are in the names of a folder, ascending; number_of gives that of a name, 0 where it has none. *numbers
- * is the caller's (mem_free), also on error. */
+/* The numbers that are in the names of a folder, ascending; number_of gives that of a name, 0 where it has none.
+ * *numbers is the caller's (mem_free), also on error. */
 enum status file_list_numbered(const char *dir, int (*number_of)(const char *name), int **numbers, size_t *count,
                                struct error *err);
 

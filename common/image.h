@@ -94,14 +94,14 @@ void image_allocate(struct image *image);
 /* Index of a channel by its exact name; -1 when absent. */
 int image_channel(const struct image *image, const char *name);
 
-/* Reads EXR, PNG, JPEG, TIFF, HEIC, AVIF, WebP or Radiance HDR by content (not by extension). Channels are in the order R, G, B, A if they
- * exist, then the others by name; grey PNG/JPEG, and Y of an EXR without R, G, B, become R = G = B. An EXR's picture
- * is its display window, to which cameras refer: pixels outside of the data window are 0; of several parts the first
- * with R, G, B is read. info may be NULL. On error *image is empty (releasing it does no harm).
+/* Reads EXR, PNG, JPEG, TIFF, HEIC, AVIF, WebP or Radiance HDR by content (not by extension). Channels are in the order
+ * R, G, B, A if they exist, then the others by name; grey PNG/JPEG, and Y of an EXR without R, G, B, become R = G = B.
+ * An EXR's picture is its display window, to which cameras refer: pixels outside of the data window are 0; of several
+ * parts the first with R, G, B is read. info may be NULL. On error *image is empty (releasing it does no harm).
  *
  * Colours are linear or sRGB of Rec. 709's primaries and white D65. Files that specify others (ICC profile; PNG's
- * cICP, cHRM and gAMA; HEIF's nclx; EXIF for Adobe RGB; EXR's chromaticities) are converted to linear light of these; colour
- * information that cannot be used gives a warning in info. */
+ * cICP, cHRM and gAMA; HEIF's nclx; EXIF for Adobe RGB; EXR's chromaticities) are converted to linear light of these;
+ * colour information that cannot be used gives a warning in info. */
 enum status image_read(const char *path, struct image *image, struct image_info *info, struct error *err);
 
 /* The same with stored values of PNG, JPEG and others, without colour conversion: for masks. */

@@ -1,5 +1,5 @@
-/* image_codec.h -- what the codecs (exr_*.c, hdr.c, heif.c, jpeg.c, png_*.c, tiff*.c, webp.c) share with image_read.c, which
- * chooses among them; private to them.
+/* image_codec.h -- what the codecs (exr_*.c, hdr.c, heif.c, jpeg.c, png_*.c, tiff*.c, webp.c) share with image_read.c,
+ * which chooses among them; private to them.
  *
  * A codec reads from a source, which is a file or memory, at any offset: nothing is loaded
  * whole, so probing a large file costs as little as reading its header. A codec fills *image
@@ -30,7 +30,8 @@ size_t image_source_read(struct image_source *source, uint64_t offset, void *buf
 /* Converts a picture with values in [0, 1] by *color and records it in *info; releases *color. */
 void image_convert(struct image *image, struct image_info *info, struct color *color);
 
-/* Colours (the first three of four channels) that were multiplied by alpha become those of the surface, up to `most`. */
+/* Colours (the first three of four channels) that were multiplied by alpha become those of the surface, up to
+ * `most`. */
 void image_divide_by_alpha(struct image *image, float most);
 
 /* Colour space from EXIF, for files without a better source. */

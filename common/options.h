@@ -1,6 +1,6 @@
-/* options.h -- parses a command line by a table of options, and prints the table for --help. Options and other words may come in any order; `--name
- * value`, `--name=value`, `-o value` and `-ovalue` are the same; `--` ends the options. Texts are borrowed from
- * argv. */
+/* options.h -- parses a command line by a table of options, and prints the table for --help. Options and other words
+ * may come in any order; `--name value`, `--name=value`, `-o value` and `-ovalue` are the same; `--` ends the options.
+ * Texts are borrowed from argv. */
 #ifndef UNBAKE_COMMON_OPTIONS_H
 #define UNBAKE_COMMON_OPTIONS_H
 

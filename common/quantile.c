@@ -24,8 +24,8 @@ static float median_of_three(float a, float b, float c) {
     return a < b ? (b < c ? b : a < c ? c : a) : (a < c ? a : b < c ? c : b);
 }
 
-/* Moves the values below the bound (not above it, where `inclusive`) to the front; returns how many. No branch depends on
- * a value: of a random sample half of them would be predicted wrongly, which takes longer than all else. */
+/* Moves the values below the bound (not above it, where `inclusive`) to the front; returns how many. No branch depends
+ * on a value: of a random sample half of them would be predicted wrongly, which takes longer than all else. */
 static size_t partition(float *value, size_t count, float bound, bool inclusive) {
     size_t below = 0;
     for (size_t i = 0; i < count; i++) {

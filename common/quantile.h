@@ -5,8 +5,8 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* Standard deviations of normal values in their median absolute deviation: 1 over the third quartile of the standard normal
- * distribution, .67449. (capture/noise.c: a quarter less, +.04 dB on the demo room.) */
+/* Standard deviations of normal values in their median absolute deviation: 1 over the third quartile of the standard
+ * normal distribution, .67449. (capture/noise.c: a quarter less, +.04 dB on the demo room.) */
 #define QUANTILE_DEVIATIONS_PER_MAD 1.4826
 
 /* value[share x count] in ascending order, share in [0, 1]: 0.5 is the (upper) median. 0 for an empty sample.

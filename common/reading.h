@@ -13,10 +13,11 @@
  *                 triangles over
  *   "scale"       length of the mesh's unit in units of the cameras' world (.001: the mesh is in millimetres)
  *   "shift"       photograph i has the pose of frame i + shift; frames without one are left out
- *   "coordinates" those in which the mesh is, where the cameras' file knows several: "file" (its poses'), "capture" (before
- *                 nerfstudio's applied_transform and applied_scale), "chunk", "local" and "projected" (of a georeferenced
- *                 Metashape chunk); otherwise by the mesh
- *   "lens"        factor of all focal lengths and principal points: .5 where they are those of pictures of twice the size
+ *   "coordinates" those in which the mesh is, where the cameras' file knows several: "file" (its poses'), "capture"
+ *                 (before nerfstudio's applied_transform and applied_scale), "chunk", "local" and "projected" (of a
+ *                 georeferenced Metashape chunk); otherwise by the mesh
+ *   "lens"        factor of all focal lengths and principal points: .5 where they are those of pictures of twice the
+ *                 size
  *   "distortion"  "told" or "ignored": the pictures have the lens's distortion as the files state it, or none
  *   "exposures"   "told" or "ignored": exposures that the files state are taken, or estimated as if they did not */
 #ifndef UNBAKE_COMMON_READING_H
@@ -35,7 +36,8 @@
  * z forward (OpenCV, COLMAP) or x right, y up, z back (OpenGL, nerfstudio). */
 enum matrix_axes { AXES_OF_FORMAT, AXES_OPENCV, AXES_OPENGL, AXES_OPENCV_INVERSE, AXES_OPENGL_INVERSE };
 
-/* A rotation by multiples of 90 degrees, with or without a mirror: component i of the result is sign[i] * p[axis[i]]. */
+/* A rotation by multiples of 90 degrees, with or without a mirror: component i of the result is
+ * sign[i] * p[axis[i]]. */
 struct signed_axes {
     int axis[3];
     float sign[3];

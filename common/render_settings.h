@@ -71,7 +71,7 @@ enum status render_settings_parse_assignment(const char *text, cJSON *object, st
 /* The names of files that the settings name, each once; an array of strings, the caller's. */
 cJSON *render_settings_files(const cJSON *object);
 
-/* --- values of an object that render_settings_check found good; defaults where they are not given -------------------- */
+/* --- values of an object that render_settings_check found good; defaults where they are not given ----------------- */
 
 bool render_settings_has(const cJSON *object, const char *name);
 double render_settings_number(const cJSON *object, const char *name);

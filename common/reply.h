@@ -29,8 +29,8 @@ void reply_release(struct reply *reply);
 /* Takes what is of use from one line of the head, as bytes with or without its end. */
 void reply_take_header(struct reply *reply, const char *bytes, size_t length);
 
-/* Parses a body of JSON, and says what the reply means: STATUS_OK, or the error of request_run. `server` is its URL, for
- * messages. */
+/* Parses a body of JSON, and says what the reply means: STATUS_OK, or the error of request_run. `server` is its URL,
+ * for messages. */
 enum status reply_judge(struct reply *reply, const char *server, struct error *err);
 
 #endif

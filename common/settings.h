@@ -21,8 +21,8 @@ struct setting {
     const char *unit;        /* "texels", "s", ...; "" where there is none */
     double minimum, maximum; /* inclusive, for numbers */
     const char *choices;     /* "a|b|c" for SETTING_CHOICE */
-    /* of a SETTING_BOX: text of six numbers, the lower corner and the upper; of a SETTING_PIXEL: "photograph,x,y,value";
-     * "": none */
+    /* of a SETTING_BOX: text of six numbers, the lower corner and the upper; of a SETTING_PIXEL:
+     * "photograph,x,y,value"; "": none */
     const char *default_text;
     const char *method; /* the only one that uses it; NULL: every method does */
     const char *help;   /* one sentence */

@@ -1,5 +1,5 @@
-/* source_digest.h -- which program this is, more exactly than its version says: of two that were built from the same sources,
- * on whatever machine, both are the same. Made by the Makefile; only in the daemon's program. */
+/* source_digest.h -- which program this is, more exactly than its version says: of two that were built from the same
+ * sources, on whatever machine, both are the same. Made by the Makefile; only in the daemon's program. */
 #ifndef UNBAKE_COMMON_SOURCE_DIGEST_H
 #define UNBAKE_COMMON_SOURCE_DIGEST_H
 

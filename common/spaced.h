@@ -5,8 +5,9 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* The place of the i-th of `wanted` evenly spaced items of `count`, 1 <= wanted; i == wanted gives count, so consecutive
- * places also bound `wanted` parts of the list whose sizes differ by at most one. i * count must fit size_t. */
+/* The place of the i-th of `wanted` evenly spaced items of `count`, 1 <= wanted; i == wanted gives count, so
+ * consecutive places also bound `wanted` parts of the list whose sizes differ by at most one. i * count must fit
+ * size_t. */
 static inline size_t spaced(size_t i, size_t count, size_t wanted) { return i * count / wanted; }
 
 /* The same of the items of a list that count, `all` of them, which are met one after another. */

@@ -1,7 +1,7 @@
 /* spill.c -- see spill.h.
  *
- * Arrays in the file begin on pages of their own, one after the other; space of those given back is returned to the disk
- * but not used again. The file is mapped once, at `file.base`, so that an address tells the chunk.
+ * Arrays in the file begin on pages of their own, one after the other; space of those given back is returned to the
+ * disk but not used again. The file is mapped once, at `file.base`, so that an address tells the chunk.
  *
  *      0 ............ used ............ reserved ............ file.bytes
  *        arrays            reserved               addresses only
@@ -11,10 +11,11 @@
  *      ABSENT --use--> USED --the hand passes--> MAPPED --the hand passes again--> ABSENT
  *                       ^-----------use------------'
  *
- * (second chance, or CLOCK; Corbato 1968). Whoever makes one more than the budget present moves the hand, until an eighth
- * of the budget is free. A chunk is unmapped after it is ABSENT; readers that are still in it only fault its pages in
- * again, so no pin is needed and contents never depend on the hand. What is mapped that way, or by readers that do not
- * call spill_use, is not counted: a thread, the keeper, looks at what the kernel counts and unmaps that too.
+ * (second chance, or CLOCK; Corbato 1968). Whoever makes one more than the budget present moves the hand, until an
+ * eighth of the budget is free. A chunk is unmapped after it is ABSENT; readers that are still in it only fault its
+ * pages in again, so no pin is needed and contents never depend on the hand. What is mapped that way, or by readers
+ * that do not call spill_use, is not counted: a thread, the keeper, looks at what the kernel counts and unmaps that
+ * too.
  */
 #include "common/spill.h"
 
@@ -38,7 +39,8 @@
 /* A fault maps the pages around it that are in the kernel's cache: 64 KiB at most, aligned (fault_around_bytes of
  * mm/memory.c), which is what is counted and unmapped as one. */
 #define CHUNK ((size_t)64 << 10)
-/* Readers go on with at least so many chunks, however small the budget: one per array and row that a few threads read. */
+/* Readers go on with at least so many chunks, however small the budget: one per array and row that a few threads
+ * read. */
 #define LEAST_CHUNKS 64
 /* Part of the budget that the hand frees at a time, so that threads interrupt each other seldom. Moves time only. */
 #define FREED_SHARE 8
@@ -177,8 +179,8 @@ static void free_chunks(struct spill *s, size_t goal) {
     }
 }
 
-/* Starts to read a chunk that becomes used, in one piece; the next one as well where the one before is there: readers of
- * rows come to it. */
+/* Starts to read a chunk that becomes used, in one piece; the next one as well where the one before is there: readers
+ * of rows come to it. */
 static void read_ahead(const struct spill *s, size_t chunk) {
     size_t count = chunk > 0 && atomic_load_explicit(&s->state[chunk - 1], memory_order_relaxed) != ABSENT ? 2 : 1;
     madvise(s->file.base + chunk * CHUNK, count * CHUNK, MADV_WILLNEED); /* no more than advice: it may fail */

@@ -6,9 +6,9 @@
  * The file has no name (it is removed as soon as it is open), so nothing is left of it when the process ends, however
  * it ends. Its blocks are allocated when space is reserved: a full disk is an error there, never a signal at a later
  * store. Pages of it count as this process's memory while they are mapped. Readers tell what they are about to look at
- * (spill_use); what is beyond the budget is then unmapped, least recently used first. Contents never depend on that: who
- * does not tell reads the same. The kernel keeps unmapped pages as its cache while memory is free and drops them when it
- * is not.
+ * (spill_use); what is beyond the budget is then unmapped, least recently used first. Contents never depend on that:
+ * who does not tell reads the same. The kernel keeps unmapped pages as its cache while memory is free and drops them
+ * when it is not.
  *
  * A disk that fails at reading ends the process (SIGBUS), as failing memory does. */
 #ifndef UNBAKE_COMMON_SPILL_H
@@ -44,7 +44,8 @@ void *spill_take(struct spill *s, size_t count, size_t size);
 /* Of an array from spill_take of the same s, or from mem.h; NULL is fine. */
 void spill_give(struct spill *s, void *array);
 
-/* The addresses of the file, the first member of struct spill. 0 bytes while there is none: only then base is not set. */
+/* The addresses of the file, the first member of struct spill. 0 bytes while there is none: only then base is not
+ * set. */
 struct spill_file {
     _Atomic size_t bytes;
     char *base;
@@ -58,8 +59,8 @@ static inline bool spill_has_file(const struct spill *s) {
     return s && atomic_load_explicit(&file->bytes, memory_order_acquire) > 0;
 }
 
-/* Tells that `bytes` bytes at `at`, of one array, are looked at or written next. Costs a comparison where the array is in
- * memory; s may be NULL. */
+/* Tells that `bytes` bytes at `at`, of one array, are looked at or written next. Costs a comparison where the array is
+ * in memory; s may be NULL. */
 static inline void spill_use(struct spill *s, const void *at, size_t bytes) {
     const struct spill_file *file = (const struct spill_file *)(const void *)s;
     if (spill_has_file(s) && (uintptr_t)at - (uintptr_t)file->base < file->bytes)

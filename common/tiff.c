@@ -15,8 +15,8 @@
 
 /* Largest allocation of the library: of one compressed strip or tile, or a tag. */
 #define MAX_ALLOCATION ((tmsize_t)1 << 31)
-/* LZMA and Zstandard compress a picture of one colour to nothing; a photograph has noise. Bounds the memory that a small
- * file can ask for. */
+/* LZMA and Zstandard compress a picture of one colour to nothing; a photograph has noise. Bounds the memory that a
+ * small file can ask for. */
 #define MAX_PIXELS_PER_BYTE 16384
 /* Directories that are looked at for one that is no thumbnail; and of a raw file. */
 #define MAX_DIRECTORIES 16

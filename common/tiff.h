@@ -1,5 +1,5 @@
-/* tiff.h -- state of reading a TIFF file, and what tiff_pixels.c does with it for tiff.c, which opens the file and reads
- * what it says of itself; private to the codec. */
+/* tiff.h -- state of reading a TIFF file, and what tiff_pixels.c does with it for tiff.c, which opens the file and
+ * reads what it says of itself; private to the codec. */
 #ifndef UNBAKE_COMMON_TIFF_H
 #define UNBAKE_COMMON_TIFF_H
 

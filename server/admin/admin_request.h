@@ -1,5 +1,5 @@
-/* admin_request.h -- what can be asked of a daemon's administration, and the work: tokens, usage, backups. The daemon does it, or
- * the command itself where none runs (admin.h).
+/* admin_request.h -- what can be asked of a daemon's administration, and the work: tokens, usage, backups. The daemon
+ * does it, or the command itself where none runs (admin.h).
  *
  *      {"command": "token-add", "name", "role", "expires_ms"}   {"id", "token"}; expires_ms 0: never
  *      {"command": "token-list"}                  {"items": [{"id", "user", "role", "created_ms", "expires_ms"}, ...]}

@@ -1,4 +1,5 @@
-/* admin_wire.h -- DATA/admin.sock as both sides use it: a line of JSON each way, and an open file beside it (SCM_RIGHTS). */
+/* admin_wire.h -- DATA/admin.sock as both sides use it: a line of JSON each way, and an open file beside it
+ * (SCM_RIGHTS). */
 #ifndef UNBAKE_ADMIN_ADMIN_WIRE_H
 #define UNBAKE_ADMIN_ADMIN_WIRE_H
 

@@ -62,8 +62,8 @@ static bool is_saturated(const struct clip_job *job, long x, long y, int channel
     return clips && a.unsaturated_sum / (a.count - a.saturated) < threshold;
 }
 
-/* In clips[x - first], for columns [first, end): whether a pixel of the column, in any channel, clips in the rows of the
- * window around `row`. */
+/* In clips[x - first], for columns [first, end): whether a pixel of the column, in any channel, clips in the rows of
+ * the window around `row`. */
 static void find_clipped_columns(const struct photograph *photo, size_t row, size_t first, size_t end, bool *clips) {
     size_t width = photo->camera.width;
     memset(clips, 0, end - first);

@@ -1,4 +1,5 @@
-/* environment_gather.h -- makes the map of distant light (environment.h) from all photographs that look out of the room. */
+/* environment_gather.h -- makes the map of distant light (environment.h) from all photographs that look out of the
+ * room. */
 #ifndef UNBAKE_CAPTURE_ENVIRONMENT_GATHER_H
 #define UNBAKE_CAPTURE_ENVIRONMENT_GATHER_H
 
@@ -6,8 +7,8 @@
 #include "server/capture/views.h"
 
 /* The map has about the angular resolution of the photographs: its width is the largest power of two up to 2 pi x the
- * median focal length in pixels, within the limits of environment.h. Exposures must be known. *e is to be released in any
- * case. False when no photograph has open pixels. The same for any number of threads. */
+ * median focal length in pixels, within the limits of environment.h. Exposures must be known. *e is to be released in
+ * any case. False when no photograph has open pixels. The same for any number of threads. */
 bool environment_gather(struct environment *e, const struct views *views, struct parallel *pool);
 
 #endif

@@ -1,5 +1,5 @@
-/* view_edges.c -- see views.h: the classes of pixels, by rays through the corners of cells, of a pixel each in photographs
- * that are not large (photograph_reduce.h). */
+/* view_edges.c -- see views.h: the classes of pixels, by rays through the corners of cells, of a pixel each in
+ * photographs that are not large (photograph_reduce.h). */
 #include <math.h>
 
 #include "common/mem.h"

@@ -78,8 +78,8 @@ static bool is_even(const struct search_result *r) {
     return r->found.photograph_count < EVEN_PHOTOGRAPHS || consistency_evenness(&r->found) > TAKEN_EVENNESS;
 }
 
-/* A scale of no unit is a free parameter by which some photographs can be made to agree in any room, also where the mesh
- * lies elsewhere: with it most of them must. (Evenness .8 and above where it is right, .2 where it is not.) */
+/* A scale of no unit is a free parameter by which some photographs can be made to agree in any room, also where the
+ * mesh lies elsewhere: with it most of them must. (Evenness .8 and above where it is right, .2 where it is not.) */
 static bool has_remedy(const struct search_result *r) {
     return is_better(r, REMEDY_SURE, REMEDY_GAIN) && (search_is_unit_scale(r->best.scale) || is_even(r));
 }

@@ -12,8 +12,8 @@
 #define OVERLAY_SIZE 640    /* pixels of the longer side, at most */
 #define OVERLAY_ENLARGED 10 /* times the photograph's, at most */
 
-/* Draws the photograph in grey, the edges in colour, and a tint where rays meet no surface. `camera` is the photograph's, or
- * another one of the same size. *drawing is the caller's (drawing_release). */
+/* Draws the photograph in grey, the edges in colour, and a tint where rays meet no surface. `camera` is the
+ * photograph's, or another one of the same size. *drawing is the caller's (drawing_release). */
 void overlay_draw(struct drawing *drawing, const struct photograph *photo, const struct camera *camera,
                   const struct accel *accel);
 

@@ -1,11 +1,12 @@
 /* attempt_folder.h -- the folders of a job's attempts, DATA/jobs/ID/attempt-N/: out/ with the files that it writes,
  * checkpoint/ with what a later attempt goes on from.
  *
- * A checkpoint is checkpoint.db with its journal, or the parts that a node has sent (part-N): each part is written once,
- * and the newest says from which number on they are needed.
+ * A checkpoint is checkpoint.db with its journal, or the parts that a node has sent (part-N): each part is written
+ * once, and the newest says from which number on they are needed.
  *
- * 1. At most one attempt of a job has a checkpoint; jobs that are split (store/parts.h) have none. The next one takes it over when it begins, by one rename: the
- *    database and its journal are never apart, and whoever had it before has lost it.
+ * 1. At most one attempt of a job has a checkpoint; jobs that are split (store/parts.h) have none. The next one takes
+ *    it over when it begins, by one rename: the database and its journal are never apart, and whoever had it before has
+ *    lost it.
  * 2. An output belongs to the attempt that wrote it, and a row of state.db says which. A file that no row names is seen
  *    by nobody, and goes when its attempt has ended; but the records of what is done (picture_record.h) stay.
  * 3. Nobody but an attempt changes its folder while it runs. */
@@ -29,9 +30,9 @@ enum status attempt_folder_begin(const char *data_dir, int64_t job_id, int numbe
 /* The same for one of a part of a job that is split (store/parts.h): others may run, and it takes nothing of theirs. */
 enum status attempt_folder_begin_part(const char *data_dir, int64_t job_id, int number, struct error *err);
 
-/* Gives the attempt, which has just begun, what earlier ones have left in out/, the newest of each name: as hard links, so
- * that it costs no space and what others read stays; their records of what is done become its own. Its worker judges what
- * is whole. What cannot be linked is left out and made again. No other attempt of the job may run. */
+/* Gives the attempt, which has just begun, what earlier ones have left in out/, the newest of each name: as hard links,
+ * so that it costs no space and what others read stays; their records of what is done become its own. Its worker judges
+ * what is whole. What cannot be linked is left out and made again. No other attempt of the job may run. */
 enum status attempt_folder_carry_outputs(const char *data_dir, int64_t job_id, int number, struct error *err);
 
 /* The folder of the attempt that has a checkpoint, relative to data_dir; the caller's (mem_free). NULL: none has. */

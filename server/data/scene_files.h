@@ -1,5 +1,6 @@
 /* scene_files.h -- what a checked scene consists of, for another machine that needs it: its unpacked files with their
- * digests. Hashing takes a second a gigabyte, and many attempts ask for the same scene, so the list is kept beside it. */
+ * digests. Hashing takes a second a gigabyte, and many attempts ask for the same scene, so the list is kept beside
+ * it. */
 #ifndef UNBAKE_DATA_SCENE_FILES_H
 #define UNBAKE_DATA_SCENE_FILES_H
 

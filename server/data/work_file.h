@@ -1,5 +1,5 @@
-/* work_file.h -- opens files of DATA/jobs/ and DATA/scenes/, which workers write: no component of a path may be a symbolic
- * link. */
+/* work_file.h -- opens files of DATA/jobs/ and DATA/scenes/, which workers write: no component of a path may be a
+ * symbolic link. */
 #ifndef UNBAKE_DATA_WORK_FILE_H
 #define UNBAKE_DATA_WORK_FILE_H
 

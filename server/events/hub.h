@@ -48,7 +48,8 @@ struct hub_limits {
     size_t of_all, of_user;
 };
 enum hub_answer { HUB_JOINED, HUB_FULL, HUB_USER_FULL };
-/* Admits the stream if the limits allow one more. After HUB_JOINED it counts until hub_leave, whatever becomes of it. */
+/* Admits the stream if the limits allow one more. After HUB_JOINED it counts until hub_leave, whatever becomes of
+ * it. */
 enum hub_answer hub_join(struct hub *hub, struct hub_member *m, const struct hub_limits *limits);
 /* From now on changes wake it; m->stream->wake is set. Marks made before are kept. */
 void hub_listen(struct hub *hub, struct hub_member *m);

@@ -1,9 +1,9 @@
 /* glb.h -- scene.glb: the room as binary glTF 2.0, for Blender and other readers of glTF.
  *
- * A node "room" turns the room's upward axis to glTF's +y and, where the mesh has an offset, moves it there. Below it are one node, mesh and material per segment,
- * named "segment N" as in the report or as the input calls
- * them (extras.segment has the number then, too), and the cameras of the held-out views (without lens distortion and principal
- * point offset, which glTF does not have). Metres; texture coordinates from the top left corner, as in glTF.
+ * A node "room" turns the room's upward axis to glTF's +y and, where the mesh has an offset, moves it there. Below it
+ * are one node, mesh and material per segment, named "segment N" as in the report or as the input calls them
+ * (extras.segment has the number then, too), and the cameras of the held-out views (without lens distortion and
+ * principal point offset, which glTF does not have). Metres; texture coordinates from the top left corner, as in glTF.
  *
  * The material model is metallic-roughness (glTF 2.0 specification, appendix B) with metallic 0:
  *

@@ -1,8 +1,8 @@
 /* mesh_ply.h -- the mesh with its atlas coordinates as a binary little-endian PLY (scene.ply).
  *
  *   vertex: float x y z, nx ny nz if the mesh has normals, float s t. Origin lower left: an image's top row is t = 1,
- *           its left column s = 0. Vertices on a seam between charts are repeated per chart. Where the input has texture
- *           coordinates of its own, float s1 t1 are these, with the same origin; 0 at faces that have none.
+ *           its left column s = 0. Vertices on a seam between charts are repeated per chart. Where the input has
+ *           texture coordinates of its own, float s1 t1 are these, with the same origin; 0 at faces that have none.
  *   face:   triangles, list uchar int vertex_indices; int segment as in the report; int face, the face of the input
  *           that the triangle is part of.
  *

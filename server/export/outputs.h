@@ -34,7 +34,8 @@
  *
  * Coordinates are relative to the mesh's offset (report.json: "offset"), which is 0 unless the input lies far from its
  * origin. scene.ply and scene.obj have it as a comment, "unbake offset X Y Z", which our readers add; scene.glb as the
- * translation of its root node; scene.xml as a comment; scene.usda as the transform of /Room; the cameras of views.json contain it.
+ * translation of its root node; scene.xml as a comment; scene.usda as the transform of /Room; the cameras of views.json
+ * contain it.
  *
  * Those of glb.h, mesh_obj.h, mitsuba.h and usd.h are left out where they would have too many objects or bytes;
  * report.json says so under "left_out". */
@@ -45,7 +46,8 @@
 #include "server/export/input.h"
 #include "server/export/output_files.h"
 
-/* Writes what is known by now to preview/ under the folder `dir`, which exists, and scene.ply if it is not there. Needs no report and no comparisons. */
+/* Writes what is known by now to preview/ under the folder `dir`, which exists, and scene.ply if it is not there. Needs
+ * no report and no comparisons. */
 enum status export_preview(const char *dir, const struct export_input *input, export_announce *announce, void *user,
                            struct error *err);
 

@@ -1,5 +1,5 @@
-/* texture_files.h -- the textures among a job's files: one EXR for each parameter, base colour and patterns of emission as
- * PNG, too, and their previews. */
+/* texture_files.h -- the textures among a job's files: one EXR for each parameter, base colour and patterns of emission
+ * as PNG, too, and their previews. */
 #ifndef UNBAKE_EXPORT_TEXTURE_FILES_H
 #define UNBAKE_EXPORT_TEXTURE_FILES_H
 

@@ -4,8 +4,8 @@
  *   Segments    a Mesh for each segment, named by parts_label; its displayName is the input's name for it, and its
  *               customData have the numbers of segment and object. `st` has its origin at the lower left;
  *               `st1` are the input's own texture coordinates, where it has some
- *   Materials   a Material of the same name and displayName: UsdPreviewSurface, with base_color.png. Roughness is ours (alpha is its
- *               square in both), ior gives the reflectance at normal incidence of `specular` as in glb.h
+ *   Materials   a Material of the same name and displayName: UsdPreviewSurface, with base_color.png. Roughness is ours
+ *               (alpha is its square in both), ior gives the reflectance at normal incidence of `specular` as in glb.h
  *   Lights      Sky, a DomeLight with environment.exr (whose layout is that of OpenEXR and UsdLux, but for half a row
  *               at the poles); where a sun was found that no photograph shows, Sun, a DistantLight, and then Sky has
  *               sky.exr, without it

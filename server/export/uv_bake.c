@@ -9,13 +9,14 @@
 #include "common/mem.h"
 #include "server/scene/coverage.h"
 
-/* Coordinates may leave the unit square by so much: rounding, and half a texel of a picture of 512. They are clamped. */
+/* Coordinates may leave the unit square by so much: rounding, and half a texel of a picture of 512. They are
+ * clamped. */
 #define SQUARE_SLACK 1e-3f
 /* Share of texels that more than one triangle may cover: packers let charts touch, and round. Layouts that mirror or
  * repeat a part have tens of percent. */
 #define OVERLAP_MOST 0.002
-/* Share of the square that a layout of a whole room covers at least. Coordinates that are all alike, or pick colours from
- * a palette, cover less. */
+/* Share of the square that a layout of a whole room covers at least. Coordinates that are all alike, or pick colours
+ * from a palette, cover less. */
 #define AREA_LEAST 0.01
 #define BATCH 1024 /* valid texels */
 

@@ -1,5 +1,5 @@
-/* views_json.h -- views.json, the cameras of the held-out views, and cameras.json, those of all photographs, in the format
- * of nerfstudio's transforms.json, in the coordinates of the input. */
+/* views_json.h -- views.json, the cameras of the held-out views, and cameras.json, those of all photographs, in the
+ * format of nerfstudio's transforms.json, in the coordinates of the input. */
 #ifndef UNBAKE_EXPORT_VIEWS_JSON_H
 #define UNBAKE_EXPORT_VIEWS_JSON_H
 

@@ -34,8 +34,8 @@ static const char *limit_setting(const struct settings *full, const char *name) 
     return NULL;
 }
 
-/* Raises in `settings` the limit that the body names; problems go to params. With more time, the limit by observations is
- * dropped: the job may have ended by it before its time was up. */
+/* Raises in `settings` the limit that the body names; problems go to params. With more time, the limit by observations
+ * is dropped: the job may have ended by it before its time was up. */
 static void raise_limit(cJSON *settings, struct settings *full, const cJSON *body, cJSON *params) {
     static const char *const names[] = {"iterations", "time_limit_sec", "looks"};
     const char *limit = limit_setting(full, body->string), *right = NULL;

@@ -1,5 +1,5 @@
-/* file_reply.h -- the reply that sends a file which a worker wrote: an output, a scene's picture. Tags, ranges, and what
- * keeps it from acting in a browser. */
+/* file_reply.h -- the reply that sends a file which a worker wrote: an output, a scene's picture. Tags, ranges, and
+ * what keeps it from acting in a browser. */
 #ifndef UNBAKE_HTTP_FILE_REPLY_H
 #define UNBAKE_HTTP_FILE_REPLY_H
 

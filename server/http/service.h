@@ -1,4 +1,5 @@
-/* service.h -- builds what the handlers work with (api.h) at start, has the transport serve it, and frees it at the end. */
+/* service.h -- builds what the handlers work with (api.h) at start, has the transport serve it, and frees it at the
+ * end. */
 #ifndef UNBAKE_HTTP_SERVICE_H
 #define UNBAKE_HTTP_SERVICE_H
 

@@ -13,8 +13,8 @@ struct response *space_check_room(struct api *api, const struct request *r, uint
 /* The same for what a running job writes, on this machine or through its node: nothing is kept free for others. */
 struct response *space_check_job(struct api *api, const struct request *r, uint64_t bytes);
 /* Refuses when what the caller keeps, not counting the scene `but_scene` (NULL: none), plus what is arriving in other
- * requests of the caller's, plus `bytes` passes user_max_bytes. A caller that goes on to add the scene holds api->folder.scene_mutex: two at once would both find
- * room. */
+ * requests of the caller's, plus `bytes` passes user_max_bytes. A caller that goes on to add the scene holds
+ * api->folder.scene_mutex: two at once would both find room. */
 struct response *space_check_share(struct api *api, const struct request *r, const char *but_scene, uint64_t bytes);
 
 #endif

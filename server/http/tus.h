@@ -1,5 +1,5 @@
-/* tus.h -- the tus protocol 1.0.0 (tus.io) as all requests of /v1/uploads have it: its version, the upload that the path
- * names, what replies say of it. */
+/* tus.h -- the tus protocol 1.0.0 (tus.io) as all requests of /v1/uploads have it: its version, the upload that the
+ * path names, what replies say of it. */
 #ifndef UNBAKE_HTTP_TUS_H
 #define UNBAKE_HTTP_TUS_H
 

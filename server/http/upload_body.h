@@ -1,5 +1,5 @@
-/* upload_body.h -- the body of PATCH /v1/uploads/ID: bytes of an upload on their way to disk, with the checksum that the
- * client may give of them (extension checksum of the tus protocol). */
+/* upload_body.h -- the body of PATCH /v1/uploads/ID: bytes of an upload on their way to disk, with the checksum that
+ * the client may give of them (extension checksum of the tus protocol). */
 #ifndef UNBAKE_HTTP_UPLOAD_BODY_H
 #define UNBAKE_HTTP_UPLOAD_BODY_H
 

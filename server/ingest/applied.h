@@ -12,9 +12,9 @@
  * problem in `name`, when the transform mirrors space or is singular. */
 void applied_undo(struct frames *t, const char *name, const char *reason, struct findings *f);
 
-/* Decides for the mesh of that path by who writes such a name; NULL: none. Undoes it for meshes that photogrammetry or a
- * scanner wrote; otherwise leaves the poses and says what would turn the mesh, where something was applied. `given`: what the reading
- * says (frames_settle_coordinates), or NULL. */
+/* Decides for the mesh of that path by who writes such a name; NULL: none. Undoes it for meshes that photogrammetry or
+ * a scanner wrote; otherwise leaves the poses and says what would turn the mesh, where something was applied. `given`:
+ * what the reading says (frames_settle_coordinates), or NULL. */
 void applied_settle(struct frames *t, const char *name, const char *mesh, const char *given, struct findings *f);
 
 #endif

@@ -1,5 +1,5 @@
-/* frame_context.h -- values of a file of frames as JSON, each of the frame or else of the top level; faults are told once,
- * with their place. */
+/* frame_context.h -- values of a file of frames as JSON, each of the frame or else of the top level; faults are told
+ * once, with their place. */
 #ifndef UNBAKE_INGEST_FRAME_CONTEXT_H
 #define UNBAKE_INGEST_FRAME_CONTEXT_H
 

@@ -1,8 +1,8 @@
 /* photo_fit.h -- how pictures relate to the sizes for which their cameras are stated.
  *
- * Tools write intrinsics for the picture that they worked on, which is not always the file in the bundle: turned upright
- * by its EXIF orientation, or of full size where the bundle has halves or quarters. Pictures are turned, and intrinsics
- * scaled, where the stated sizes say so; each is reported. */
+ * Tools write intrinsics for the picture that they worked on, which is not always the file in the bundle: turned
+ * upright by its EXIF orientation, or of full size where the bundle has halves or quarters. Pictures are turned, and
+ * intrinsics scaled, where the stated sizes say so; each is reported. */
 #ifndef UNBAKE_INGEST_PHOTO_FIT_H
 #define UNBAKE_INGEST_PHOTO_FIT_H
 
@@ -23,8 +23,8 @@ struct photo_fit {
     struct lens lens;                     /* of the turned picture */
 };
 
-/* Reads the headers of the pictures at path[] (below dir; NULL: absent) and decides; fit[frame_count]. `name` is that of
- * the file of cameras. Warns of what is turned or scaled. */
+/* Reads the headers of the pictures at path[] (below dir; NULL: absent) and decides; fit[frame_count]. `name` is that
+ * of the file of cameras. Warns of what is turned or scaled. */
 void photo_fit_all(const char *dir, const char *name, char *const *path, const struct frames *t, struct parallel *pool,
                    struct photo_fit *fit, struct findings *f);
 

@@ -1,5 +1,5 @@
-/* photo_pixels.h -- the pixels of photographs: from a decoded picture to half precision, and which are masked. Arrays of
- * photographs are taken from photo->spill, where room for them was reserved. */
+/* photo_pixels.h -- the pixels of photographs: from a decoded picture to half precision, and which are masked. Arrays
+ * of photographs are taken from photo->spill, where room for them was reserved. */
 #ifndef UNBAKE_INGEST_PHOTO_PIXELS_H
 #define UNBAKE_INGEST_PHOTO_PIXELS_H
 

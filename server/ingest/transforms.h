@@ -2,10 +2,10 @@
  *
  * Per frame, else at the top level: fl_x fl_y cx cy w h, camera_angle_x / _y (radians), k1 to k6, p1, p2,
  * camera_model (PINHOLE, SIMPLE_PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV, OPENCV_FISHEYE or FISHEYE,
- * SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE, THIN_PRISM_FISHEYE with sx1 sy1, FOV with omega, DIVISION with k1; in any letters) or
- * is_fisheye, exposure, exposure_time (s), iso, f_number. Per frame: file_path, transform_matrix, mask_path, split
- * (train, test, val), is_bad (left out). At the top level: test_frames, further ones that are held out;
- * applied_transform and applied_scale; `mesh` or ply_file_path; the lists train_filenames, val_filenames,
+ * SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE, THIN_PRISM_FISHEYE with sx1 sy1, FOV with omega, DIVISION with k1; in any
+ * letters) or is_fisheye, exposure, exposure_time (s), iso, f_number. Per frame: file_path, transform_matrix,
+ * mask_path, split (train, test, val), is_bad (left out). At the top level: test_frames, further ones that are held
+ * out; applied_transform and applied_scale; `mesh` or ply_file_path; the lists train_filenames, val_filenames,
  * test_filenames. val counts as test. Everything else is ignored. Numbers may be in quotes. w and h may be those of the
  * picture at another scale, or turned upright (photo_fit.h).
  *

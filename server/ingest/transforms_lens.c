@@ -79,7 +79,8 @@ static bool has(const struct frame_context *c, const char *key) {
     return value && !cJSON_IsNull(value);
 }
 
-/* instant-ngp says by such members that the lens is another one than camera_model or is_fisheye name (its json_binding.h). */
+/* instant-ngp says by such members that the lens is another one than camera_model or is_fisheye name (its
+ * json_binding.h). */
 static void refuse_others(struct frame_context *c) {
     static const char *const members[] = {"ftheta_p0", "latlong", "equirectangular", "orthographic"};
     for (size_t i = 0; i < sizeof members / sizeof *members; i++)
@@ -89,8 +90,8 @@ static void refuse_others(struct frame_context *c) {
                                   members[i]);
 }
 
-/* The lens's polynomials. Beside k5 and k6, k4 is OpenCV's, of the denominator; alone, it is nerfstudio's, of the eighth
- * power of the radius (its camera_utils.py; ns-process-data writes it for RealityCapture's lenses). */
+/* The lens's polynomials. Beside k5 and k6, k4 is OpenCV's, of the denominator; alone, it is nerfstudio's, of the
+ * eighth power of the radius (its camera_utils.py; ns-process-data writes it for RealityCapture's lenses). */
 static void read_distortion(struct frame_context *c, struct lens *lens) {
     static const char *const radial[6] = {"k1", "k2", "k3", "k4", "k5", "k6"};
     bool is_rational;

@@ -1,8 +1,8 @@
 /* lanes.h -- which queued job begins next, and where.
  *
  * Small renders have a lane of their own, so that a preview does not wait behind hours of work. A lane's slots are
- * filled in the users' turns (store_job_next), as far as an executor has a place (executors.h) and, on this machine, the
- * memory that is foretold for the job is free (admission.h). Not thread-safe: the scheduler's thread. */
+ * filled in the users' turns (store_job_next), as far as an executor has a place (executors.h) and, on this machine,
+ * the memory that is foretold for the job is free (admission.h). Not thread-safe: the scheduler's thread. */
 #ifndef UNBAKE_JOB_LANES_H
 #define UNBAKE_JOB_LANES_H
 

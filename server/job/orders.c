@@ -35,8 +35,8 @@ static enum status find_done(const struct job_work *work, const struct scheduler
     return status;
 }
 
-/* What the job's owner may still take of the disk beside the job; of a part its share of that, for the pictures that are
- * not done, since the others take theirs at the same time. 0: no limit. */
+/* What the job's owner may still take of the disk beside the job; of a part its share of that, for the pictures that
+ * are not done, since the others take theirs at the same time. 0: no limit. */
 static enum status disk_left(const struct job_work *work, const struct scheduler_config *config, struct store *store,
                              int64_t done, uint64_t *bytes, struct error *err) {
     const struct job *job = work->job;
@@ -73,8 +73,8 @@ static void complete_order(cJSON *order, const struct scheduler_config *config, 
         json_add_string(order, "reduced", buf_text(reduced));
 }
 
-/* What a render's order has besides: its part, or how it may split, which a small one does not. What its pictures are does
- * not depend on the settings that say where and in how many parts it runs: these stay here. */
+/* What a render's order has besides: its part, or how it may split, which a small one does not. What its pictures are
+ * does not depend on the settings that say where and in how many parts it runs: these stay here. */
 static void add_parts(cJSON *order, const struct job_work *work, const struct scheduler_config *config, int64_t done) {
     const struct job *job = work->job;
     const struct job_part *part = work->part;

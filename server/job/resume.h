@@ -4,8 +4,8 @@
 
 #include "server/job/executors.h"
 
-/* Attempts that go on without a daemon are taken up, each in one of the empty slots; all other jobs that the store has as
- * running are queued again. */
+/* Attempts that go on without a daemon are taken up, each in one of the empty slots; all other jobs that the store has
+ * as running are queued again. */
 enum status resume_all(struct attempt *slots, size_t slot_count, struct executors *places,
                        const struct scheduler_config *config, struct store *store, size_t *requeued, struct error *err);
 

@@ -183,8 +183,8 @@ static void follow_wish(struct scheduler *s, struct attempt *a, enum job_wanted 
     }
 }
 
-/* An attempt that the store has as running, and nobody else: entering its false start had failed. Or a job of which none
- * runs: no part of it could begin. */
+/* An attempt that the store has as running, and nobody else: entering its false start had failed. Or a job of which
+ * none runs: no part of it could begin. */
 static void requeue_orphan(struct scheduler *s, const struct attempt_key *key) {
     struct error err;
     enum status status = key->number ? store_job_stop(s->store, key->job_id, key->number, "its start failed", &err)

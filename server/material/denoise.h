@@ -28,8 +28,8 @@ struct color_prior {
 /* Writes the valid texels of `out` from measured[height][width] and prior[chart_count]: those of the charts for which
  * wanted[chart_count] is true, or of all where it is NULL. deviation[height][width], NULL or half precision: their
  * expected error, a standard deviation over the channels, by noise, by detail that is lost with it, by light of other
- * surfaces, and by edges, of which one texel in stride x stride was measured; of texels that were not measured that of the
- * prior. The same for any number of threads. */
+ * surfaces, and by edges, of which one texel in stride x stride was measured; of texels that were not measured that of
+ * the prior. The same for any number of threads. */
 void denoise(const struct atlas *atlas, const struct inverse_uv *inverse, size_t triangle_count,
              const struct measured *measured, const struct color_prior *prior, const bool *wanted, struct texture *out,
              uint32_t stride, uint16_t *deviation, struct parallel *pool);

@@ -26,8 +26,8 @@ struct emission_pattern_input {
 };
 
 /* Finds the patterns of all emitters in their outgoing radiance, emitted and reflected: writes the emission patterns of
- * *materials and, where there is one, sets evidence[segment_count].radiance to the mean over the surface. Depends only on
- * photographs, emitters and evidence.observed, not on the number of threads. */
+ * *materials and, where there is one, sets evidence[segment_count].radiance to the mean over the surface. Depends only
+ * on photographs, emitters and evidence.observed, not on the number of threads. */
 void emission_pattern_find(const struct emission_pattern_input *in, struct materials *materials,
                            struct emitter_evidence *evidence);
 

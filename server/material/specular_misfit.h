@@ -1,12 +1,13 @@
-/* specular_misfit.h -- what candidate materials leave unexplained at the points of a segment, and how sure the difference
- * of two of them is.
+/* specular_misfit.h -- what candidate materials leave unexplained at the points of a segment, and how sure the
+ * difference of two of them is.
  *
  * Errors are shared: by all observations of a point (its normal), by all of a photograph (its pose, exposure, white
- * balance, vignette), and by all of a region (the light that arrives there, the mesh). The variance of the difference is
- * that over the points, and what sums over photographs vary beyond single observations and those over regions beyond
- * single points, about their mean (Cameron, Gelbach & Miller 2011, Robust inference with multiway clustering, section 2).
- * What is summed are the effects of errors alone, and not the difference itself: a true highlight is in few photographs and in one region. An error is what neither candidate
- * explains, the smaller of both residuals, and its effect is what the difference would be less without it:
+ * balance, vignette), and by all of a region (the light that arrives there, the mesh). The variance of the difference
+ * is that over the points, and what sums over photographs vary beyond single observations and those over regions beyond
+ * single points, about their mean (Cameron, Gelbach & Miller 2011, Robust inference with multiway clustering, section
+ * 2). What is summed are the effects of errors alone, and not the difference itself: a true highlight is in few
+ * photographs and in one region. An error is what neither candidate explains, the smaller of both residuals, and its
+ * effect is what the difference would be less without it:
  *
  *      u = rho(e_a) - rho(e_b) - rho(e_a - e_b)     where e_b is the smaller one; + where e_a is */
 #ifndef UNBAKE_MATERIAL_SPECULAR_MISFIT_H

@@ -1,9 +1,9 @@
 /* specular_points.h -- sample points of all segments, by all threads.
  *
- * A segment's texels are tried in an order of their own until enough fulfil the criteria, which are relaxed where too few
- * do: first pixels nearer to edges, then smaller patches. In each round every segment tries as many as it still lacks,
- * and all of these are observed at once: a large segment keeps as many threads busy as many small ones, and its points
- * are those of one try after the other. */
+ * A segment's texels are tried in an order of their own until enough fulfil the criteria, which are relaxed where too
+ * few do: first pixels nearer to edges, then smaller patches. In each round every segment tries as many as it still
+ * lacks, and all of these are observed at once: a large segment keeps as many threads busy as many small ones, and its
+ * points are those of one try after the other. */
 #ifndef UNBAKE_MATERIAL_SPECULAR_POINTS_H
 #define UNBAKE_MATERIAL_SPECULAR_POINTS_H
 

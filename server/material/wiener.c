@@ -184,7 +184,8 @@ static void keep_texture(struct wiener *w) {
 }
 
 /* Adds the error of detail that is too fine to be resolved: where the finest that is resolved has edges. Where there is
- * no texture there are none: peaks of noise alone, above what is subtracted, have a quarter of its power in the mean. */
+ * no texture there are none: peaks of noise alone, above what is subtracted, have a quarter of its power in the
+ * mean. */
 static void add_unresolved(struct wiener *w, size_t step, float part) {
     size_t samples = w->width * w->height;
     for (size_t at = 0; at < samples; at++) {

@@ -33,8 +33,8 @@ void wiener_init(struct wiener *w, size_t samples);
 void wiener_release(struct wiener *w);
 
 /* Filters `levels` levels, the first with a step of `step` samples, each with twice the step of the one before, and
- * adds their texture to `kept` and what that is off to `error`. The radius of the power window is at most max_window samples. Nothing finer than
- * `resolution` samples was resolved. */
+ * adds their texture to `kept` and what that is off to `error`. The radius of the power window is at most max_window
+ * samples. Nothing finer than `resolution` samples was resolved. */
 void wiener_levels(struct wiener *w, size_t step, int levels, size_t max_window, size_t resolution);
 
 /* Radius of the samples that such a call reads. */

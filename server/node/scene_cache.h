@@ -2,8 +2,8 @@
  * the folder.
  *
  *   CACHE/ID/        the scene's files; NAME.part: one that is being fetched
- *   CACHE/ID.use     locked (flock, shared) by whoever reads the scene, and alone by who removes it; its time is that of
- *                    the last use
+ *   CACHE/ID.use     locked (flock, shared) by whoever reads the scene, and alone by who removes it; its time is that
+ *                    of the last use
  *   CACHE/ID.fetch   locked alone by who fetches files of it
  *
  * 1. A file has its name only when its digest was right. It is hashed again for every attempt: what is damaged is

@@ -12,10 +12,10 @@
 #include "server/render/world.h"
 #include "server/scene/camera.h"
 
-/* The mean over views is known well enough when its standard error is this part of it: a view's may be larger by the root
- * of their number. Else the view is rendered again, up to HELD_RENDER_ROUNDS times in all. Of pictures of 100 x 100 pixels
- * and more the first render nearly always does: the product of two errors leaves the noise of all pixels together, of
- * which each has its own. */
+/* The mean over views is known well enough when its standard error is this part of it: a view's may be larger by the
+ * root of their number. Else the view is rendered again, up to HELD_RENDER_ROUNDS times in all. Of pictures of 100 x
+ * 100 pixels and more the first render nearly always does: the product of two errors leaves the noise of all pixels
+ * together, of which each has its own. */
 #define HELD_RENDER_GOAL 0.1
 #define HELD_RENDER_ROUNDS 4
 

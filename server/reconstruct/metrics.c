@@ -91,8 +91,8 @@ static double displayed(double radiance, double exposure) {
     return (double)image_linear_to_srgb((float)fmin(fmax(radiance * exposure, 0.0), 1.0));
 }
 
-/* By how much display, which is concave, is darkened by a pixel's noise: in the mean by f''(x) v / 2 to second order for
- * noise of variance v, of which the mean of both re-renders has half. */
+/* By how much display, which is concave, is darkened by a pixel's noise: in the mean by f''(x) v / 2 to second order
+ * for noise of variance v, of which the mean of both re-renders has half. */
 static double display_bias(const float *halves, int channel, double exposure) {
     double a = (double)halves[channel], b = (double)halves[3 + channel];
     double bias = displayed(a, exposure) + displayed(b, exposure) - 2.0 * displayed(0.5 * (a + b), exposure);

@@ -6,8 +6,8 @@
 #include "common/mem.h"
 #include "server/reconstruct/metrics.h"
 
-/* Relative step of depth from a pixel to the next at an outline. A floor or a wall seen at 5 degrees has .03 (640 pixels,
- * 60 degrees). */
+/* Relative step of depth from a pixel to the next at an outline. A floor or a wall seen at 5 degrees has .03 (640
+ * pixels, 60 degrees). */
 #define STEP 0.1f
 
 struct outline_depths {

@@ -1,5 +1,6 @@
-/* outlines.h -- how much of a re-render's error lies beside outlines: places where one surface ends before another. There
- * mesh and photographs must fit to the pixel, which shows whether poses and mesh are exact; elsewhere they need not. */
+/* outlines.h -- how much of a re-render's error lies beside outlines: places where one surface ends before another.
+ * There mesh and photographs must fit to the pixel, which shows whether poses and mesh are exact; elsewhere they need
+ * not. */
 #ifndef UNBAKE_RECONSTRUCT_OUTLINES_H
 #define UNBAKE_RECONSTRUCT_OUTLINES_H
 
@@ -16,8 +17,8 @@ struct outline_error {
     double pixel_share; /* of the pixels that count, that are beside outlines */
 };
 
-/* Depth of what a camera sees at the middle of each pixel, [height][width], metres along the optical axis (of a panorama
- * the distance); infinite where it sees nothing. The caller's (mem_free). */
+/* Depth of what a camera sees at the middle of each pixel, [height][width], metres along the optical axis (of a
+ * panorama the distance); infinite where it sees nothing. The caller's (mem_free). */
 float *outlines_depth(struct accel *accel, const struct camera *camera, struct parallel *pool);
 
 /* The photograph and its re-renders are as for metrics_msre, of the size of `depth`. NaN without pixels that count. */

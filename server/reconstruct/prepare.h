@@ -8,8 +8,8 @@
 #include "server/state/reconstruction.h"
 
 /* Holds photographs out, turns and denoises the mesh of r->scene and estimates its normals, calibrates exposures and
- * poses; makes segments, atlas, world, noise and environment of *r, which have no content yet, and *views. All are to be
- * released whatever it returns. STATUS_INPUT where the scene is not one that can be reconstructed. */
+ * poses; makes segments, atlas, world, noise and environment of *r, which have no content yet, and *views. All are to
+ * be released whatever it returns. STATUS_INPUT where the scene is not one that can be reconstructed. */
 enum status prepare_run(struct reconstruction *r, struct views *views, const struct pace *pace, struct error *err);
 
 /* Lights the world by r->environment, after its map changed. */

@@ -15,7 +15,8 @@ enum status report_held_out(struct reconstruction *r, const struct views *views,
 /* Releases r->held_out, which is empty then. */
 void report_release_held_out(struct reconstruction *r);
 
-/* Adds "grey_card" to r->report, where one is given: what base colour came out there; warns where it is not the card's. */
+/* Adds "grey_card" to r->report, where one is given: what base colour came out there; warns where it is not the
+ * card's. */
 void report_grey_card(struct reconstruction *r, const struct reconstruct_hooks *hooks);
 
 /* Adds "luminance_per_unit" to r->report where it is told, or known by the photographs; in cd/m2. */

@@ -1,7 +1,7 @@
 /* solve_emitters.h -- which segments emit, and how much.
  *
- * A segment emits if it is brighter than a surface of base colour 1 could be in the light that arrives there, if its own
- * light changed between photographs (changing_light.h), or if it is a lamp that no photograph shows. */
+ * A segment emits if it is brighter than a surface of base colour 1 could be in the light that arrives there, if its
+ * own light changed between photographs (changing_light.h), or if it is a lamp that no photograph shows. */
 #ifndef UNBAKE_RECONSTRUCT_SOLVE_EMITTERS_H
 #define UNBAKE_RECONSTRUCT_SOLVE_EMITTERS_H
 

@@ -91,8 +91,8 @@ static inline struct bsdf bsdf_make(rgb base_color, float roughness, float specu
     return b;
 }
 
-/* What the specular lobe of a metal reflects at the cosine c between the directions and the microfacet's normal: Schlick
- * 1994, as Mitsuba 3's `principled` has it. */
+/* What the specular lobe of a metal reflects at the cosine c between the directions and the microfacet's normal:
+ * Schlick 1994, as Mitsuba 3's `principled` has it. */
 static inline rgb bsdf_metal_fresnel(rgb base_color, float c) {
     float w = bsdf_schlick(c);
     return (rgb){base_color.r + (1.0f - base_color.r) * w, base_color.g + (1.0f - base_color.g) * w,

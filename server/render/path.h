@@ -57,8 +57,8 @@ void path_batch_free(struct path_batch *batch);
 void path_batch_trace(struct path_batch *batch, const struct world *world, const struct path_settings *settings,
                       size_t count, const struct ray *ray, const struct path_key *key, rgb *radiance);
 
-/* Of the last path_batch_trace, the part of each ray's radiance that was reflected once at most: what emits, seen by the
- * camera, and direct light. Borrowed until the next. */
+/* Of the last path_batch_trace, the part of each ray's radiance that was reflected once at most: what emits, seen by
+ * the camera, and direct light. Borrowed until the next. */
 const rgb *path_batch_direct(const struct path_batch *batch);
 
 /* Appends to `log` the derivatives of the paths of the last path_batch_trace, given d_radiance[count], the derivative

@@ -7,8 +7,8 @@
 #include "server/render/shade.h"
 #include "server/render/world.h"
 
-/* Chooses a light triangle for each of `count` lanes by s->pick and loads it; lanes that choose the environment are left
- * to path_lights_environment. False when the scene has no light. */
+/* Chooses a light triangle for each of `count` lanes by s->pick and loads it; lanes that choose the environment are
+ * left to path_lights_environment. False when the scene has no light. */
 bool path_lights_pick(struct shade_block *s, struct vertex_block *v, const struct world *world, int count);
 
 /* The samples on triangles of segments with an emission cone. After shade_light. */

@@ -138,7 +138,8 @@ static size_t padded_cells(const struct pack_item *item, uint32_t padding) {
     return count;
 }
 
-/* Share of the grid that the dilated shapes fill; infinite when one is larger than the grid. Above 1 they cannot fit. */
+/* Share of the grid that the dilated shapes fill; infinite when one is larger than the grid. Above 1 they cannot
+ * fit. */
 static double fill_at(struct raster *raster, const struct charts *charts, double density,
                       const struct pack_grid *grid) {
     if (!rasterise(raster, charts, density, (int32_t)grid->cell * COVERAGE_UNITS, grid->cells))

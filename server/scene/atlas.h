@@ -35,8 +35,8 @@ struct atlas {
 };
 
 /* The highest mip level of which no texel that covers a chart has values of another one, where texels between charts
- * have the value of the nearest chart: a texel of level n is 2^n wide, so its far corner is sqrt(2) (2^n - 1) texels off
- * the chart and must be nearer to it than to the next one. */
+ * have the value of the nearest chart: a texel of level n is 2^n wide, so its far corner is sqrt(2) (2^n - 1) texels
+ * off the chart and must be nearer to it than to the next one. */
 static inline int atlas_clean_level(uint32_t padding) {
     int level = 0;
     while ((float)padding + 1.0f > 2.41421356f * (float)((2 << level) - 1))
@@ -45,7 +45,8 @@ static inline int atlas_clean_level(uint32_t padding) {
 }
 
 /* Makes a size x size atlas at the greatest density that fits. If texels_per_metre is not 0, uses that density and
- * the smallest power-of-two size up to ATLAS_MAX_SIZE that holds it (STATUS_INPUT when none does). `padding`: free texels between charts. Deterministic. */
+ * the smallest power-of-two size up to ATLAS_MAX_SIZE that holds it (STATUS_INPUT when none does). `padding`: free
+ * texels between charts. Deterministic. */
 enum status atlas_make(struct atlas *atlas, const struct mesh *mesh, const struct segments *segments, uint32_t size,
                        float texels_per_metre, uint32_t padding, struct error *err);
 /* As atlas_make with a size. The density of a chart is the maximum of density[triangle_count], each in (0, 1], over

@@ -40,9 +40,9 @@ struct camera {
 };
 
 /* Finds where the distortion stops growing and sets `fold`, the limit up to which the model is one-to-one: tan of the
- * angle from the axis (OPENCV) or that angle in radians (fisheye); well outside the picture if it never folds; 0 without
- * distortion and for FOV and DIVISION, which have closed forms. Beyond it the polynomial maps directions outside the view into the picture. Call once after
- * size and lens parameters are set. */
+ * angle from the axis (OPENCV) or that angle in radians (fisheye); well outside the picture if it never folds; 0
+ * without distortion and for FOV and DIVISION, which have closed forms. Beyond it the polynomial maps directions
+ * outside the view into the picture. Call once after size and lens parameters are set. */
 void camera_find_fold(struct camera *camera);
 
 /* Whether the lens differs from a pinhole. */

@@ -14,8 +14,9 @@
 /* Base colour of unknown surfaces, and of emitters, whose own light hides it. */
 #define NEUTRAL_BASE_COLOR 0.5f
 
-/* How the emission of a segment depends on the cosine c to its normal: times ((c - outer) / (inner - outer))^2, between 0
- * and 1, over c: a spot light of KHR_lights_punctual, whose intensity is even within the inner cone. Outer -1: none. */
+/* How the emission of a segment depends on the cosine c to its normal: times ((c - outer) / (inner - outer))^2, between
+ * 0 and 1, over c: a spot light of KHR_lights_punctual, whose intensity is even within the inner cone. Outer -1:
+ * none. */
 struct emission_cone {
     float outer, inner;
 };
@@ -56,8 +57,8 @@ bool materials_is_polished(const struct materials *m, uint32_t segment);
 /* Allocates the deviations, all unknown. */
 void materials_start_deviation(struct materials *m);
 
-/* Standard deviation of a texel's base colour, by channel: that of its measurement, and no less than plain surface of this
- * room has, which contains the errors that no texel's own measurement tells. Black where it is unknown. */
+/* Standard deviation of a texel's base colour, by channel: that of its measurement, and no less than plain surface of
+ * this room has, which contains the errors that no texel's own measurement tells. Black where it is unknown. */
 rgb materials_deviation(const struct materials *m, size_t texel);
 
 /* Allocates a pattern of unknown texels, or frees it. Untouched pages of the former take no memory. */

@@ -58,7 +58,8 @@ static inline bool mesh_has_uv(const struct mesh *mesh, size_t triangle) {
     return c && isfinite(c[0].x + c[0].y + c[1].x + c[1].y + c[2].x + c[2].y);
 }
 
-/* Copies triangle `from` with its face, object and texture coordinates over triangle `to`: to leave some out in place. */
+/* Copies triangle `from` with its face, object and texture coordinates over triangle `to`: to leave some out in
+ * place. */
 void mesh_move_triangle(struct mesh *mesh, size_t from, size_t to);
 
 /* Maps each vertex to the lowest-numbered one at the same position (files repeat vertices where

@@ -73,9 +73,9 @@ enum status store_begin_freeing(struct store *store, struct error *err);
  * *changed_job (STORE_NOTHING_CHANGED before) whose subscribers are told. */
 typedef enum status store_change(struct store *store, void *what, int64_t *changed_job, struct error *err);
 enum status store_change_freeing(struct store *store, store_change *change, void *what, struct error *err);
-/* From here on, until store_group_end, all transactions of this thread are one: each of them is still undone alone where it
- * fails, but nothing of any is kept unless the whole is. Other threads wait. Subscribers are told after the whole of the
- * job that the last one has changed. It is one that frees space, as above. */
+/* From here on, until store_group_end, all transactions of this thread are one: each of them is still undone alone
+ * where it fails, but nothing of any is kept unless the whole is. Other threads wait. Subscribers are told after the
+ * whole of the job that the last one has changed. It is one that frees space, as above. */
 enum status store_group_begin(struct store *store, struct error *err);
 enum status store_group_end(struct store *store, enum status status, struct error *err);
 bool store_reserve_spend(struct store *store); /* gives DATA/reserve up; false if that was done already */
@@ -84,8 +84,8 @@ enum status store_end(struct store *store, enum status status, int64_t changed_j
 int64_t store_now_ms(void); /* Unix time */
 
 /* When a row may go, as SQL over its table: Unix milliseconds, 0 for never; see retention.h. States
- * up to 2 are those of jobs that have not ended; a scene in state 1 is being checked. A job stays while another that has
- * not ended reads its outputs; kind 1, renders, read nothing of their scene. */
+ * up to 2 are those of jobs that have not ended; a scene in state 1 is being checked. A job stays while another that
+ * has not ended reads its outputs; kind 1, renders, read nothing of their scene. */
 #define JOB_EXPIRES                                                                                                          \
     "(CASE WHEN pinned = 1 OR state <= 2 OR EXISTS (SELECT 1 FROM jobs AS reader WHERE"                                      \
     " reader.source_id = jobs.id AND reader.source_id > 0 AND reader.state <= 2) THEN 0 WHEN expires_ms > 0 THEN expires_ms" \
@@ -105,7 +105,8 @@ int64_t store_now_ms(void); /* Unix time */
     "pinned = CASE ?1 WHEN 0 THEN pinned WHEN 1 THEN 1 ELSE 0 END,"                                                    \
     " expires_ms = iif(?2, ?3, expires_ms)"
 
-/* The part (parts.h) of which the job (an SQL expression) begins an attempt next; null where it cannot at this moment. */
+/* The part (parts.h) of which the job (an SQL expression) begins an attempt next; null where it cannot at this
+ * moment. */
 #define NEXT_PART(job)                                                                                                 \
     "(CASE WHEN EXISTS (SELECT 1 FROM parts WHERE job_id = " job " AND parts.state > 1) THEN NULL"                     \
     " WHEN EXISTS (SELECT 1 FROM parts WHERE job_id = " job " AND parts.state = 0) THEN"                               \
@@ -128,8 +129,8 @@ enum status reserve_check(struct store *store, struct error *err);
 /* Inside a transaction: appends an event. */
 enum status store_event_append(struct store *store, int64_t job_id, int attempt, const char *type, const char *data,
                                struct error *err);
-/* job_inputs.c, all inside a transaction: STATUS_CONFLICT unless job `id` is a reconstruction with results, which another
- * job may read. */
+/* job_inputs.c, all inside a transaction: STATUS_CONFLICT unless job `id` is a reconstruction with results, which
+ * another job may read. */
 enum status store_source_ready(struct store *store, int64_t id, struct error *err);
 /* STATUS_CONFLICT while a job that has not ended reads the outputs of job `id`, which therefore cannot be `action`. */
 enum status store_source_check(struct store *store, int64_t id, const char *action, struct error *err);
@@ -147,8 +148,8 @@ struct count_limits; /* limits.h */
 /* Inside a transaction: STATUS_LIMIT unless this owner (0: nobody) may queue one more job. */
 enum status store_queue_check(struct store *store, int64_t owner_id, const struct count_limits *limits,
                               struct error *err);
-/* scene_reading.c, inside a transaction: gives the scene a reading for user owner_id (-1: whom no other's jobs hinder) as
- * store_scene_patch has it; a check that is under way with the same one goes on. */
+/* scene_reading.c, inside a transaction: gives the scene a reading for user owner_id (-1: whom no other's jobs hinder)
+ * as store_scene_patch has it; a check that is under way with the same one goes on. */
 enum status store_scene_set_reading(struct store *store, const char *id, int64_t owner_id, const char *reading,
                                     struct error *err);
 /* Whether the scene is to be read otherwise than a check has read it; `reading` NULL: that does not matter. */

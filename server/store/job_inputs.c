@@ -1,5 +1,5 @@
-/* job_inputs.c -- whether a job has what it reads: files that its settings name (job_files.h) and the outputs of another
- * job, which stay as they are while it reads them. */
+/* job_inputs.c -- whether a job has what it reads: files that its settings name (job_files.h) and the outputs of
+ * another job, which stay as they are while it reads them. */
 #include "common/buf.h"
 #include "server/store/job_files.h"
 #include "server/store/store.h"

@@ -1,4 +1,5 @@
-/* outputs.h -- the files that attempts have finished writing, and their digests. As for all of the store, see store.h. */
+/* outputs.h -- the files that attempts have finished writing, and their digests. As for all of the store, see
+ * store.h. */
 #ifndef UNBAKE_STORE_OUTPUTS_H
 #define UNBAKE_STORE_OUTPUTS_H
 

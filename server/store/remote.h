@@ -8,16 +8,16 @@
  *
  * 1. The row is on disk before anything is submitted, with the name under which the site will know it: whoever finds it
  *    after a crash looks for that name first.
- * 2. Who holds the attempt's token may claim it, once. A claim is repeated by the same claimant (its reply may have been
- *    lost); every other one is refused.
- * 3. All that a node says carries the attempt's token and its claimant, and is refused with STATUS_CONFLICT once the row
- *    is ENDED, or another attempt of the job runs, or none.
+ * 2. Who holds the attempt's token may claim it, once. A claim is repeated by the same claimant (its reply may have
+ *    been lost); every other one is refused.
+ * 3. All that a node says carries the attempt's token and its claimant, and is refused with STATUS_CONFLICT once the
+ *    row is ENDED, or another attempt of the job runs, or none.
  * 4. Reports are numbered from 1 without gaps. One is entered with its number in one transaction; one that is repeated
  *    changes nothing and has the same reply. The end is a report too, the last, and there is one end.
- * 5. Lines are read in the order of their reports, each at least once: after a crash of the daemon those of one report may
- *    be read again.
- * 6. Who writes files for an attempt enters first (store_remote_enter) and leaves after. After the end nobody enters; what
- *    is ENDED and has no writer will not be written to any more. */
+ * 5. Lines are read in the order of their reports, each at least once: after a crash of the daemon those of one report
+ *    may be read again.
+ * 6. Who writes files for an attempt enters first (store_remote_enter) and leaves after. After the end nobody enters;
+ *    what is ENDED and has no writer will not be written to any more. */
 #ifndef UNBAKE_STORE_REMOTE_H
 #define UNBAKE_STORE_REMOTE_H
 
@@ -84,7 +84,8 @@ enum status store_remote_rename(struct store *store, int64_t job_id, int number,
 /* The site has it under that id. Nothing changes where it is claimed or ended already, but for an unknown id. */
 enum status store_remote_submitted(struct store *store, int64_t job_id, int number, const char *external_id,
                                    struct error *err);
-/* Why it waits; the job shows "waiting in EXECUTOR: REASON" until it is claimed. Without a change nothing is written. */
+/* Why it waits; the job shows "waiting in EXECUTOR: REASON" until it is claimed. Without a change nothing is
+ * written. */
 enum status store_remote_explain(struct store *store, int64_t job_id, int number, const char *reason,
                                  struct error *err);
 /* What is the matter with one that is claimed, which the job shows; "": nothing any more. Without a change nothing is
@@ -101,9 +102,9 @@ enum status store_remote_list(struct store *store, const char *executor, struct 
                               struct error *err);
 /* Grows whenever a node has said something: while it stands still there is nothing to read. */
 uint64_t store_remote_changes(struct store *store);
-/* Reads the oldest report: passes its lines, each with its newline, to `each`, and removes it. What `each` enters into the
- * store is one transaction with that: a report is entered whole, once, or not at all and read again. STATUS_NOT_FOUND
- * when there is none. */
+/* Reads the oldest report: passes its lines, each with its newline, to `each`, and removes it. What `each` enters into
+ * the store is one transaction with that: a report is entered whole, once, or not at all and read again.
+ * STATUS_NOT_FOUND when there is none. */
 typedef void remote_lines_fn(void *user, const char *lines);
 enum status store_remote_read(struct store *store, int64_t job_id, int number, remote_lines_fn *each, void *user,
                               struct error *err);

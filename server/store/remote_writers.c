@@ -1,4 +1,5 @@
-/* remote_writers.c -- how many requests write outputs of an attempt elsewhere at this moment; under the store's mutex. */
+/* remote_writers.c -- how many requests write outputs of an attempt elsewhere at this moment; under the store's
+ * mutex. */
 #include "common/mem.h"
 #include "server/store/internal.h"
 

@@ -157,7 +157,8 @@ struct job_new {
 /* queue_limit and job->user_queue_limit: STATUS_LIMIT when that many jobs are queued, in all or of the owner.
  * STATUS_NO_SPACE when the owner has user_max_jobs jobs. With a known key: the earlier job's id, and *replayed;
  * STATUS_CONFLICT when the request differs. The scene may still be in `checking`; STATUS_CONFLICT when it is
- * rejected, STATUS_NOT_FOUND when there is none; a render needs none. STATUS_CONFLICT when the source has no results. */
+ * rejected, STATUS_NOT_FOUND when there is none; a render needs none. STATUS_CONFLICT when the source has no
+ * results. */
 enum status store_job_add(struct store *store, const struct job_new *job, size_t queue_limit, int64_t *id,
                           bool *replayed, struct error *err);
 enum status store_job_get(struct store *store, int64_t id, struct job *job, struct error *err);

@@ -36,7 +36,8 @@ enum status transition_tell(struct store *store, const struct present *now, cons
 /* As transition_begin_stopping, for the end of an attempt that the job must be running; it ends so. */
 enum status attempt_begin_end(struct store *store, int64_t id, int attempt, const char *ending, struct present *now,
                               struct error *err);
-/* That attempt ends, by which the job would become `to`; where others run, or the job's parts go on, it stays as it is. */
+/* That attempt ends, by which the job would become `to`; where others run, or the job's parts go on, it stays as it
+ * is. */
 enum status attempt_leave(struct store *store, struct present *now, enum job_state to, const char *reason,
                           const char *hint, struct error *err);
 

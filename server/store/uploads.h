@@ -1,4 +1,5 @@
-/* uploads.h -- resumable uploads: what has arrived of them, and what they became. As for all of the store, see store.h. */
+/* uploads.h -- resumable uploads: what has arrived of them, and what they became. As for all of the store, see
+ * store.h. */
 #ifndef UNBAKE_STORE_UPLOADS_H
 #define UNBAKE_STORE_UPLOADS_H
 

@@ -47,8 +47,8 @@ static enum MHD_Result refuse(struct exchange *x) {
     return reply_queue(x);
 }
 
-/* The head has been worked on: refuses the request or lets its body arrive. A reply to a request without a body is queued
- * at the library's next call; queued now, it would close the connection. */
+/* The head has been worked on: refuses the request or lets its body arrive. A reply to a request without a body is
+ * queued at the library's next call; queued now, it would close the connection. */
 static enum MHD_Result accept_body(struct exchange *x) {
     struct request *r = &x->request;
     if (r->has_body && x->reply)

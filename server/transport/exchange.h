@@ -72,8 +72,8 @@ struct listener {
     size_t pending_reply_count; /* exchanges with reply_pending */
 };
 
-/* Suspends the connection and queues the exchange in the pool, which calls run(&x->task). false, and nothing is done, when
- * the daemon is closing. */
+/* Suspends the connection and queues the exchange in the pool, which calls run(&x->task). false, and nothing is done,
+ * when the daemon is closing. */
 bool exchange_give(struct exchange *x, struct pool *pool, void (*run)(struct task *task));
 /* Resumes the connection: from here on only the library may touch x. The mutex is held. */
 void exchange_give_back(struct exchange *x);

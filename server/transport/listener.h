@@ -1,5 +1,5 @@
-/* listener.h -- HTTP: sockets, threads and libmicrohttpd, of which nothing shows. What a request means, and what its reply
- * is, the application says (application.h).
+/* listener.h -- HTTP: sockets, threads and libmicrohttpd, of which nothing shows. What a request means, and what its
+ * reply is, the application says (application.h).
  *
  *   head ──> head_check, find, begin ──> body: data ... ──> finish ──> reply
  *                    │ refused                  │ refused
@@ -33,8 +33,8 @@ struct listener_config {
     struct guard_limits limits;
 };
 
-/* Listens and serves until listener_stop, which takes *l. Of `config` it borrows the proxies; `application` is copied, its
- * `user` borrowed. STATUS_INPUT: the address or the certificate cannot be used. */
+/* Listens and serves until listener_stop, which takes *l. Of `config` it borrows the proxies; `application` is copied,
+ * its `user` borrowed. STATUS_INPUT: the address or the certificate cannot be used. */
 enum status listener_start(struct listener **l, const struct listener_config *config,
                            const struct application *application, struct error *err);
 uint16_t listener_port(const struct listener *l);

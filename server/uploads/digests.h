@@ -41,7 +41,8 @@ struct digests_file {
 enum status digests_look(struct digests *d, int64_t job_id, const struct output_row *row, int fd,
                          struct digests_file *file, struct error *err);
 
-/* The same for a file that is not an output; `thing` and `name` identify it. Files above DIGESTS_AT_ONCE get no digest. */
+/* The same for a file that is not an output; `thing` and `name` identify it. Files above DIGESTS_AT_ONCE get no
+ * digest. */
 enum status digests_look_at(int fd, const char *thing, const char *name, struct digests_file *file, struct error *err);
 
 /* Hashes the open file. Once *stopping (may be NULL) is true it returns STATUS_CANCELLED. *version is the version

@@ -1,12 +1,12 @@
-/* checkpoint_file.h -- checkpoint.db as it lies on the disk: its tables, opened and verified. What is saved and loaded is
- * checkpoint.c's.
+/* checkpoint_file.h -- checkpoint.db as it lies on the disk: its tables, opened and verified. What is saved and loaded
+ * is checkpoint.c's.
  *
  *   newest   one row: fingerprint, program, iteration, digest       user_version is the format (STATE_FORMAT)
  *   arrays   number, name, bytes
  *   tiles    id, array, number, hash, data
  *
- * In memory stands, for every tile of the newest commit, its row and its hash: what a save compares with and a load reads
- * by. */
+ * In memory stands, for every tile of the newest commit, its row and its hash: what a save compares with and a load
+ * reads by. */
 #ifndef UNBAKE_WORKER_CHECKPOINT_FILE_H
 #define UNBAKE_WORKER_CHECKPOINT_FILE_H
 
@@ -43,7 +43,8 @@ struct checkpoint_file {
 };
 
 /* Opens or creates the file, and reads and verifies all of it. note[0] is 0, or a sentence for the user on why what was
- * there is not used; it is removed then. STATUS_UNAVAILABLE when another process has it. After a failure *f is empty. */
+ * there is not used; it is removed then. STATUS_UNAVAILABLE when another process has it. After a failure *f is
+ * empty. */
 enum status checkpoint_file_open(struct checkpoint_file *f, const char *path, const char *fingerprint, char note[512],
                                  struct error *err);
 void checkpoint_file_close(struct checkpoint_file *f);

@@ -4,8 +4,8 @@
  * 1. A part has what has changed since the part before; the first one of a process has all.
  * 2. A part still lies there as long as it has not been carried away. Until then no further one is written, unless it
  *    must be: a slow network makes parts rarer, and there are two at the most.
- * 3. Where the parts that are needed take more than PARTS_STRETCH times the state, or are PARTS_KEPT_MAX, the next has all of
- *    it again: whoever keeps them needs room for that much and two parts more.
+ * 3. Where the parts that are needed take more than PARTS_STRETCH times the state, or are PARTS_KEPT_MAX, the next has
+ *    all of it again: whoever keeps them needs room for that much and two parts more.
  *
  * Not thread-safe. */
 #ifndef UNBAKE_WORKER_CHECKPOINT_PARTS_H

@@ -1,5 +1,5 @@
-/* evaluate.c -- a reconstruction compared with the truth of its room, inside a worker. It is short and has no checkpoint:
- * a request to stop ends the process, and a later attempt begins anew. */
+/* evaluate.c -- a reconstruction compared with the truth of its room, inside a worker. It is short and has no
+ * checkpoint: a request to stop ends the process, and a later attempt begins anew. */
 #include <string.h>
 
 #include "common/file.h"

@@ -6,8 +6,8 @@
  *    "disk_bytes":0,"parts":false}
  *   {"kind":"render","outputs":"DATA/jobs/9/attempt-1/out","files":"DATA/jobs/17/files","settings":{…},"name":"…",
  *    "job_id":17,"attempt":1,"thread_count":4,"memory_bytes":0,"sandbox":true,"memory_step":0,"disk_bytes":0}
- *      and, where it may find that it is better done in parts, "split":{"parts":0,"paths":1e9}: in how many, or of how much
- *      each; or, of a part, "part":{"first":100,"count":50,"done":7}: its pictures, of which so many are done
+ *      and, where it may find that it is better done in parts, "split":{"parts":0,"paths":1e9}: in how many, or of how
+ *      much each; or, of a part, "part":{"first":100,"count":50,"done":7}: its pictures, of which so many are done
  *   {"kind":"evaluate", as a render's, without files and with "scene" as a reconstruction's}
  *   {"kind":"check","scene_id":"…","reading":{…},"thread_count":4,"memory_bytes":0,"photograph_memory_bytes":0,
  *    "keep_free_bytes":671088640,"sandbox":true}

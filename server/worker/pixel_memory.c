@@ -3,8 +3,8 @@
 
 #include "common/machine.h"
 
-/* With less, even one photograph is read from the disk again and again: one of 12 megapixels with what is found of it takes
- * 150 MB. Moves time only. */
+/* With less, even one photograph is read from the disk again and again: one of 12 megapixels with what is found of it
+ * takes 150 MB. Moves time only. */
 #define LEAST_BYTES ((uint64_t)64 << 20)
 /* Where the system does not tell what it has. */
 #define UNKNOWN_BYTES ((uint64_t)2 << 30)

@@ -7,8 +7,8 @@
 #include "common/spill.h"
 #include "server/worker/order.h"
 
-/* Bytes: as the order says; else half of what the worker may use or, without a limit, could have now. Half of that again
- * for each time that the job has run out of memory. */
+/* Bytes: as the order says; else half of what the worker may use or, without a limit, could have now. Half of that
+ * again for each time that the job has run out of memory. */
 uint64_t pixel_memory_bytes(const struct order *order);
 
 /* Memory and a file in the order's folder; the caller's (spill_free). */

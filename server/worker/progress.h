@@ -9,11 +9,12 @@
  *   {"type":"checkpoint","iteration":120,"bytes":…,"seconds":…}
  *   {"type":"part","number":7,"first":3,"bytes":…}   of a checkpoint, for another machine: only a node is told
  *   {"type":"record","name":"views.jsonl","sha256":"…"}   of what is done, which has grown: only a node is told
- *   {"type":"plan","pictures":500,"parts":8,"digest":"…"}   a render that is better done in parts (store/parts.h); it ends
+ *   {"type":"plan","pictures":500,"parts":8,"digest":"…"}   a render that is better done in parts (store/parts.h); it
+ *   ends
  *   {"type":"space","bytes":…}   what it takes of the disk besides the files in its folder
  *   {"type":"problem","file":"images/003.png","reason":"…","hint":"…"}   (scene checks)
- *   {"type":"scene","facts":{"triangle_count":…,"frame_count":…,…}}  (scene checks: what is known by now, at last all of it)
- *   {"type":"end","status":"ok|input|no-space|…","message":"…","hint":"…"}
+ *   {"type":"scene","facts":{"triangle_count":…,"frame_count":…,…}}  (scene checks: what is known by now, at last all
+ *   of it) {"type":"end","status":"ok|input|no-space|…","message":"…","hint":"…"}
  *
  * A line is at most PROGRESS_LINE_MAX bytes. Signals go the other way: SIGTERM checkpoint and
  * stop (exit PROGRESS_EXIT_STOPPED); SIGUSR1 write a preview now; SIGKILL cancel. An output or preview

@@ -1,5 +1,5 @@
-/* requests.h -- what the daemon asks of a worker while it works: SIGTERM, stop; SIGUSR1, pictures of what there is. A daemon
- * that is gone asks to stop, too.
+/* requests.h -- what the daemon asks of a worker while it works: SIGTERM, stop; SIGUSR1, pictures of what there is. A
+ * daemon that is gone asks to stop, too.
  *
  * The signals are blocked and asked for: no handlers, no globals. */
 #ifndef UNBAKE_WORKER_REQUESTS_H

@@ -1,7 +1,7 @@
 /* job_files.c -- see job_files.h.
  *
- * A file counts against its owner's share from its first byte: as an arrival, then as a part of its job's folder. It is in
- * its place, durably, before its row says so. */
+ * A file counts against its owner's share from its first byte: as an arrival, then as a part of its job's folder. It is
+ * in its place, durably, before its row says so. */
 #include "server/http/jobs/job_files.h"
 
 #include "common/file.h"

@@ -1,9 +1,10 @@
 /* job_submit.c -- POST /v1/jobs: a job of any kind, checked as a whole before anything of it is stored.
  *
  *      reconstruct   reads a scene
- *      render        reads the outputs of a reconstruction, its source, and files that its settings name, which are sent
- *                    afterwards (job_files.h)
- *      evaluate      reads the outputs of its source, and a scene that holds a truth: its source's unless another is named
+ *      render        reads the outputs of a reconstruction, its source, and files that its settings name, which are
+ *                    sent afterwards (job_files.h)
+ *      evaluate      reads the outputs of its source, and a scene that holds a truth: its source's unless another is
+ *                    named
  */
 #include <limits.h>
 #include <stdio.h>
@@ -36,8 +37,8 @@ struct job_submission {
     cJSON *params; /* faults; NULL once they have been sent */
 };
 
-/* Loads the scene that the request names: with an entry in params where no job may use it, or a reply where the database
- * failed. */
+/* Loads the scene that the request names: with an entry in params where no job may use it, or a reply where the
+ * database failed. */
 static struct response *find_scene(struct job_submission *s, const char *id) {
     size_t digits = strspn(id, "0123456789abcdef");
     char hint[SCENE_ID_SIZE + 64];

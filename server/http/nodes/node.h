@@ -1,5 +1,5 @@
-/* node.h -- who asks in the name of an attempt: the node that runs it (server/node), which shows the attempt's own token
- * and says which claimant it is. No user's token opens these routes, and an attempt's opens no others. */
+/* node.h -- who asks in the name of an attempt: the node that runs it (server/node), which shows the attempt's own
+ * token and says which claimant it is. No user's token opens these routes, and an attempt's opens no others. */
 #ifndef UNBAKE_HTTP_NODES_NODE_H
 #define UNBAKE_HTTP_NODES_NODE_H
 

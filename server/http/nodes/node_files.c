@@ -1,10 +1,10 @@
-/* node_files.c -- the files of an attempt that runs elsewhere: its node reads what its job reads, and the checkpoint, and writes
- * checkpoints and outputs.
+/* node_files.c -- the files of an attempt that runs elsewhere: its node reads what its job reads, and the checkpoint,
+ * and writes checkpoints and outputs.
  *
  * 1. What is read is opened component by component, without symbolic links, below the one folder that is meant.
  * 2. What is written has a name that an output or a part may have, and lies whole in its place before 204 is said.
- * 3. Of checkpoints there are at any time whole ones here: a part says from which number on they are needed, and what is
- *    older goes after it has come. */
+ * 3. Of checkpoints there are at any time whole ones here: a part says from which number on they are needed, and what
+ *    is older goes after it has come. */
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>

@@ -1,6 +1,6 @@
-/* node_inputs.h -- what a job that runs elsewhere reads: of a reconstruction the scene's files; of a render outputs/NAME,
- * the outputs of the job that it reads, and files/NAME, the files that were sent with it. Nodes keep them under an id: the
- * scene's or, of a render, the SHA-256 of the list, so that renders that read the same share it. */
+/* node_inputs.h -- what a job that runs elsewhere reads: of a reconstruction the scene's files; of a render
+ * outputs/NAME, the outputs of the job that it reads, and files/NAME, the files that were sent with it. Nodes keep them
+ * under an id: the scene's or, of a render, the SHA-256 of the list, so that renders that read the same share it. */
 #ifndef UNBAKE_HTTP_NODES_NODE_INPUTS_H
 #define UNBAKE_HTTP_NODES_NODE_INPUTS_H
 

@@ -21,8 +21,9 @@ bool mesh_file_is_known(const char *name);
 enum status mesh_file_read(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
                            struct faces_report *report, struct error *err);
 
-/* The same with what the file says of its surfaces: mesh->object_id are numbers of materials and mesh->uv are as the file has them, without transforms of pictures. A PLY
- * says nothing: no material, and no object_id. The look is the caller's (look_release), also after a failure. */
+/* The same with what the file says of its surfaces: mesh->object_id are numbers of materials and mesh->uv are as the
+ * file has them, without transforms of pictures. A PLY says nothing: no material, and no object_id. The look is the
+ * caller's (look_release), also after a failure. */
 enum status mesh_file_read_look(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
                                 struct mesh_look *look, struct faces_report *report, struct error *err);
 

@@ -17,9 +17,9 @@ bool photo_is_picture(const char *path);
 /* Replaces the frames' names by paths from the root. Folders are tried in this order: `base` and the folders that tools
  * use below it (images/, photos/, rgb/, ...), then the same below each folder above; the one with most of the
  * photographs is taken. In a folder a name matches exactly, else but for case, else but for the extension (and then a
- * picture before camera raw); where it may mean two files, both are named as a problem. Names that are not found get the
- * base before them. Warns where the folder is not the one that
- * the names say; with `tells_unposed` also of photographs beside them that no frame names. Returns how many were found. */
+ * picture before camera raw); where it may mean two files, both are named as a problem. Names that are not found get
+ * the base before them. Warns where the folder is not the one that the names say; with `tells_unposed` also of
+ * photographs beside them that no frame names. Returns how many were found. */
 size_t photo_folder_settle(const struct listing *l, const char *base, bool tells_unposed, struct frames *t,
                            struct findings *f);
 

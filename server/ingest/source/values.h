@@ -26,8 +26,8 @@ double json_value(const cJSON *item);
 double json_member(const cJSON *object, const char *key);
 /* The numbers of an array, nested or flat; false when there are not `count` of them. */
 bool json_numbers(const cJSON *array, size_t count, double *value);
-/* The element of the array whose member `key` is the same number or text as `id`; NULL: none. *hint, at first NULL, is the
- * one that was found before: files mostly keep one order. */
+/* The element of the array whose member `key` is the same number or text as `id`; NULL: none. *hint, at first NULL, is
+ * the one that was found before: files mostly keep one order. */
 const cJSON *json_find(const cJSON *array, const char *key, const cJSON *id, const cJSON **hint);
 /* A string member; NULL otherwise. */
 const char *json_text_member(const cJSON *object, const char *key);
