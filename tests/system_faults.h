@@ -1,6 +1,6 @@
-/* system_faults.h -- for one file of a test: calls of the system that the daemon makes, before libc's own. The n-th call
- * fails without being made, once or from then on; of all or of those of some names. What SQLite calls does not count, nor
- * does what is done by descriptors to anything but files and folders, or to the standard streams. */
+/* system_faults.h -- for one file of a test: calls of the system that the daemon makes, before libc's own. The n-th
+ * call fails without being made, once or from then on; of all or of those of some names. What SQLite calls does not
+ * count, nor does what is done by descriptors to anything but files and folders, or to the standard streams. */
 #ifndef UNBAKE_TESTS_SYSTEM_FAULTS_H
 #define UNBAKE_TESTS_SYSTEM_FAULTS_H
 

@@ -3,9 +3,10 @@
  *   confine UNIT SYSCALLS LOG WRITABLE PROGRAM ARGUMENT...
  *
  * Runs the program as the unit's [Service] section says (confine_unit.h): its environment, its view of the files (for
- * root alone: elsewhere it keeps that of the caller), its rights, and a seccomp filter that lets through the system calls
- * named in the file SYSCALLS. Of files only what is below the folder WRITABLE can be written. Appends what the program
- * says on its notify socket to LOG (in WRITABLE), with a watchdog of WATCHDOG_SEC; hands SIGTERM and SIGHUP on. */
+ * root alone: elsewhere it keeps that of the caller), its rights, and a seccomp filter that lets through the system
+ * calls named in the file SYSCALLS. Of files only what is below the folder WRITABLE can be written. Appends what the
+ * program says on its notify socket to LOG (in WRITABLE), with a watchdog of WATCHDOG_SEC; hands SIGTERM and SIGHUP
+ * on. */
 #include <poll.h>
 #include <libgen.h>
 #include <signal.h>

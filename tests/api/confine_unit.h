@@ -1,6 +1,6 @@
-/* confine_unit.h -- the [Service] section of a systemd unit, as far as it hides or refuses something, put into effect on
- * the calling process. A line that is neither known here nor known to hide nothing ends the program: whoever adds one to
- * the unit teaches it to this file. */
+/* confine_unit.h -- the [Service] section of a systemd unit, as far as it hides or refuses something, put into effect
+ * on the calling process. A line that is neither known here nor known to hide nothing ends the program: whoever adds
+ * one to the unit teaches it to this file. */
 #ifndef UNBAKE_TESTS_CONFINE_UNIT_H
 #define UNBAKE_TESTS_CONFINE_UNIT_H
 

@@ -1,5 +1,5 @@
-/* test_http_disk.c -- a disk that fails, or lies, while the daemon serves: what it says, what it holds on to, and that it
- * goes on once the disk is well. */
+/* test_http_disk.c -- a disk that fails, or lies, while the daemon serves: what it says, what it holds on to, and that
+ * it goes on once the disk is well. */
 #include "server/data/collector.h"
 #include "server/data/trash.h"
 #include "server/http/space.h"
@@ -115,8 +115,8 @@ static int send_all(const char *id, struct buf *reply) {
     return rig_status(reply);
 }
 
-/* What is received is committed now and then. Where that fails the client is told in the middle, and of what was received
- * only what is on disk counts. */
+/* What is received is committed now and then. Where that fails the client is told in the middle, and of what was
+ * received only what is on disk counts. */
 static void check_large(void) {
     struct buf reply;
     char id[33] = "", *length = mem_printf(TUS "Upload-Length: %zu\r\n", LARGE), path[64];

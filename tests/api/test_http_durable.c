@@ -1,6 +1,7 @@
-/* test_http_durable.c -- what is acknowledged is on disk: a file that has been written is synced before it gets the name by
- * which it is found, and before the database counts its bytes; the name is synced before the reply. Every write, sync and
- * rename below the data folder is seen, in whatever thread. And room is looked for and taken under one lock. */
+/* test_http_durable.c -- what is acknowledged is on disk: a file that has been written is synced before it gets the
+ * name by which it is found, and before the database counts its bytes; the name is synced before the reply. Every
+ * write, sync and rename below the data folder is seen, in whatever thread. And room is looked for and taken under one
+ * lock. */
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <libgen.h>

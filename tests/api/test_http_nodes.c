@@ -1,5 +1,5 @@
-/* The side of the daemon that nodes talk to: one claim, the attempt's own token and no other, reports that may be repeated
- * and have no gaps, files that are whole or not there, and nothing after the end. */
+/* The side of the daemon that nodes talk to: one claim, the attempt's own token and no other, reports that may be
+ * repeated and have no gaps, files that are whole or not there, and nothing after the end. */
 #include <sys/stat.h>
 
 #include "common/sha256.h"

@@ -1,5 +1,5 @@
-/* test_http_quota.c -- what one user may take of what all share, each with its own status, the option's name and who can
- * raise it; admins are not bound. Uploads that never begin give their space back soon. */
+/* test_http_quota.c -- what one user may take of what all share, each with its own status, the option's name and who
+ * can raise it; admins are not bound. Uploads that never begin give their space back soon. */
 #include <sys/stat.h>
 
 #include "common/clock.h"
@@ -102,8 +102,8 @@ static void await_no_arrivals(void) {
         usleep(1000);
 }
 
-/* What comes in one request counts from its admission, too: of a burst as many are admitted as may be under way, and what
- * they are to hold is pledged, kept and to be checked. */
+/* What comes in one request counts from its admission, too: of a burst as many are admitted as may be under way, and
+ * what they are to hold is pledged, kept and to be checked. */
 static void test_arrivals(void) {
     enum { MOST = 3, BURST = 12 };
     int fds[BURST], admitted = 0, refused = 0;

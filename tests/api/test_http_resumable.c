@@ -130,8 +130,8 @@ static void test_two(struct rig *rig, enum rival rival) {
     upload_row_release(&row);
 }
 
-/* A part that is to be checked has come, but for the end of its request, and another request takes the upload over: what the
- * first has brought does not count. */
+/* A part that is to be checked has come, but for the end of its request, and another request takes the upload over:
+ * what the first has brought does not count. */
 static void test_overtaken(struct rig *rig) {
     struct resumables *p = rig->api->resumables;
     struct upload_row row = {.name = mem_strdup("room"), .metadata = mem_strdup(""), .length = BYTES};

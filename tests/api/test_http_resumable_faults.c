@@ -1,6 +1,6 @@
-/* test_http_resumable_faults.c -- uploads in parts where a fault follows another: the clean-up after a failing disk fails,
- * too, or what is being written is removed. What was counted stays, what was not is sent again, and in the end the scene
- * is what was sent. */
+/* test_http_resumable_faults.c -- uploads in parts where a fault follows another: the clean-up after a failing disk
+ * fails, too, or what is being written is removed. What was counted stays, what was not is sent again, and in the end
+ * the scene is what was sent. */
 #include "common/sha256.h"
 #include "server/uploads/upload_session.h"
 #include "server/uploads/upload_writer.h"
@@ -191,7 +191,8 @@ static void check_removed(void) {
     CHECK(rig.api->resumables->first == NULL);
 }
 
-/* Bytes that are to be checked are announced, and the database cannot take note. The request that has the upload keeps it. */
+/* Bytes that are to be checked are announced, and the database cannot take note. The request that has the upload keeps
+ * it. */
 static void check_disbelief(void) {
     struct upload_writer *writer, *other;
     create("");

@@ -1,6 +1,6 @@
-/* test_http_threads.c -- who waits for the disk. Every call that may wait for one, and every mutex, is seen with the name
- * of the thread: libmicrohttpd's own, "MHD-...", make none of the calls, and never meet a mutex whose holder is in one.
- * And while the disk hangs, /healthz is answered, and /readyz says so in time. */
+/* test_http_threads.c -- who waits for the disk. Every call that may wait for one, and every mutex, is seen with the
+ * name of the thread: libmicrohttpd's own, "MHD-...", make none of the calls, and never meet a mutex whose holder is in
+ * one. And while the disk hangs, /healthz is answered, and /readyz says so in time. */
 #include <pthread.h>
 
 #include "server/data/collector.h"

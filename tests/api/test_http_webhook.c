@@ -1,4 +1,5 @@
-/* test_http_webhook.c -- who sees a job's webhook, which secrets it may have, and that its messages can be sent again. */
+/* test_http_webhook.c -- who sees a job's webhook, which secrets it may have, and that its messages can be sent
+ * again. */
 #include "tests/api/rig.h"
 
 static struct rig rig;

@@ -1,6 +1,6 @@
-/* bench_executors.c -- what 2,000 jobs on 64 nodes cost the daemon: the real executor and store with a fake cluster in virtual
- * time (tests/chaos/executor_model.h), nothing going wrong. A node reports every 6 s on average, two lines each time.
- * Prints processor time in all and by report, the number of status commands, and memory. HTTP is not in it. */
+/* bench_executors.c -- what 2,000 jobs on 64 nodes cost the daemon: the real executor and store with a fake cluster in
+ * virtual time (tests/chaos/executor_model.h), nothing going wrong. A node reports every 6 s on average, two lines each
+ * time. Prints processor time in all and by report, the number of status commands, and memory. HTTP is not in it. */
 #define JOBS_MAX 2000
 #define CLUSTER_MAX 2100
 #include <sys/resource.h>

@@ -1,8 +1,9 @@
-/* bench_nodes.c -- the real daemon, 2,000 jobs, 64 nodes that report at once: how long its API takes to answer meanwhile, and
- * what the daemon takes of processor and memory. The nodes are threads here with the link of `unbaked node` (server/node/link.h)
- * and a worker that computes nothing: a claim, for JOB_SEC a report every REPORT_SEC with two lines, one part of a checkpoint,
- * one output, the end. So they come and go some hundred times as often as those of rooms. Their scheduler's commands are cp and
- * cat. One client meanwhile adds the jobs and asks for lists and single ones, some twenty times a second.
+/* bench_nodes.c -- the real daemon, 2,000 jobs, 64 nodes that report at once: how long its API takes to answer
+ * meanwhile, and what the daemon takes of processor and memory. The nodes are threads here with the link of `unbaked
+ * node` (server/node/link.h) and a worker that computes nothing: a claim, for JOB_SEC a report every REPORT_SEC with
+ * two lines, one part of a checkpoint, one output, the end. So they come and go some hundred times as often as those of
+ * rooms. Their scheduler's commands are cp and cat. One client meanwhile adds the jobs and asks for lists and single
+ * ones, some twenty times a second.
  *
  * bench_nodes [JOBS [NODES]]. $UNBAKE_BUILD/unbaked is the daemon. */
 #include <dirent.h>

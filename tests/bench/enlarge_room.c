@@ -1,5 +1,6 @@
-/* enlarge_room ROOM OUT FACTOR COPIES -- a room of `unbaked demo-room --sdr` with pictures FACTOR times as wide and high, each
- * under COPIES names: as large a capture as one likes, within minutes and little of the disk. For many_photographs.sh. */
+/* enlarge_room ROOM OUT FACTOR COPIES -- a room of `unbaked demo-room --sdr` with pictures FACTOR times as wide and
+ * high, each under COPIES names: as large a capture as one likes, within minutes and little of the disk. For
+ * many_photographs.sh. */
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>

@@ -1,8 +1,8 @@
 /* scan_ceiling ROOM KNOWN CAPTURE OUT -- the base colours that no method exceeds which trusts a scan's mesh and poses.
  *
  * CAPTURE is a bundle with the mesh of a scan of ROOM. Its training photographs are replaced by pictures of ROOM's true
- * base colours, rendered from where the photographs were really taken; these are fused onto CAPTURE's mesh with the poses
- * that CAPTURE tells. scan_scores compares the result, which is written to OUT as a job's outputs would be:
+ * base colours, rendered from where the photographs were really taken; these are fused onto CAPTURE's mesh with the
+ * poses that CAPTURE tells. scan_scores compares the result, which is written to OUT as a job's outputs would be:
  *
  *   scan_scores ROOM OUT "" OUT/truth
  *

@@ -1,8 +1,8 @@
 /* executor_model.h -- a cluster that misbehaves, in virtual time, and the model that says what must hold all the same.
  *
  * The real executor (server/executor) and the real store work for a scheduler whose commands time out, lie, repeat ids,
- * lose replies and answer late; whose nodes die, are cut off, are started twice; under a daemon that dies at any moment.
- * A script is one seed. What is held:
+ * lose replies and answer late; whose nodes die, are cut off, are started twice; under a daemon that dies at any
+ * moment. A script is one seed. What is held:
  *
  * 1. An attempt is claimed once, and of one job no two attempts write at the same time; none after its end.
  * 2. A job succeeds only by an attempt whose node said so, once; nothing is accepted after.
@@ -391,8 +391,8 @@ static inline void start_one(struct model_job *job) {
     mem_free(folder);
 }
 
-/* The HTTP side works while the scheduler's thread decides: a node that has just been asked to stop, or was given up, may
- * have reported its end before that. */
+/* The HTTP side works while the scheduler's thread decides: a node that has just been asked to stop, or was given up,
+ * may have reported its end before that. */
 static inline void node_hurries(const struct model_job *job) {
     for (size_t i = 0; i < model.cluster_count; i++) {
         struct cluster_job *c = &model.cluster[i];

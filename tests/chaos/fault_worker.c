@@ -6,8 +6,8 @@
  * of a scene, which never finds fault with the scene for it.
  *
  * From n = FROM (1) on. Of operations every STEP-th fails, of a check's more; ALL: 1 for all of these ways at each, 0
- * for one in turn. Of allocations, which are many and alike, the first that the same calls led to, for every STEP-th such
- * stack of calls; ALL: in both ways, and once more, in turn, the last and the one in the middle. */
+ * for one in turn. Of allocations, which are many and alike, the first that the same calls led to, for every STEP-th
+ * such stack of calls; ALL: in both ways, and once more, in turn, the last and the one in the middle. */
 #include <dirent.h>
 
 #include "tests/chaos/faults.h"
@@ -18,8 +18,8 @@
     "\"cameras_per_texel\":1,\"samples_per_camera\":2,\"report_samples\":1,"                                           \
     "\"gather_samples\":16,\"gloss_passes\":1,\"preview_interval_sec\":60"
 
-/* Few texels, for a disk: what is done to them does nothing to files. Given a density the atlas is made once, not twice,
- * whose memory is to fail as well. */
+/* Few texels, for a disk: what is done to them does nothing to files. Given a density the atlas is made once, not
+ * twice, whose memory is to fail as well. */
 #define FEW_TEXELS ",\"texels_per_metre\":2"
 
 /* What is to fail, and how. */

@@ -1,7 +1,7 @@
-/* hold PAGE new ROOT | count | at N | is | await | go -- for shell tests: workers under preload/files.so are held up, so that
- * what a test does to them does not depend on how fast they are. new: makes the page of faults.h for what happens below
- * ROOT, and counts; count: prints how many operations on files workers did; at: the N-th from now on holds each worker up;
- * is: whether one is; await: waits until one is; go: they go on. */
+/* hold PAGE new ROOT | count | at N | is | await | go -- for shell tests: workers under preload/files.so are held up,
+ * so that what a test does to them does not depend on how fast they are. new: makes the page of faults.h for what
+ * happens below ROOT, and counts; count: prints how many operations on files workers did; at: the N-th from now on
+ * holds each worker up; is: whether one is; await: waits until one is; go: they go on. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <unistd.h>

@@ -1,7 +1,7 @@
-/* node_kill BUILD ROOM LIVES SEED -- attempts by the real `unbaked node`, which talks to the HTTP side in this process: it is
- * killed at random, taken back, asked to stop, cut off, and started twice; its cache is damaged. Every job that comes of it has
- * the textures, byte for byte, of one that ran at home. This process plays the scheduler: it begins attempts, reads their
- * lines, ends them. */
+/* node_kill BUILD ROOM LIVES SEED -- attempts by the real `unbaked node`, which talks to the HTTP side in this process:
+ * it is killed at random, taken back, asked to stop, cut off, and started twice; its cache is damaged. Every job that
+ * comes of it has the textures, byte for byte, of one that ran at home. This process plays the scheduler: it begins
+ * attempts, reads their lines, ends them. */
 #include <dlfcn.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
@@ -231,8 +231,8 @@ static void test_undisturbed(void) {
     check_equal(&a);
 }
 
-/* The site has taken the attempt's machine: its worker has stopped by itself, not been killed after the time that it has for
- * a checkpoint, and the attempt is over for whoever is started for it again. */
+/* The site has taken the attempt's machine: its worker has stopped by itself, not been killed after the time that it
+ * has for a checkpoint, and the attempt is over for whoever is started for it again. */
 static void check_taken_back(const struct remote_attempt *a, int code) {
     struct remote_attempt again = *a;
     CHECK_THAT(code == 85 && strcmp(a->row.end.way, "preempted") == 0, "the node ended with %d, %s", code,
@@ -328,8 +328,9 @@ static void test_wishes(void) {
     }
 }
 
-/* The daemon's disk is full for a moment: the attempt goes on. It stays full, and the daemon asks to stop, as a scheduler
- * does that stops those at home: it ends as stopped. Where nobody asks, the job is blocked, and says where. */
+/* The daemon's disk is full for a moment: the attempt goes on. It stays full, and the daemon asks to stop, as a
+ * scheduler does that stops those at home: it ends as stopped. Where nobody asks, the job is blocked, and says
+ * where. */
 static void test_full_disk(bool all) {
     struct remote_attempt a = {.lease_sec = LEASE_SEC};
     begin(&a, rig_job(&rig), 2, ITERATIONS);
@@ -366,8 +367,8 @@ static void test_full_disk(bool all) {
     atomic_store(&disk_is_full, false);
 }
 
-/* Answers are lost on the way: every request may have been carried out, and nothing is done twice or missed. Some connections
- * are turned away, since there are too many. */
+/* Answers are lost on the way: every request may have been carried out, and nothing is done twice or missed. Some
+ * connections are turned away, since there are too many. */
 static void test_lost_answers(unsigned seed) {
     struct remote_attempt a = {.lease_sec = 60};
     struct proxy proxy;

@@ -1,6 +1,6 @@
-/* proxy.h -- for long tests: a way to a server that loses what goes over it. One in `one_in` connections is cut, at a random
- * place of what the server answers: that is carried out, and whoever asked does not know. One in `one_in_turned` gets 429, as
- * where an address has too many. */
+/* proxy.h -- for long tests: a way to a server that loses what goes over it. One in `one_in` connections is cut, at a
+ * random place of what the server answers: that is carried out, and whoever asked does not know. One in `one_in_turned`
+ * gets 429, as where an address has too many. */
 #ifndef UNBAKE_TESTS_CHAOS_PROXY_H
 #define UNBAKE_TESTS_CHAOS_PROXY_H
 

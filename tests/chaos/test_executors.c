@@ -1,5 +1,5 @@
-/* test_executors.c -- attempts on a cluster that misbehaves: random scripts against the model of executor_model.h; 300, in the
- * long form 100,000. UNBAKE_SCRIPTS sets how many, UNBAKE_SEED the first. */
+/* test_executors.c -- attempts on a cluster that misbehaves: random scripts against the model of executor_model.h; 300,
+ * in the long form 100,000. UNBAKE_SCRIPTS sets how many, UNBAKE_SEED the first. */
 #include "common/clock.h"
 #include "tests/chaos/executor_model.h"
 #include "tests/figures.h"

@@ -297,8 +297,8 @@ int main(void) {
     printf("%d uploads of %llu MB at once, %u connections dropped, %.1f s, %.0f MB/s\n", count,
            (unsigned long long)(bytes / 1000000), drops, took, (double)whole / took / 1e6);
     CHECK_THAT(drops > 0, "no connection was dropped");
-    /* A client that asks while the end of its dropped body is still being written goes on too early and is refused, once
-     * it has sent what the proxy reads at once. All drops together must not lose more. */
+    /* A client that asks while the end of its dropped body is still being written goes on too early and is refused,
+     * once it has sent what the proxy reads at once. All drops together must not lose more. */
     CHECK_THAT(sent >= whole && sent - whole <= READ_BYTES, "%llu bytes were sent, of %llu", (unsigned long long)sent,
                (unsigned long long)whole);
     figure("uploads over dropped connections that differ from what was sent", wrong, 0, "lower");

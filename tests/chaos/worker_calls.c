@@ -1,6 +1,6 @@
-/* worker_calls BUILD ROOM ARCHIVE STEP -- every STEP-th call of the system that the check of a scene, or an attempt of a job,
- * makes fails once by EIO, those that read as those that write: it does without, or says by its exit status and its last line
- * that the machine was at fault, never the scene or the job. The next attempt succeeds. */
+/* worker_calls BUILD ROOM ARCHIVE STEP -- every STEP-th call of the system that the check of a scene, or an attempt of
+ * a job, makes fails once by EIO, those that read as those that write: it does without, or says by its exit status and
+ * its last line that the machine was at fault, never the scene or the job. The next attempt succeeds. */
 #include "tests/chaos/faults.h"
 #include "tests/chaos/worker.h"
 

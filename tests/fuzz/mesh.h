@@ -30,8 +30,8 @@ static inline void must_be_mesh(enum status status, struct mesh *mesh, struct er
     mesh_release(mesh);
 }
 
-/* Of a reader that reads materials, too: each triangle has one, each vertex a place in its pictures, which can be looked
- * up. Releases both. */
+/* Of a reader that reads materials, too: each triangle has one, each vertex a place in its pictures, which can be
+ * looked up. Releases both. */
 static inline void must_be_look(enum status status, struct mesh *mesh, struct mesh_look *look, struct error *err) {
     for (size_t i = 0; status == STATUS_OK && i < mesh->triangle_count; i++) {
         MUST(mesh->object_id[i] >= 0 && (uint64_t)mesh->object_id[i] < look->material_count);

@@ -1,4 +1,5 @@
-/* test_icc.c -- ICC profiles, as a picture brings them: whatever they are, a warning or a conversion, and never a crash. */
+/* test_icc.c -- ICC profiles, as a picture brings them: whatever they are, a warning or a conversion, and never a
+ * crash. */
 #include <lcms2.h>
 
 #include "common/color_icc.h"

@@ -1,5 +1,5 @@
-/* test_servers.c -- the client's configuration of servers: whatever it holds, what is read has names that are found, and
- * URLs. */
+/* test_servers.c -- the client's configuration of servers: whatever it holds, what is read has names that are found,
+ * and URLs. */
 #include "client/servers.h"
 
 #include <sys/stat.h>

@@ -48,7 +48,8 @@ static inline void add_quad(struct mesh *m, int64_t object, vec3 corner, vec3 u,
     m->face_count = m->triangle_count;
 }
 
-/* Floor, ceiling and the two walls across x of a room of 4 x 3 x 3 m, normals inward, y up; memory for so many quads. */
+/* Floor, ceiling and the two walls across x of a room of 4 x 3 x 3 m, normals inward, y up; memory for so many
+ * quads. */
 static inline void start_room(struct mesh *m, size_t quads) {
     *m = (struct mesh){0};
     m->position = mem_array(4 * quads, sizeof *m->position);

@@ -1,5 +1,5 @@
-/* calibrate_poses.h: cameras are moved by some pixels and found again, held-out ones, too; a capture whose poses are right
- * is left alone. */
+/* calibrate_poses.h: cameras are moved by some pixels and found again, held-out ones, too; a capture whose poses are
+ * right is left alone. */
 #include "server/capture/poses/calibrate_poses.h"
 
 #include "server/scene/rgb_half.h"

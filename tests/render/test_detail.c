@@ -1,6 +1,6 @@
 /* detail.h: of paint about as fine as the photographs' pixels less is lost than by the mean of what they show, on any
- * number of threads; noise is not taken for it; none comes out darker than black; what one half of the photographs alone
- * tells stays; and pixels of little worth are counted as exactly as others. */
+ * number of threads; noise is not taken for it; none comes out darker than black; what one half of the photographs
+ * alone tells stays; and pixels of little worth are counted as exactly as others. */
 #include "server/capture/halves.h"
 #include "server/material/detail.h"
 #include "server/material/divide.h"

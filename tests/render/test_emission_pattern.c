@@ -92,7 +92,8 @@ static void test_linear(struct parallel *pool) {
     mesh_release(&mesh);
 }
 
-/* Radiance that a place of the floor sends to `wo` by the lamp's light alone: a sum over a grid of the lamp's places. */
+/* Radiance that a place of the floor sends to `wo` by the lamp's light alone: a sum over a grid of the lamp's
+ * places. */
 static rgb direct_light(const struct model *m, vec3 floor, vec3 wo) {
     enum { SIDE = 200 };
     rgb sum = {0.0f, 0.0f, 0.0f}, base = rgb_gray(0.5f);
@@ -252,7 +253,8 @@ static void hide_half(struct photograph *photo) {
     }
 }
 
-/* By exposures of which some saturate far below the lamp, and only these see one half of it: that is not darker for it. */
+/* By exposures of which some saturate far below the lamp, and only these see one half of it: that is not darker for
+ * it. */
 static void test_exposures(struct parallel *pool) {
     struct scene scene = {0};
     struct reconstruction r;

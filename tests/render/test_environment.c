@@ -1,5 +1,5 @@
-/* environment.h, fill.h, visibility.h, relight/environment.h: the sky behind a window is found in the photographs, whatever their
- * exposures and faults; samples go where its light finds a way in. */
+/* environment.h, fill.h, visibility.h, relight/environment.h: the sky behind a window is found in the photographs,
+ * whatever their exposures and faults; samples go where its light finds a way in. */
 #include "common/rng.h"
 #include "common/sha256.h"
 #include "server/capture/environment_gather.h"

@@ -218,8 +218,8 @@ static void test_field(struct fixture *f) {
     mem_free(scratch);
 }
 
-/* A sheet that hangs over the floor with its front upwards: what its back sends down is about what the path tracer says,
- * to whom it is not quite Lambertian. */
+/* A sheet that hangs over the floor with its front upwards: what its back sends down is about what the path tracer
+ * says, to whom it is not quite Lambertian. */
 static void test_back(void) {
     struct fixture g = {0};
     make_mesh(&g.mesh);
@@ -272,8 +272,8 @@ static rgb gather_diffuse(const struct fixture *f, const struct light_field *fie
     return irradiance_diffuse(&light, f->at.shading, 0.5f, viewer(0.7f));
 }
 
-/* Two black, polished walls mirror what all others send out, and each other: as lights, if lobes are as wide as they are
- * taken to be for those, and else as their texels are said to. */
+/* Two black, polished walls mirror what all others send out, and each other: as lights, if lobes are as wide as they
+ * are taken to be for those, and else as their texels are said to. */
 static void test_mirrors(struct fixture *f, float roughness, bool are_lights) {
     static const uint32_t mirror[MIRRORS] = {1, 3};
     struct incident_lobe lobe[OBJECTS] = {0};

@@ -1,5 +1,6 @@
-/* grey_card.h, unseen_light.h: in a room whose light comes from a sky that no photograph shows, the scale of base colours is
- * a guess. A pixel of known reflectance fixes it; where the sky is seen, it only says how well base colour came out. */
+/* grey_card.h, unseen_light.h: in a room whose light comes from a sky that no photograph shows, the scale of base
+ * colours is a guess. A pixel of known reflectance fixes it; where the sky is seen, it only says how well base colour
+ * came out. */
 #include "server/capture/grey_card.h"
 #include "tests/render/open_room.h"
 #include "tests/render/shell.h"

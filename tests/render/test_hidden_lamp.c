@@ -54,7 +54,8 @@ static void test_none_hidden(struct parallel *pool) {
     scene_release(&scene);
 }
 
-/* A strip of a twentieth of a metre, less than a pixel of most photographs: all that shows it shows the ceiling, too. */
+/* A strip of a twentieth of a metre, less than a pixel of most photographs: all that shows it shows the ceiling,
+ * too. */
 static void test_thin(struct parallel *pool) {
     struct scene scene = {0};
     make_mesh(&scene.mesh);

@@ -1,5 +1,5 @@
-/* test_holes.c -- a room of 4 x 3 x 3 m whose mesh lacks 2 x 1.5 m of a wall, photographed with what may be there: the wall,
- * painted or plain; sky, clouded or plain; a room beyond; nothing. Photographs are closed forms. */
+/* test_holes.c -- a room of 4 x 3 x 3 m whose mesh lacks 2 x 1.5 m of a wall, photographed with what may be there: the
+ * wall, painted or plain; sky, clouded or plain; a room beyond; nothing. Photographs are closed forms. */
 #include "server/holes/holes.h"
 
 #include "common/image.h"

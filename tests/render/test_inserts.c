@@ -1,5 +1,6 @@
-/* Meshes of files that are put into a room with their own materials (insert.h): an emissive one against a lamp, metals in a
- * furnace, pictures and several materials of GLB and OBJ by what the first hits see, and what is said of the rest. */
+/* Meshes of files that are put into a room with their own materials (insert.h): an emissive one against a lamp, metals
+ * in a furnace, pictures and several materials of GLB and OBJ by what the first hits see, and what is said of the
+ * rest. */
 #include "server/relight/bake.h"
 #include "common/buf.h"
 #include "tests/check.h"
@@ -14,7 +15,7 @@
 static struct parallel *pool;
 static struct error err;
 
-/* --- files ---------------------------------------------------------------------------------------------------------- */
+/* --- files -------------------------------------------------------------------------------------------------------- */
 
 static void put_file(const char *dir, const char *name, const void *data, size_t size) {
     char *path = file_join(dir, name);
@@ -34,8 +35,9 @@ static void put_picture(const char *dir, const char *name, const float code[4][3
     mem_free(path);
 }
 
-/* Two squares side by side, x from -1 to 0 and 0 to 1, y from -1 to 1, z = 0, which face +z; each has texture coordinates
- * from 0 to 1 to the right and downwards. `rest` is the rest of the JSON; the squares have materials 0 and 1. */
+/* Two squares side by side, x from -1 to 0 and 0 to 1, y from -1 to 1, z = 0, which face +z; each has texture
+ * coordinates from 0 to 1 to the right and downwards. `rest` is the rest of the JSON; the squares have materials 0 and
+ * 1. */
 static void put_gltf(const char *dir, const char *name, const char *rest) {
     static const float corner[8][5] = {{-1, -1, 0, 0, 1}, {0, -1, 0, 1, 1}, {0, 1, 0, 1, 0}, {-1, 1, 0, 0, 0},
                                        {0, -1, 0, 0, 1},  {1, -1, 0, 1, 1}, {1, 1, 0, 1, 0}, {0, 1, 0, 0, 0}};
@@ -62,7 +64,7 @@ static void put_gltf(const char *dir, const char *name, const char *rest) {
     mem_free(json);
 }
 
-/* --- pictures ------------------------------------------------------------------------------------------------------- */
+/* --- pictures ----------------------------------------------------------------------------------------------------- */
 
 static char said[1024];
 
@@ -114,7 +116,7 @@ static char *dark_room(void) {
     return relit_outputs(walls, 6, VIEW);
 }
 
-/* --- tests ---------------------------------------------------------------------------------------------------------- */
+/* --- tests -------------------------------------------------------------------------------------------------------- */
 
 static void test_gltf(void) {
     static const float color[4][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 1}};
@@ -256,7 +258,8 @@ static double lit_plane(const char *dir, const char *more) {
     return mean;
 }
 
-/* Over a plane at z = 0 hangs a square of 2 x 2 at z = 3 that shines down: as a lamp, and as a file of an even picture. */
+/* Over a plane at z = 0 hangs a square of 2 x 2 at z = 3 that shines down: as a lamp, and as a file of an even
+ * picture. */
 static void test_emission(void) {
     static const float white[4][3] = {{1, 1, 1}, {1, 1, 1}, {1, 1, 1}, {1, 1, 1}};
     const struct relit_quad plane = {{-5, -5, 0}, {10, 0, 0}, {0, 10, 0}, {0.5f, 0.5f, 0.5f}, {0, 0, 0}, 0.5f, 0.0f};
@@ -280,8 +283,8 @@ static void test_emission(void) {
     relit_remove(dir);
 }
 
-/* Walls of radiance 1 around a mirror of perfect and of coloured metal: it shows 1 and its colour. Rough metal of white loses
- * what is scattered more than once; a dielectric of albedo .5 at normal incidence is between. */
+/* Walls of radiance 1 around a mirror of perfect and of coloured metal: it shows 1 and its colour. Rough metal of white
+ * loses what is scattered more than once; a dielectric of albedo .5 at normal incidence is between. */
 static void test_furnace(void) {
     struct relit_quad walls[6];
     struct image image;

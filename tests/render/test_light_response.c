@@ -1,6 +1,6 @@
-/* segment_light.h, light_point.h: what sources send to points, against closed forms. A sphere over a floor; a sky through
- * a hole in the ceiling, all of it and by cell; nothing behind a wall; and the joint fit finds the sky's radiance from
- * these responses, which noise would make too small. */
+/* segment_light.h, light_point.h: what sources send to points, against closed forms. A sphere over a floor; a sky
+ * through a hole in the ceiling, all of it and by cell; nothing behind a wall; and the joint fit finds the sky's
+ * radiance from these responses, which noise would make too small. */
 #include "server/light/joint_fit.h"
 #include "server/light/segment_light.h"
 #include "server/render/bsdf.h"

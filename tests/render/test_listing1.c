@@ -90,7 +90,8 @@ static double run_looks(struct scene *scene, struct shell *shell, int wanted, in
     return iterations;
 }
 
-/* A run ends when windows (of one texel here) had the looks asked for; extended by looks or time it goes on from there. */
+/* A run ends when windows (of one texel here) had the looks asked for; extended by looks or time it goes on from
+ * there. */
 static void test_ends_early(struct scene *scene) {
     struct shell shell = {.polls_until_stop = -1};
     double looks, first = run_looks(scene, &shell, 3, 0, &looks);

@@ -240,8 +240,8 @@ static void test_panorama(void) {
     }
     for (int c = 0; c < 3; c++)
         CHECK_THAT(fabs(whole[c] / six[c] - 1.0) < 0.01, "channel %d: %g, not %g", c, whole[c], six[c]);
-    /* The middle of the picture is where the camera looks, its right half what is to the right of it, its first row above.
-     * Each of the six views has its own wall in the middle, none of them as bright as another. */
+    /* The middle of the picture is where the camera looks, its right half what is to the right of it, its first row
+     * above. Each of the six views has its own wall in the middle, none of them as bright as another. */
     static const uint32_t place[6][2] = {{30, 14}, {0, 14}, {14, 14}, {46, 14}, {30, 0}, {30, 28}};
     for (int v = 0; v < 6; v++) {
         double found = mean_blue(&image, place[v][0], place[v][1]);

@@ -1,6 +1,7 @@
 /* light_estimate.h: a lamp at which every photograph saturates is as bright as what it lights tells, and so are sky and
- * ground; where some photograph measured them, what they light is not asked. A bar before a white sky that some photographs
- * show as white is no lamp. Of lamps that are alike none is brighter than the others. The same for any number of threads. */
+ * ground; where some photograph measured them, what they light is not asked. A bar before a white sky that some
+ * photographs show as white is no lamp. Of lamps that are alike none is brighter than the others. The same for any
+ * number of threads. */
 #include "server/state/evidence.h"
 #include "server/state/reconstruction.h"
 #include "tests/check.h"
@@ -175,8 +176,8 @@ static void test_measured(struct scene *scene) {
     reconstruct_release(&r);
 }
 
-/* A third of the photographs is exposed for the room, in the others the sky outshines the bar: none shows that it is not
- * the bar which shines. */
+/* A third of the photographs is exposed for the room, in the others the sky outshines the bar: none shows that it is
+ * not the bar which shines. */
 static void test_bar(struct parallel *pool) {
     struct scene scene = {0};
     struct image sky;

@@ -1,6 +1,6 @@
-/* plan.h in a whole reconstruction. Without a time limit its bytes do not hang on the clock: neither on the one that its
- * surroundings keep nor on clock_sec, which here runs as fast as is wanted. With one that is far too short everything is
- * cut that can be, that is said, and what it finds is a whole room all the same. */
+/* plan.h in a whole reconstruction. Without a time limit its bytes do not hang on the clock: neither on the one that
+ * its surroundings keep nor on clock_sec, which here runs as fast as is wanted. With one that is far too short
+ * everything is cut that can be, that is said, and what it finds is a whole room all the same. */
 #include "common/clock.h"
 #include "common/sha256.h"
 #include "server/reconstruct/reconstruct.h"

@@ -175,8 +175,8 @@ static void test_beside_seen(const struct image *sky, struct parallel *pool) {
     image_release(&dusk);
 }
 
-/* Without a ceiling and a wall most light comes from where hardly a photograph looks. What the low strip of sky that they show
- * lets one guess of it looks credible; what surfaces say is asked for all the same. */
+/* Without a ceiling and a wall most light comes from where hardly a photograph looks. What the low strip of sky that
+ * they show lets one guess of it looks credible; what surfaces say is asked for all the same. */
 static void test_mostly_unseen(struct parallel *pool) {
     struct scene scene = {0}, parted;
     struct image even;

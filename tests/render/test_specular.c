@@ -1,5 +1,5 @@
-/* specular_fit.h: a small room with a polished floor, a satin wall, an eggshell one and matt ones, photographed by our own path
- * tracer, and what the solve stage tells of each; then with photographs that hardly tell. */
+/* specular_fit.h: a small room with a polished floor, a satin wall, an eggshell one and matt ones, photographed by our
+ * own path tracer, and what the solve stage tells of each; then with photographs that hardly tell. */
 #include "common/rng.h"
 #include "server/reconstruct/reconstruct.h"
 #include "tests/render/shell.h"

@@ -1,5 +1,5 @@
-/* fault_rig.h -- for tests that let calls of SQLite or of the system fail below server/job/, without the scheduler's loop: a
- * folder with a store, scenes and jobs; what the log says; what is left over of a process. */
+/* fault_rig.h -- for tests that let calls of SQLite or of the system fail below server/job/, without the scheduler's
+ * loop: a folder with a store, scenes and jobs; what the log says; what is left over of a process. */
 #ifndef UNBAKE_TESTS_FAULT_RIG_H
 #define UNBAKE_TESTS_FAULT_RIG_H
 

@@ -58,8 +58,8 @@ static inline void plane_rig_init(struct plane_rig *rig, size_t photographs, int
           STATUS_OK);
 }
 
-/* Adds a photograph from a place above that looks at another; its middle pixel covers `pixel_m` at that distance, and each
- * shows paint(user, its place on the plane). */
+/* Adds a photograph from a place above that looks at another; its middle pixel covers `pixel_m` at that distance, and
+ * each shows paint(user, its place on the plane). */
 static inline struct photograph *plane_rig_add(struct plane_rig *rig, vec3 from, vec3 to, float pixel_m,
                                                rgb paint(void *user, vec3 place), void *user) {
     CHECK(rig->scene.photograph_count < rig->capacity);
@@ -119,8 +119,8 @@ static inline rgb plane_paint_one(void *user, vec3 place) {
     return *(const rgb *)user;
 }
 
-/* Base colour at the middle texel, without highlights, as `probes` have the light; *divide stays for more, its `measured`
- * is to be freed. *typical is to outlive it. */
+/* Base colour at the middle texel, without highlights, as `probes` have the light; *divide stays for more, its
+ * `measured` is to be freed. *typical is to outlive it. */
 static inline const struct measured *plane_rig_divide(struct plane_rig *rig, const struct probes *probes,
                                                       float *typical, struct divide *divide) {
     static const uint32_t texel = PLANE_MIDDLE;

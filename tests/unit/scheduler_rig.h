@@ -1,6 +1,6 @@
 /* scheduler_rig.h -- for tests of the scheduler: the scheduler and a store in a thread of the test, with a worker that
- * plays roles: the test's program itself, started as `TEST worker DIR`. A job's role is in its settings, a scene's in its
- * archive; the test says what the roles do (play, play_check). */
+ * plays roles: the test's program itself, started as `TEST worker DIR`. A job's role is in its settings, a scene's in
+ * its archive; the test says what the roles do (play, play_check). */
 #ifndef UNBAKE_TESTS_SCHEDULER_RIG_H
 #define UNBAKE_TESTS_SCHEDULER_RIG_H
 

@@ -1,6 +1,6 @@
-/* source_view.h -- one view of the demo room, written as each tool has it, must be read as the pose that transforms.json of the
- * room has. The texts of the tests were computed from that pose by the formulas that the tools document (named in the
- * readers), apart from this program. */
+/* source_view.h -- one view of the demo room, written as each tool has it, must be read as the pose that
+ * transforms.json of the room has. The texts of the tests were computed from that pose by the formulas that the tools
+ * document (named in the readers), apart from this program. */
 #ifndef UNBAKE_TESTS_UNIT_SOURCE_VIEW_H
 #define UNBAKE_TESTS_UNIT_SOURCE_VIEW_H
 

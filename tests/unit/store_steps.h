@@ -1,5 +1,6 @@
-/* store_steps.h -- everything that the store can be asked, as steps in an order in which each of them has something to do:
- * the life of some scenes, uploads, jobs, tokens and messages. For tests that let a call fail in the middle of each. */
+/* store_steps.h -- everything that the store can be asked, as steps in an order in which each of them has something to
+ * do: the life of some scenes, uploads, jobs, tokens and messages. For tests that let a call fail in the middle of
+ * each. */
 #ifndef UNBAKE_TESTS_UNIT_STORE_STEPS_H
 #define UNBAKE_TESTS_UNIT_STORE_STEPS_H
 

@@ -1,7 +1,7 @@
-/* test_attempt_faults.c -- an attempt of a job and the check of a scene, from their start to the entry of their outcome,
- * while a call of SQLite or of the system fails, or all from one on. What is not done is done the next time: no job
- * loses an attempt, no output is lost, no process and no descriptor is left. As worker stands in this program itself:
- * `test_attempt_faults worker DIR`. */
+/* test_attempt_faults.c -- an attempt of a job and the check of a scene, from their start to the entry of their
+ * outcome, while a call of SQLite or of the system fails, or all from one on. What is not done is done the next time:
+ * no job loses an attempt, no output is lost, no process and no descriptor is left. As worker stands in this program
+ * itself: `test_attempt_faults worker DIR`. */
 #include "server/job/attempt.h"
 
 #include "server/job/worker_messages.h"

@@ -1,5 +1,5 @@
-/* best.h: of any number of items the best are kept by weight, as sorting all of them would choose, in whatever order they
- * come; equal weights go by index; what weighs nothing, or is no number, is not taken. */
+/* best.h: of any number of items the best are kept by weight, as sorting all of them would choose, in whatever order
+ * they come; equal weights go by index; what weighs nothing, or is no number, is not taken. */
 #include "server/capture/best.h"
 #include "common/mem.h"
 #include "common/rng.h"

@@ -1,6 +1,6 @@
-/* test_bundle_faults.c -- bundles of each kind where a call of the system fails, once or from then on: what is left is the
- * whole scene, or the disk is blamed for what it did, never the bundle. And folders where files must be, which are the
- * bundle's own fault. */
+/* test_bundle_faults.c -- bundles of each kind where a call of the system fails, once or from then on: what is left is
+ * the whole scene, or the disk is blamed for what it did, never the bundle. And folders where files must be, which are
+ * the bundle's own fault. */
 #include "server/ingest/bundle.h"
 
 #include "common/file.h"

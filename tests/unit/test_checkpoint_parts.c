@@ -1,5 +1,5 @@
-/* test_checkpoint_parts.c -- checkpoints that travel as parts: those that another machine keeps are a whole checkpoint at any
- * time, only what has changed is sent, what is damaged is found. */
+/* test_checkpoint_parts.c -- checkpoints that travel as parts: those that another machine keeps are a whole checkpoint
+ * at any time, only what has changed is sent, what is damaged is found. */
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>

@@ -1,5 +1,5 @@
-/* test_color.c -- pictures that say what their colours are: profiles and numbers against values in closed form, which of
- * several counts, what cannot be used, and what our own files say. */
+/* test_color.c -- pictures that say what their colours are: profiles and numbers against values in closed form, which
+ * of several counts, what cannot be used, and what our own files say. */
 #include <openexr.h>
 
 #include "common/color.h"

@@ -1,6 +1,6 @@
 /* color_prior.h: a chart that photographs show well expects its own colour, one that they do not show that
- * of the surfaces around it, and one that they show in mixed pixels only hardly more than that; where a part is clean, that
- * part tells. */
+ * of the surfaces around it, and one that they show in mixed pixels only hardly more than that; where a part is clean,
+ * that part tells. */
 #include <math.h>
 
 #include "common/image.h"
@@ -86,8 +86,8 @@ int main(void) {
     mem_free(again);
     parallel_free(three);
 
-    /* Its own mean counts with the square of the share of its texels that is known: of one black texel among 1024, beside a
-     * white wall, with .325^2 / (1 + .325^2) and not .325 / 1.325. (It is none that the grids take in.) */
+    /* Its own mean counts with the square of the share of its texels that is known: of one black texel among 1024,
+     * beside a white wall, with .325^2 / (1 + .325^2) and not .325 / 1.325. (It is none that the grids take in.) */
     mem_free(prior);
     measured[HIDDEN * SIDE * SIDE + 1] = (struct measured){.weight = 1.0f};
     CHECK((HIDDEN * SIDE * SIDE + 1) % 3 != 0);

@@ -1,5 +1,5 @@
-/* test_deliver_faults.c -- a webhook's message to a receiver that is not found, not reached, says nothing or nonsense: it
- * counts as not delivered, and the reason is told. */
+/* test_deliver_faults.c -- a webhook's message to a receiver that is not found, not reached, says nothing or nonsense:
+ * it counts as not delivered, and the reason is told. */
 #include "server/worker/deliver.h"
 
 #include <arpa/inet.h>

@@ -1,6 +1,6 @@
-/* test_delivery.c -- the call of a webhook, from the outbox to the entry of what became of it, while a call of SQLite or
- * of the system fails, or all from one on: a message is sent until it is taken, no more often than that takes, and nothing
- * of the call is left over. As worker stands in this program itself: `test_delivery worker DIR`. */
+/* test_delivery.c -- the call of a webhook, from the outbox to the entry of what became of it, while a call of SQLite
+ * or of the system fails, or all from one on: a message is sent until it is taken, no more often than that takes, and
+ * nothing of the call is left over. As worker stands in this program itself: `test_delivery worker DIR`. */
 #include "server/job/delivery.h"
 
 #include <signal.h>

@@ -1,5 +1,5 @@
-/* test_delivery_turns.c -- one user's receivers that hang do not hold up another user's webhook: six jobs of one, one of
- * another. The worker that delivers is this program. */
+/* test_delivery_turns.c -- one user's receivers that hang do not hold up another user's webhook: six jobs of one, one
+ * of another. The worker that delivers is this program. */
 #include "tests/unit/scheduler_rig.h"
 
 enum { ANNA = 1, BERT };

@@ -1,5 +1,5 @@
-/* divide.h: base colour in closed form. A plane under light from one direction, photographed from many: what each shows is
- * base colour times the reflection model, and that base colour comes back, whatever exposure, gain and vignette a
+/* divide.h: base colour in closed form. A plane under light from one direction, photographed from many: what each shows
+ * is base colour times the reflection model, and that base colour comes back, whatever exposure, gain and vignette a
  * photograph has; saturated and masked pixels do not tell, unless
  * most saturate: then no less is told than their lower bound; the error that the probes share is in the texel's noise;
  * what is sent out, and what white paint would show, follow. */

@@ -100,7 +100,8 @@ static void check_file(const struct image *image, enum image_exr_type type, bool
     image_release(&back);
 }
 
-/* The file as libraries up to 3.4.6 write it: its last bytes are the chunk, which lies raw. The reader must find out. */
+/* The file as libraries up to 3.4.6 write it: its last bytes are the chunk, which lies raw. The reader must find
+ * out. */
 static void check_old_file(const struct image *image, enum image_exr_type type, const uint8_t *deflated) {
     struct buf file;
     struct image back;

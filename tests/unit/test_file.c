@@ -1,5 +1,5 @@
-/* test_file.c -- each call of the system that file.c makes fails once, and closing: what was there is still there, nothing
- * is left beside it, and the same works when it is asked again. */
+/* test_file.c -- each call of the system that file.c makes fails once, and closing: what was there is still there,
+ * nothing is left beside it, and the same works when it is asked again. */
 #include "common/file.h"
 
 #include "common/mem.h"

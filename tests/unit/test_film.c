@@ -1,5 +1,6 @@
 /* film.h, light.h: what is no number goes nowhere. Non-finite samples count as black, are counted, and spoil no other
- * pixel; pixels of the environment that are not finite, or negative, are black to what looks at it and to what samples it. */
+ * pixel; pixels of the environment that are not finite, or negative, are black to what looks at it and to what samples
+ * it. */
 #include "server/render/film.h"
 #include "server/scene/latlong.h"
 #include "tests/unit/plane_rig.h"

@@ -3,7 +3,8 @@
 #include "common/utf8.h"
 #include "tests/unit/formats_rig.h"
 
-/* Labels have the characters of a name that are safe in all formats, and bounded length. Changes name[1] for a while. */
+/* Labels have the characters of a name that are safe in all formats, and bounded length. Changes name[1] for a
+ * while. */
 static void check_labels(const struct segments *named, struct segments *automatic, const struct mesh *room,
                          char *name[3]) {
     char label[PARTS_LABEL_BYTES];

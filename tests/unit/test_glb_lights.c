@@ -7,7 +7,8 @@
 #define STRIP 40 /* squares of 10 cm */
 #define SQUARES (1 + 6 + STRIP + 1)
 
-/* A panel of 2 m2 that faces down, a cube of side .2 m, a strip 4 m long that faces +x, and a wall that emits nothing. */
+/* A panel of 2 m2 that faces down, a cube of side .2 m, a strip 4 m long that faces +x, and a wall that emits
+ * nothing. */
 static void make_room(struct mesh *mesh, struct segments *segments) {
     *mesh = (struct mesh){.position = mem_array(4 * SQUARES, sizeof *mesh->position),
                           .index = mem_array(2 * SQUARES, sizeof *mesh->index)};

@@ -1,5 +1,5 @@
-/* halves.h and robust.h: draws are as far from 0 as means are from the truth, whatever all samples share; and an outlier
- * is told from noise. */
+/* halves.h and robust.h: draws are as far from 0 as means are from the truth, whatever all samples share; and an
+ * outlier is told from noise. */
 #include "server/capture/halves.h"
 
 #include "tests/check.h"

@@ -1,5 +1,5 @@
-/* test_housekeeping.c -- what is of no use any more goes, and nothing else does; while a call of SQLite or of the system
- * fails, or all from one on, it stays, the log says why, and it goes the next time. */
+/* test_housekeeping.c -- what is of no use any more goes, and nothing else does; while a call of SQLite or of the
+ * system fails, or all from one on, it stays, the log says why, and it goes the next time. */
 #include "server/job/housekeeping.h"
 
 #include <time.h>

@@ -1,5 +1,5 @@
-/* test_image_faults.c -- pictures where the disk or a library fails, or a file asks for more than a picture may have: each
- * is told for what it is, and a failing disk is never called a damaged picture. */
+/* test_image_faults.c -- pictures where the disk or a library fails, or a file asks for more than a picture may have:
+ * each is told for what it is, and a failing disk is never called a damaged picture. */
 #include <openexr.h>
 #include <png.h>
 #include <stdio.h>

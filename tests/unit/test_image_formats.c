@@ -1,6 +1,6 @@
 /* test_image_formats.c -- TIFF, HEIC, AVIF, WebP and CMYK JPEG: pictures of six patches, made here by the libraries'
- * encoders (those of HEIF are in tests/data/image, by libheif 1.15 with x265 and aom), come back in their colours; layers of
- * EXR; what is cut short, or of a kind that is not read, is refused. */
+ * encoders (those of HEIF are in tests/data/image, by libheif 1.15 with x265 and aom), come back in their colours;
+ * layers of EXR; what is cut short, or of a kind that is not read, is refused. */
 #include <tiffio.h>
 #include <webp/encode.h>
 #include <webp/mux.h>
@@ -308,7 +308,8 @@ static void heif(void) {
         CHECK_NEAR(middle(&image, 3)[1], 92.2457 / 203, .01);
         image_release(&image);
     }
-    /* 64 x 96 as shown, of patches twice as large: rotated by the file, whose EXIF says so a second time; Display P3. */
+    /* 64 x 96 as shown, of patches twice as large: rotated by the file, whose EXIF says so a second time; Display
+     * P3. */
     if (reads("tests/data/image/turned.heic", &image, &info)) {
         const float *grey = image.pixel + (16 * 64 + 16) * 3, *red = image.pixel + (16 * 64 + 48) * 3;
         CHECK(image.width == 64 && image.height == 96 && info.orientation == 1);

@@ -1,5 +1,5 @@
-/* server/job/fit.h: a job reads its scene as the check has found that it is to be read, else as it was given, whatever a
- * worker has told; and is refused where mesh and photographs do not fit. */
+/* server/job/fit.h: a job reads its scene as the check has found that it is to be read, else as it was given, whatever
+ * a worker has told; and is refused where mesh and photographs do not fit. */
 #include "server/job/fit.h"
 
 #include "common/mem.h"

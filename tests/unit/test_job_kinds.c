@@ -1,5 +1,5 @@
-/* test_job_kinds.c -- renders and evaluations in the store: what they read stays, files come before they begin, and small
- * renders have a lane of their own. */
+/* test_job_kinds.c -- renders and evaluations in the store: what they read stays, files come before they begin, and
+ * small renders have a lane of their own. */
 #include "server/store/job_files.h"
 #include "tests/unit/store_rig.h"
 

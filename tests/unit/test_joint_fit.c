@@ -1,6 +1,6 @@
 /* joint_fit.h: closed forms. Small spheres over a plane light points of known albedo; their radiances come back, with
- * standard deviations that the errors keep to; what cannot be told apart is told together; bounds hold; a source that is
- * not there gains nothing; the result is a minimum, and the same for any number of threads. */
+ * standard deviations that the errors keep to; what cannot be told apart is told together; bounds hold; a source that
+ * is not there gains nothing; the result is a minimum, and the same for any number of threads. */
 #include <math.h>
 #include <string.h>
 
@@ -190,7 +190,8 @@ static void test_minimum(struct parallel *pool) {
     joint_fit_release(&f);
 }
 
-/* Sixteen times the points in the same patches say less than sixteen times as much: patches have errors of their own. */
+/* Sixteen times the points in the same patches say less than sixteen times as much: patches have errors of their
+ * own. */
 static void test_patches(struct parallel *pool) {
     const float x[2] = {60.0f, 25.0f};
     static struct joint_point few[POINTS / 16];
@@ -214,8 +215,8 @@ static void test_patches(struct parallel *pool) {
     CHECK_THAT(error[1] < error[0] && error[1] > 0.35 * error[0], "%g and %g", error[0], error[1]);
 }
 
-/* Where errors of patches are drawn for each patch they count one by one; where one is drawn for each square of four, four
- * count as one. */
+/* Where errors of patches are drawn for each patch they count one by one; where one is drawn for each square of four,
+ * four count as one. */
 static void test_patches_alike(struct parallel *pool) {
     const float x[2] = {0.0f, 0.0f};
     double mean[2] = {0.0, 0.0};

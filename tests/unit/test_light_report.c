@@ -1,9 +1,10 @@
-/* light_estimate.h: the report states the radiance of sky and ground, and of segments that are emitters, with its deviation;
- * not of a white surface that saturates. What these deviations come to for all light. */
+/* light_estimate.h: the report states the radiance of sky and ground, and of segments that are emitters, with its
+ * deviation; not of a white surface that saturates. What these deviations come to for all light. */
 #include "server/light/light_estimate.h"
 #include "tests/check.h"
 
-/* Three segments of one triangle each, of areas 1, 1 and 2, of which the first is a lamp whose radiance was measured. */
+/* Three segments of one triangle each, of areas 1, 1 and 2, of which the first is a lamp whose radiance was
+ * measured. */
 static void test_deviation(struct reconstruction *r) {
     static vec3 position[] = {{0, 0, 0}, {2, 0, 0}, {0, 1, 0}, {0, 2, 0}};
     static uint32_t index[][3] = {{0, 1, 2}, {0, 1, 2}, {0, 1, 3}}, of_triangle[] = {0, 1, 2};

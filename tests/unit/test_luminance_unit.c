@@ -1,5 +1,5 @@
-/* test_luminance_unit.c -- the luminance of radiance 1 by the cameras' settings: of photographs alone, then of a whole job,
- * its report and its scene.usda. */
+/* test_luminance_unit.c -- the luminance of radiance 1 by the cameras' settings: of photographs alone, then of a whole
+ * job, its report and its scene.usda. */
 #include "server/capture/luminance_unit.h"
 #include "tests/unit/tiny_scene.h"
 

@@ -1,5 +1,5 @@
-/* fuse.h, divide.h, emission_pattern.h: of more photographs than are kept of a texel the sharpest tell, wherever they come
- * in the capture; all are counted. The same for any number of threads. */
+/* fuse.h, divide.h, emission_pattern.h: of more photographs than are kept of a texel the sharpest tell, wherever they
+ * come in the capture; all are counted. The same for any number of threads. */
 #include "server/material/divide.h"
 #include "server/material/emission_pattern.h"
 #include "server/reconstruct/inputs.h"
@@ -66,8 +66,9 @@ static void test_bounds(void) {
     plane_rig_release(&rig);
 }
 
-/* How bright a texel is, by which noise is told, the photographs say by the light they had: five of a 64th of the exposure
- * are wrong, and have half of what they show as noise at what the four others show, but none at what they show themselves. */
+/* How bright a texel is, by which noise is told, the photographs say by the light they had: five of a 64th of the
+ * exposure are wrong, and have half of what they show as noise at what the four others show, but none at what they show
+ * themselves. */
 static void test_exposure(void) {
     struct plane_rig rig;
     rgb right = {1.0f, 1.0f, 1.0f}, wrong = {3.0f / 64.0f, 3.0f / 64.0f, 3.0f / 64.0f};

@@ -1,5 +1,5 @@
-/* measured.h: a look of much weight counts for much where the others do not contradict it; into a highlight that none of
- * the others shows it does not, however sharp it is; the error that all share is in the noise. */
+/* measured.h: a look of much weight counts for much where the others do not contradict it; into a highlight that none
+ * of the others shows it does not, however sharp it is; the error that all share is in the noise. */
 #include "server/material/measured.h"
 
 #include <math.h>

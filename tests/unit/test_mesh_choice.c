@@ -1,4 +1,5 @@
-/* test_mesh_choice.c -- which of several meshes is taken, and that it is said; and what nerfstudio applied is undone. */
+/* test_mesh_choice.c -- which of several meshes is taken, and that it is said; and what nerfstudio applied is
+ * undone. */
 #include "server/ingest/mesh_choice.h"
 
 #include "common/file.h"

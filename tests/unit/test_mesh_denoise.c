@@ -1,6 +1,6 @@
 /* mesh_denoise.h: a rough floor and wall become plane and keep their edge, a ball beside them is
- * not spoiled, what coincides stays together; what is smooth, has few triangles, or has normals stays as it is. The same for any
- * number of threads. */
+ * not spoiled, what coincides stays together; what is smooth, has few triangles, or has normals stays as it is. The
+ * same for any number of threads. */
 #include <math.h>
 #include <string.h>
 

@@ -1,6 +1,6 @@
-/* mesh_planes.h, height_fit.h: of a rough floor and wall both planes are found and their vertices put there, those of the
- * edge into both; what is bowed by more than its noise, and what has few vertices, stays; a paraboloid is fitted to the
- * last bit, and a line tells of none. */
+/* mesh_planes.h, height_fit.h: of a rough floor and wall both planes are found and their vertices put there, those of
+ * the edge into both; what is bowed by more than its noise, and what has few vertices, stays; a paraboloid is fitted to
+ * the last bit, and a line tells of none. */
 #include <math.h>
 #include <string.h>
 

@@ -60,8 +60,8 @@ struct known_scene {
     struct image photograph, halves;
 };
 
-/* A wall of gentle contrast, of which all renders are too bright by a twentieth; `noise` is the standard deviation of one
- * of the two, relative to radiance and common to the channels of a pixel. */
+/* A wall of gentle contrast, of which all renders are too bright by a twentieth; `noise` is the standard deviation of
+ * one of the two, relative to radiance and common to the channels of a pixel. */
 static void render_known(struct known_scene *k, float noise, uint64_t seed) {
     for (size_t i = 0; i < SIDE * SIDE; i++) {
         float base = 0.3f + 0.1f * sinf(0.3f * (float)(i % SIDE)) * cosf(0.2f * (float)(i / SIDE));

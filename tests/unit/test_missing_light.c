@@ -10,8 +10,8 @@
 #define DESK 40
 #define STRENGTH 2.0f
 
-/* Base colour .5 everywhere. The lamp lights 16 places of a desk and, a little, the last 1600 of the wall, where what is
- * known of the light is up to a fifth too low. */
+/* Base colour .5 everywhere. The lamp lights 16 places of a desk and, a little, the last 1600 of the wall, where what
+ * is known of the light is up to a fifth too low. */
 static void place_room(struct light_place place[WALL + DESK]) {
     for (size_t i = 0; i < WALL + DESK; i++) {
         bool is_desk = i >= WALL;

@@ -1,6 +1,6 @@
-/* test_node_fetch.c -- a node that is to stop while it fetches stops at once, not after the file: a list that the daemon
- * still makes, a file of the scene, a part of the checkpoint. The daemon is a server that follows a script and falls
- * silent; then the machine's scheduler sends SIGTERM. */
+/* test_node_fetch.c -- a node that is to stop while it fetches stops at once, not after the file: a list that the
+ * daemon still makes, a file of the scene, a part of the checkpoint. The daemon is a server that follows a script and
+ * falls silent; then the machine's scheduler sends SIGTERM. */
 #include "server/node/fetch.h"
 #include "tests/unit/client_script.h"
 

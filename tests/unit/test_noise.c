@@ -137,8 +137,8 @@ static void test_black(void) {
     noise_release(&noise);
 }
 
-/* Draws have the variance of a look-up: 1 at a pixel's middle, a quarter (cubic: 0.41) between four, and texels that read
- * the same pixels have the same. */
+/* Draws have the variance of a look-up: 1 at a pixel's middle, a quarter (cubic: 0.41) between four, and texels that
+ * read the same pixels have the same. */
 static void test_draw(void) {
     double middle = 0.0, between = 0.0, cubic = 0.0;
     for (uint32_t i = 0; i < 10000; i++) {

@@ -1,5 +1,5 @@
-/* test_outputs_read_back.c -- an attempt of which one output was damaged on its way to the disk fails and says which: no
- * reader is left to find out. One byte of one file after the other changes between the worker and the system. */
+/* test_outputs_read_back.c -- an attempt of which one output was damaged on its way to the disk fails and says which:
+ * no reader is left to find out. One byte of one file after the other changes between the worker and the system. */
 #include <dlfcn.h>
 
 #include "common/json.h"

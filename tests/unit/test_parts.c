@@ -1,5 +1,5 @@
-/* test_parts.c -- jobs that are split: which attempt begins next, what becomes of a part and of the job when one ends, and
- * what an older data folder, a restart and a user's wishes do to them. */
+/* test_parts.c -- jobs that are split: which attempt begins next, what becomes of a part and of the job when one ends,
+ * and what an older data folder, a restart and a user's wishes do to them. */
 #include <math.h>
 #include <string.h>
 #include <unistd.h>

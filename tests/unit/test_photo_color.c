@@ -1,5 +1,5 @@
-/* test_photo_color.c -- photographs of Display P3 in a bundle: converted and said to be, saturated where the file is and
- * nowhere else, masks left alone; and profiles that cannot be used are said once. */
+/* test_photo_color.c -- photographs of Display P3 in a bundle: converted and said to be, saturated where the file is
+ * and nowhere else, masks left alone; and profiles that cannot be used are said once. */
 #include "common/file.h"
 #include "common/image.h"
 #include "server/ingest/bundle.h"

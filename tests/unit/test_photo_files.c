@@ -1,5 +1,5 @@
-/* test_photo_files.c -- photographs as people have them: formats, sizes and orientations other than those stated, broken
- * files among good ones, names of other machines. Bundles made here; test_captures.c has the shared ones. */
+/* test_photo_files.c -- photographs as people have them: formats, sizes and orientations other than those stated,
+ * broken files among good ones, names of other machines. Bundles made here; test_captures.c has the shared ones. */
 #include <sys/stat.h>
 
 #include "common/file.h"
@@ -113,7 +113,8 @@ static void turned(void) {
     CHECK(load_copies(JPEG, "\"fl_x\":20") && scene.photograph[0].camera.width == 24);
 }
 
-/* Photographs of more pixels than are kept are means of theirs, in a file as in memory; the camera of the file stays known. */
+/* Photographs of more pixels than are kept are means of theirs, in a file as in memory; the camera of the file stays
+ * known. */
 static void reduced(void) {
     struct image image;
     CHECK(image_read_photograph(PLAIN, &image, NULL, NULL) == STATUS_OK);

@@ -1,5 +1,5 @@
-/* pixel_memory.h, photos.h: a job whose photographs do not fit their memory gives the same bytes as one whose do, says what it takes of the disk, and
- * says so where that has no room. */
+/* pixel_memory.h, photos.h: a job whose photographs do not fit their memory gives the same bytes as one whose do, says
+ * what it takes of the disk, and says so where that has no room. */
 #include "server/worker/pixel_memory.h"
 
 #include <fcntl.h>

@@ -1,5 +1,5 @@
-/* plain_spread.h: a known spread is read off plain charts whatever else is textured, little surface tells none; and what
- * materials_deviation states with it covers errors as a normal distribution does. */
+/* plain_spread.h: a known spread is read off plain charts whatever else is textured, little surface tells none; and
+ * what materials_deviation states with it covers errors as a normal distribution does. */
 #include "server/material/plain_spread.h"
 
 #include "common/image.h"
@@ -46,8 +46,8 @@ static void set(uint32_t texel, float value) {
 
 static float measure(void) { return plain_spread(&surface, &materials.base_color, observed, is_emitter); }
 
-/* Each chart has a colour of its own, and its cells `spread` about it; the first `textured` charts have broad stripes, the
- * emitter as well. */
+/* Each chart has a colour of its own, and its cells `spread` about it; the first `textured` charts have broad stripes,
+ * the emitter as well. */
 static void paint(float spread, uint32_t textured) {
     for (uint32_t i = 0; i < TEXELS; i++) {
         uint32_t chart = chart_at(i);
@@ -83,8 +83,8 @@ static void test_little_is_seen(void) {
         observed[i] = 1.0f;
 }
 
-/* Errors of a known variance: along plain surface one of .01 that cells share and no measurement tells; on every fourth cell
- * noise of .03 of each texel, which its measurement tells. */
+/* Errors of a known variance: along plain surface one of .01 that cells share and no measurement tells; on every fourth
+ * cell noise of .03 of each texel, which its measurement tells. */
 static void test_coverage(void) {
     size_t one = 0, two = 0;
     for (uint32_t i = 0; i < TEXELS; i++) {

@@ -1,5 +1,6 @@
-/* pose_walk.h: the energy of a walk in closed form, whichever way the cameras look; a drift that all share costs nothing;
- * what is expected between two photographs and beyond the last; and the variances of a simulated walk found again. */
+/* pose_walk.h: the energy of a walk in closed form, whichever way the cameras look; a drift that all share costs
+ * nothing; what is expected between two photographs and beyond the last; and the variances of a simulated walk found
+ * again. */
 #include "server/capture/poses/pose_walk.h"
 
 #include "common/mem.h"

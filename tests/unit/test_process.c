@@ -1,6 +1,6 @@
-/* test_process.c -- a run on this machine from its start to its end: what the process finds, what of its lines is heard,
- * what it can be asked, its log and its last words, how its end is told, and what keeps it from starting. Scripts stand
- * in for the worker. */
+/* test_process.c -- a run on this machine from its start to its end: what the process finds, what of its lines is
+ * heard, what it can be asked, its log and its last words, how its end is told, and what keeps it from starting.
+ * Scripts stand in for the worker. */
 #include "server/job/process.h"
 
 #include <errno.h>

@@ -1,5 +1,5 @@
-/* test_read_back.c -- a picture that is damaged on its way into its file is not taken for written: the writers read back
- * what they wrote. Here one byte of it changes between them and the system. */
+/* test_read_back.c -- a picture that is damaged on its way into its file is not taken for written: the writers read
+ * back what they wrote. Here one byte of it changes between them and the system. */
 #include <dlfcn.h>
 #include <errno.h>
 #include <sys/stat.h>

@@ -1,5 +1,5 @@
-/* test_reserve.c -- a disk that is really full, to its last block: what frees space or stops work is entered all the same,
- * all else is refused, and all of it works again once there is room. On a small file system of its own. */
+/* test_reserve.c -- a disk that is really full, to its last block: what frees space or stops work is entered all the
+ * same, all else is refused, and all of it works again once there is room. On a small file system of its own. */
 #include <fcntl.h>
 #include <sched.h>
 #include <sys/mount.h>

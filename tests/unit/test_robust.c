@@ -1,6 +1,6 @@
-/* robust.h: weights in closed form: half at the distance of `scale`, or where noise alone goes that far; a share of wrong
- * samples that moves the mean by what the formula says and not more; the median by weights to a power; and how much of
- * normal noise's information one step with Cauchy's weights keeps. */
+/* robust.h: weights in closed form: half at the distance of `scale`, or where noise alone goes that far; a share of
+ * wrong samples that moves the mean by what the formula says and not more; the median by weights to a power; and how
+ * much of normal noise's information one step with Cauchy's weights keeps. */
 #include "server/capture/robust.h"
 
 #include "tests/check.h"

@@ -1,5 +1,5 @@
-/* test_run_ends.c -- what becomes of a job when its run ends in one of the ways that a run may (server/job/run.h), on an
- * executor of the test's that does nothing else; and what the table of attempts says of it. */
+/* test_run_ends.c -- what becomes of a job when its run ends in one of the ways that a run may (server/job/run.h), on
+ * an executor of the test's that does nothing else; and what the table of attempts says of it. */
 #include "server/job/attempt.h"
 #include "server/job/outcome.h"
 #include "server/job/worker_messages.h"

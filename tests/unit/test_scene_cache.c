@@ -1,5 +1,5 @@
-/* test_scene_cache.c -- scenes on a node's disk: fetched once for all, what is damaged or half there is made good, what is in
- * use stays, the rest goes, the oldest first. */
+/* test_scene_cache.c -- scenes on a node's disk: fetched once for all, what is damaged or half there is made good, what
+ * is in use stays, the rest goes, the oldest first. */
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <sys/wait.h>

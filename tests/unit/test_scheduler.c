@@ -1,5 +1,5 @@
-/* test_scheduler.c -- how attempts of jobs and checks of scenes end, and what the scheduler makes of it; a worker plays all
- * that may happen (scheduler_rig.h). */
+/* test_scheduler.c -- how attempts of jobs and checks of scenes end, and what the scheduler makes of it; a worker plays
+ * all that may happen (scheduler_rig.h). */
 #include <stdatomic.h>
 #include <sys/stat.h>
 

@@ -1,5 +1,5 @@
-/* test_scheduler_requests.c -- what users ask of the scheduler while jobs run, and what the machine does to it: workers that
- * do not start, a daemon that is killed (scheduler_rig.h). */
+/* test_scheduler_requests.c -- what users ask of the scheduler while jobs run, and what the machine does to it: workers
+ * that do not start, a daemon that is killed (scheduler_rig.h). */
 #include <dirent.h>
 #include <sys/wait.h>
 

@@ -1,6 +1,6 @@
-/* test_scheduler_retries.c -- what the scheduler cannot do while calls of SQLite or of the system fail it does later: it
- * checks scenes that had no room, queues jobs whose start was not entered, starts at all; and work waits while the disk is
- * nearly full (scheduler_rig.h). */
+/* test_scheduler_retries.c -- what the scheduler cannot do while calls of SQLite or of the system fail it does later:
+ * it checks scenes that had no room, queues jobs whose start was not entered, starts at all; and work waits while the
+ * disk is nearly full (scheduler_rig.h). */
 #include "tests/unit/scheduler_rig.h"
 
 #include "common/log.h"

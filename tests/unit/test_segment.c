@@ -105,8 +105,8 @@ static void test_shapes(void) {
     mesh_release(&mesh);
 }
 
-/* The corridor's walls are one object, its floor another, of which a sliver of the left wall is part; its segments are the
- * left wall, the floor, the right wall in this order. */
+/* The corridor's walls are one object, its floor another, of which a sliver of the left wall is part; its segments are
+ * the left wall, the floor, the right wall in this order. */
 static void test_names(void) {
     static const struct {
         const char *of_object[2];

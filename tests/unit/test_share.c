@@ -1,6 +1,7 @@
-/* test_share.c -- what a user is held to have taken of the disk: folders of scenes and jobs as they are, whatever of them
- * an archive or a list of outputs tells; the limit of it where a scene is checked and a job begins; the figure after the
- * daemon was killed, and what a job takes beside its folder. As worker stands in this program itself: `test_share worker DIR`. */
+/* test_share.c -- what a user is held to have taken of the disk: folders of scenes and jobs as they are, whatever of
+ * them an archive or a list of outputs tells; the limit of it where a scene is checked and a job begins; the figure
+ * after the daemon was killed, and what a job takes beside its folder. As worker stands in this program itself:
+ * `test_share worker DIR`. */
 #include "server/job/attempt.h"
 
 #include "server/job/worker_messages.h"
@@ -32,7 +33,8 @@ static void write_file(const char *folder, const char *name, size_t kib) {
     mem_free(path);
 }
 
-/* --- the worker's side: a scene is unpacked to 256 KiB, a job leaves an output of 4 bytes and a checkpoint of 128 KiB -- */
+/* --- the worker's side: a scene is unpacked to 256 KiB, a job leaves an output of 4 bytes and a checkpoint of 128 KiB
+ * -- */
 
 static int worker(const char *folder) {
     struct progress p = {.fd = PROGRESS_FD};
@@ -120,7 +122,8 @@ static const struct unchecked *unchecked(const char *id) {
     return &scene;
 }
 
-/* Sends an archive of 16 KiB and checks it; then it belongs to `second`, too, before it is checked (-1: to nobody else). */
+/* Sends an archive of 16 KiB and checks it; then it belongs to `second`, too, before it is checked (-1: to nobody
+ * else). */
 static void check_scene(const char *id, int64_t owner, int64_t second, uint64_t limit, struct scene_row *row) {
     const struct scheduler_config with = limited(limit);
     struct attempt a = {0};

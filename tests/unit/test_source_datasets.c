@@ -1,4 +1,5 @@
-/* test_source_datasets.c -- readers of phones' recordings and of data sets that have no capture in the test data: source_view.h. */
+/* test_source_datasets.c -- readers of phones' recordings and of data sets that have no capture in the test data:
+ * source_view.h. */
 #include "tests/unit/source_view.h"
 
 #define RECORD3D_POSE                                                                                                  \

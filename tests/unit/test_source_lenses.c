@@ -1,6 +1,6 @@
 /* test_source_lenses.c -- every lens that a source knows: where a point is seen, against what the tool that writes it
- * documents. The pixels were computed from the tools' formulas, apart from this program. What is not modelled is refused
- * or told, never left out. */
+ * documents. The pixels were computed from the tools' formulas, apart from this program. What is not modelled is
+ * refused or told, never left out. */
 #include "tests/unit/source_rig.h"
 
 /* Of pictures of 160 x 120 pixels; poses are the identity. */

@@ -105,8 +105,8 @@ static void test_alicevision(void) {
     source_rig_stop(&rig);
 }
 
-/* Rotations stored column by column, of the world into the rig and of the rig into the camera: by 90 degrees around z and
- * around x. */
+/* Rotations stored column by column, of the world into the rig and of the rig into the camera: by 90 degrees around z
+ * and around x. */
 #define RIG(independent, status)                                                                                       \
     "{\"version\":[1,2,0],\"views\":[{\"poseId\":\"1\",\"intrinsicId\":\"9\",\"rigId\":\"7\",\"subPoseId\":\"1\","     \
     "\"isPoseIndependant\":\"" independent                                                                             \

@@ -32,8 +32,8 @@ static double difference(const struct rigid *a, const struct rigid *b) {
     return worst;
 }
 
-/* Photograph i of the capture, which repeats them after `period`, has the pose of photograph i of the truth, and its lens
- * within `lens_tolerance` pixels. */
+/* Photograph i of the capture, which repeats them after `period`, has the pose of photograph i of the truth, and its
+ * lens within `lens_tolerance` pixels. */
 static void check_same(const struct scene *truth, const char *name, const char *source, size_t period,
                        double lens_tolerance) {
     struct scene scene;

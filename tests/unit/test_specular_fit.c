@@ -1,5 +1,5 @@
-/* specular_fit.h: roughness and specular of a plane under a disc of distant light, from photographs that show what the reflection
- * model says, integrated over the disc: a polished, a satin, an eggshell and a matt one come back. */
+/* specular_fit.h: roughness and specular of a plane under a disc of distant light, from photographs that show what the
+ * reflection model says, integrated over the disc: a polished, a satin, an eggshell and a matt one come back. */
 #include "server/material/specular_fit.h"
 #include "server/render/bsdf.h"
 #include "server/scene/latlong.h"

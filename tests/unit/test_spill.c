@@ -1,6 +1,6 @@
-/* spill.h: what fits the budget is in memory, else in a file without a name; contents survive being unmapped; no more than
- * the budget is mapped, at any moment where readers tell what they look at, else soon after; a full disk is an error of
- * the reservation. */
+/* spill.h: what fits the budget is in memory, else in a file without a name; contents survive being unmapped; no more
+ * than the budget is mapped, at any moment where readers tell what they look at, else soon after; a full disk is an
+ * error of the reservation. */
 #include "common/spill.h"
 
 #include <dirent.h>
@@ -42,8 +42,8 @@ static size_t mapped(void) {
     return of_files * (size_t)sysconf(_SC_PAGESIZE);
 }
 
-/* What is left once the keeper has looked, which a busy machine or disk may hold up: looked at for ten seconds, until it is
- * no more than `most`. */
+/* What is left once the keeper has looked, which a busy machine or disk may hold up: looked at for ten seconds, until
+ * it is no more than `most`. */
 static size_t mapped_soon(size_t most) {
     size_t now = mapped();
     for (int i = 0; i < 1000 && now > most; i++) {

@@ -309,7 +309,8 @@ static void check_delivery(struct store *store, int64_t id, const char *part) {
     job_release(&job);
 }
 
-/* The job tells what became of its messages, and they can be sent again: those that wait, or one of its present state. */
+/* The job tells what became of its messages, and they can be sent again: those that wait, or one of its present
+ * state. */
 static void check_again(struct store *store, int64_t id) {
     struct outbox_row row;
     bool gave_up;

@@ -1,5 +1,5 @@
-/* test_store_remote.c -- attempts on other machines, as the store sees them: the fence, what is repeated, who comes second,
- * and that there is one end. */
+/* test_store_remote.c -- attempts on other machines, as the store sees them: the fence, what is repeated, who comes
+ * second, and that there is one end. */
 #include <string.h>
 #include <sys/wait.h>
 #include <unistd.h>

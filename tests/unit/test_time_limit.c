@@ -1,4 +1,5 @@
-/* test_time_limit.c -- an attempt whose site's time was up: futile only where nothing was saved since it was claimed. */
+/* test_time_limit.c -- an attempt whose site's time was up: futile only where nothing was saved since it was
+ * claimed. */
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>

@@ -1,4 +1,5 @@
-/* test_trust.c -- specks on plain surface are what is found, not what the truth has: mottled paint counts, print does not. */
+/* test_trust.c -- specks on plain surface are what is found, not what the truth has: mottled paint counts, print does
+ * not. */
 #include "server/evaluate/trust.h"
 
 #include <stdlib.h>

@@ -1,5 +1,5 @@
-/* views.h: classes of the pixels of a large photograph, which are found in cells of 2 x 2 pixels, the last of them cut: a
- * wall that ends before another one, 1 m behind it, which ends before nothing. */
+/* views.h: classes of the pixels of a large photograph, which are found in cells of 2 x 2 pixels, the last of them cut:
+ * a wall that ends before another one, 1 m behind it, which ends before nothing. */
 #include "common/mem.h"
 #include "server/capture/views.h"
 #include "tests/check.h"

@@ -1,5 +1,5 @@
-/* views.h: a look-up is trusted the less, and how much of what a look-up shows may be light of others grows towards an edge, and the more
- * the brighter the other side of the edge is. */
+/* views.h: a look-up is trusted the less, and how much of what a look-up shows may be light of others grows towards an
+ * edge, and the more the brighter the other side of the edge is. */
 #include "common/image.h"
 #include "common/mem.h"
 #include "server/capture/views.h"

@@ -1,5 +1,5 @@
-/* tiny_scene.h -- a scene of two triangles and three photographs of 8 x 8 pixels, and one job on it, called in this process:
- * what the worker's tests run again and again. A fourth frame has no photograph and is left out. */
+/* tiny_scene.h -- a scene of two triangles and three photographs of 8 x 8 pixels, and one job on it, called in this
+ * process: what the worker's tests run again and again. A fourth frame has no photograph and is left out. */
 #ifndef UNBAKE_TESTS_UNIT_TINY_SCENE_H
 #define UNBAKE_TESTS_UNIT_TINY_SCENE_H
 

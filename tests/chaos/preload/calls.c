@@ -1,6 +1,6 @@
-/* calls.c -- preloaded into the daemon: its n-th call of SQLite (UNBAKE_FAULTS_OF=sql) or of the system fails, once; see
- * sql_faults.h and system_faults.h. The page of faults.h says which, and by what error (0: of the system, EIO or ENOSPC
- * in turn), and hears whether there was one. */
+/* calls.c -- preloaded into the daemon: its n-th call of SQLite (UNBAKE_FAULTS_OF=sql) or of the system fails, once;
+ * see sql_faults.h and system_faults.h. The page of faults.h says which, and by what error (0: of the system, EIO or
+ * ENOSPC in turn), and hears whether there was one. */
 #include <stdlib.h>
 
 #include "tests/chaos/faults.h"
