@@ -135,50 +135,66 @@ static bool check_value(const struct render_setting *t, const cJSON *value, enum
     return check_text(t, value->valuestring, files, why);
 }
 
-/* A setting that another makes meaningless is a fault, not ignored. */
-static void need(struct setting_faults *f, const cJSON *object, const char *name, bool is_met, const char *reason) {
-    if (render_settings_has(object, name) && !is_met)
-        setting_faults_add(f, name, reason, "");
+/* What settings say of one another is asked of those that are good by themselves; nothing is said of a setting where one
+ * that it depends on is not good. */
+struct settings_check {
+    struct setting_faults faults;
+    const cJSON *given, *good; /* good: those of `given` without a fault of their own */
+};
+
+static bool is_doubtful(const struct settings_check *c, const char *name) {
+    return render_settings_has(c->given, name) && !render_settings_has(c->good, name);
 }
 
-static void check_sky(struct setting_faults *f, const cJSON *object) {
+/* A setting that another makes meaningless is a fault, not ignored. */
+static void need(struct settings_check *c, const char *name, bool is_met, const char *reason) {
+    if (render_settings_has(c->good, name) && !is_met)
+        setting_faults_add(&c->faults, name, reason, "");
+}
+
+static void check_sky(struct settings_check *c) {
     static const char *const of_sky[] = {"date", "latitude", "longitude", "north",
                                          "suns", "time",     "turbidity", "utc_offset"};
-    bool is_sky = render_settings_is(object, "environment", "sky");
-    bool has_map = !is_sky && !render_settings_is(object, "environment", "none");
+    bool is_sky = render_settings_is(c->good, "environment", "sky");
+    bool has_map = !is_sky && !render_settings_is(c->good, "environment", "none");
+    if (is_doubtful(c, "environment"))
+        return;
     for (size_t i = 0; i < sizeof of_sky / sizeof *of_sky; i++)
-        need(f, object, of_sky[i], is_sky, "belongs to environment=sky");
+        need(c, of_sky[i], is_sky, "belongs to environment=sky");
     for (size_t i = 0; i < 3 && is_sky; i++)
-        if (!render_settings_has(object, of_sky[i]))
-            setting_faults_add(f, of_sky[i], "environment=sky needs it", render_settings_find(of_sky[i], NULL)->help);
-    need(f, object, "time", !is_sky || render_settings_number(object, "suns") == 1.0,
+        if (!render_settings_has(c->given, of_sky[i]))
+            setting_faults_add(&c->faults, of_sky[i], "environment=sky needs it",
+                               render_settings_find(of_sky[i], NULL)->help);
+    need(c, "time", !is_sky || render_settings_number(c->good, "suns") == 1.0,
          "with suns the times are those from sunrise to sunset");
-    need(f, object, "environment_turn", has_map, "only a map is turned; a sky has north");
-    need(f, object, "environment_scale", has_map || is_sky, "there is no environment");
-    need(f, object, "sky", has_map || is_sky, "there is no environment");
-    need(f, object, "sun", is_sky || render_settings_is(object, "environment", "found"),
+    need(c, "environment_turn", has_map, "only a map is turned; a sky has north");
+    need(c, "environment_scale", has_map || is_sky, "there is no environment");
+    need(c, "sky", has_map || is_sky, "there is no environment");
+    need(c, "sun", is_sky || render_settings_is(c->good, "environment", "found"),
          "only a sky, or what was found, has a sun of its own");
 }
 
-static void check_cameras(struct setting_faults *f, const cJSON *object) {
-    bool has_path = render_settings_has(object, "path");
-    need(f, object, "view", !has_path, "a path names its views itself");
-    need(f, object, "path_count", has_path, "belongs to path");
-    need(f, object, "multilayer",
-         !render_settings_bool(object, "multilayer") || !render_settings_is(object, "format", "png"),
+static void check_cameras(struct settings_check *c) {
+    bool has_path = render_settings_has(c->given, "path");
+    need(c, "view", !has_path, "a path names its views itself");
+    need(c, "path_count", has_path, "belongs to path");
+    need(c, "multilayer",
+         !render_settings_bool(c->good, "multilayer") || !render_settings_is(c->good, "format", "png") ||
+             is_doubtful(c, "format"),
          "only EXR has layers: format=exr or both");
 }
 
-static void check_precision(struct setting_faults *f, const cJSON *object) {
-    bool has_exr = !render_settings_is(object, "format", "png") || render_settings_bool(object, "per_light");
-    need(f, object, "precision", has_exr, "belongs to EXR: format=exr or both, or per_light");
-    need(f, object, "precision",
-         !render_settings_is(object, "precision", "half") || !render_settings_bool(object, "multilayer"),
+static void check_precision(struct settings_check *c) {
+    bool has_exr = !render_settings_is(c->good, "format", "png") || render_settings_bool(c->good, "per_light") ||
+                   is_doubtful(c, "format") || is_doubtful(c, "per_light");
+    need(c, "precision", has_exr, "belongs to EXR: format=exr or both, or per_light");
+    need(c, "precision",
+         !render_settings_is(c->good, "precision", "half") || !render_settings_bool(c->good, "multilayer"),
          "layers of one file are float");
 }
 
 /* "lamp.3.radius": whether the settings of lamp 3 belong to its kind; the same of things that are inserted. */
-static void check_lamp(struct setting_faults *f, const cJSON *object, uint32_t number) {
+static void check_lamp(struct settings_check *c, uint32_t number) {
     static const struct {
         const char *name, *kinds;
         bool is_needed;
@@ -186,32 +202,35 @@ static void check_lamp(struct setting_faults *f, const cJSON *object, uint32_t n
                    {"radius", "sphere|spot", false},       {"angle", "spot", false},         {"blend", "spot", false}};
     char name[SETTING_NAME_MAX], reason[128];
     snprintf(name, sizeof name, "lamp.%u.kind", number);
-    if (!render_settings_has(object, name)) {
-        setting_faults_add(f, name, "is missing", "area, sphere or spot");
+    if (!render_settings_has(c->given, name))
+        setting_faults_add(&c->faults, name, "is missing", "area, sphere or spot");
+    if (!render_settings_has(c->good, name))
         return;
-    }
-    const char *kind = render_settings_text(object, name);
+    const char *kind = render_settings_text(c->good, name);
     for (size_t i = 0; i < sizeof of_kind / sizeof *of_kind; i++) {
         bool belongs = choices_index(of_kind[i].kinds, kind, strlen(kind)) >= 0;
         snprintf(name, sizeof name, "lamp.%u.%s", number, of_kind[i].name);
         snprintf(reason, sizeof reason, "kind=%s %s it", kind, belongs ? "needs" : "does not have");
-        if (render_settings_has(object, name) ? !belongs : belongs && of_kind[i].is_needed)
-            setting_faults_add(f, name, reason, "");
+        if (render_settings_has(c->given, name) ? !belongs && !is_doubtful(c, name) : belongs && of_kind[i].is_needed)
+            setting_faults_add(&c->faults, name, reason, "");
     }
 }
 
-static void check_families(struct setting_faults *f, const cJSON *object) {
+static bool is_thing_number(uint32_t number) { return number >= 1 && number <= RENDER_LAMPS_MAX; }
+
+static void check_families(struct settings_check *c) {
     char name[SETTING_NAME_MAX];
     size_t count;
-    uint32_t *number = render_settings_family(object, "lamp.", &count);
+    uint32_t *number = render_settings_family(c->given, "lamp.", &count);
     for (size_t i = 0; i < count; i++)
-        check_lamp(f, object, number[i]);
+        if (is_thing_number(number[i]))
+            check_lamp(c, number[i]);
     mem_free(number);
-    number = render_settings_family(object, "insert.", &count);
+    number = render_settings_family(c->given, "insert.", &count);
     for (size_t i = 0; i < count; i++) {
         snprintf(name, sizeof name, "insert.%u.file", number[i]);
-        if (!render_settings_has(object, name))
-            setting_faults_add(f, name, "is missing", "a .glb, .gltf, .obj or .ply");
+        if (is_thing_number(number[i]) && !render_settings_has(c->given, name))
+            setting_faults_add(&c->faults, name, "is missing", "a .glb, .gltf, .obj or .ply");
     }
     mem_free(number);
 }
@@ -224,27 +243,32 @@ static void check_name(struct setting_faults *f, const cJSON *value, enum render
     bool is_counted = t && (strncmp(t->name, "lamp.", 5) == 0 || strncmp(t->name, "insert.", 7) == 0);
     if (!t)
         setting_faults_add_unknown(f, value->string, render_settings_nearest(value->string));
-    else if (is_counted && (number < 1 || number > RENDER_LAMPS_MAX))
+    else if (is_counted && !is_thing_number(number))
         setting_faults_add(f, value->string, "is numbered from 1 to 1000", "");
     else if (!check_value(t, value, files, &why))
         setting_faults_add(f, value->string, why.text, t->help);
 }
 
 enum status render_settings_check(const cJSON *object, enum render_files files, cJSON *problems, struct error *err) {
-    struct setting_faults faults = {.problems = problems};
+    struct settings_check c = {.faults = {.problems = problems}, .given = object};
     if (!cJSON_IsObject(object)) {
-        setting_faults_add(&faults, "settings", "must be an object of names and values", "");
+        setting_faults_add(&c.faults, "settings", "must be an object of names and values", "");
         return error_set(err, STATUS_INPUT, "settings must be a JSON object");
     }
-    for (const cJSON *value = object->child; value; value = value->next)
-        check_name(&faults, value, files);
-    if (faults.count == 0) {
-        check_sky(&faults, object);
-        check_cameras(&faults, object);
-        check_precision(&faults, object);
-        check_families(&faults, object);
+    cJSON *good = cJSON_CreateObject();
+    for (const cJSON *value = object->child; value; value = value->next) {
+        size_t before = c.faults.count;
+        check_name(&c.faults, value, files);
+        if (c.faults.count == before)
+            json_add(good, value->string, cJSON_Duplicate(value, true));
     }
-    return setting_faults_status(&faults, err);
+    c.good = good;
+    check_sky(&c);
+    check_cameras(&c);
+    check_precision(&c);
+    check_families(&c);
+    cJSON_Delete(good);
+    return setting_faults_status(&c.faults, err);
 }
 
 static enum setting_form form_of(const char *name) {

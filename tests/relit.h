@@ -10,21 +10,27 @@
 #include "common/mem.h"
 #include "server/relight/relight.h"
 
-/* Renders all pictures into a new folder, *out, the caller's. Settings are checked as a user's are. */
-static inline enum status relit_run(const char *outputs, const char *settings, struct parallel *pool, char **out,
-                                    struct error *err) {
+/* Renders all pictures into the folder `out`, which exists. Settings are checked as a user's are. */
+static inline enum status relit_into(const char *out, const char *outputs, const char *settings, struct parallel *pool,
+                                     struct error *err) {
     cJSON *tree = NULL;
-    *out = mem_strdup("/tmp/unbake-relit-XXXXXX");
     enum status status = json_parse(settings, strlen(settings), "settings", &tree, err);
     if (status == STATUS_OK)
         status = render_settings_check(tree, RENDER_FILES_ANYWHERE, NULL, err);
-    if (status == STATUS_OK && !mkdtemp(*out))
-        status = error_set(err, STATUS_IO, "no temporary folder");
-    struct relight_job job = {.outputs = outputs, .settings = tree, .out = *out};
+    struct relight_job job = {.outputs = outputs, .settings = tree, .out = out};
     if (status == STATUS_OK)
         status = relight_run(&job, NULL, pool, err);
     cJSON_Delete(tree);
     return status;
+}
+
+/* The same into a new folder, *out, the caller's. */
+static inline enum status relit_run(const char *outputs, const char *settings, struct parallel *pool, char **out,
+                                    struct error *err) {
+    *out = mem_strdup("/tmp/unbake-relit-XXXXXX");
+    if (!mkdtemp(*out))
+        return error_set(err, STATUS_IO, "no temporary folder");
+    return relit_into(*out, outputs, settings, pool, err);
 }
 
 /* Reads a file of it. */

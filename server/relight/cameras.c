@@ -88,6 +88,17 @@ static char *cameras_path(const struct relight_job *job) {
     return files_path(job, render_settings_text(job->settings, "cameras"));
 }
 
+cJSON *cameras_own(const struct relight_job *job) {
+    bool is_own = render_settings_is(job->settings, "cameras", "held_out") ||
+                  render_settings_is(job->settings, "cameras", "photographs");
+    char *path = cameras_path(job);
+    cJSON *tree = NULL;
+    if (is_own)
+        (void)json_read(path, TRANSFORMS_MAX_BYTES, &tree, NULL);
+    mem_free(path);
+    return tree;
+}
+
 /* The axis that points up in most frames, as scene_up has it of photographs. */
 static vec3 up_of(const struct frames *t) {
     double sum[3] = {0.0, 0.0, 0.0};

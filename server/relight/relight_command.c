@@ -9,7 +9,9 @@
 
 #include "common/file.h"
 #include "common/mem.h"
+#include "server/relight/cameras.h"
 #include "server/relight/denoise.h"
+#include "server/relight/files.h"
 #include "server/relight/relight.h"
 #include "server/relight/relight_plan.h"
 
@@ -82,10 +84,24 @@ static enum status add_settings(const struct options *a, cJSON *settings, struct
     return status;
 }
 
+/* What the room has not that the settings name; where a file cannot be read, rendering tells it. */
+static enum status check_room(const char *outputs, const cJSON *settings, cJSON *problems) {
+    const struct relight_job job = {.outputs = outputs, .settings = settings};
+    cJSON *report = files_report(&job), *cameras = cameras_own(&job);
+    enum status status =
+        render_settings_check_room(settings, cJSON_GetObjectItemCaseSensitive(report, "segments"),
+                                   cJSON_GetObjectItemCaseSensitive(cameras, "frames"), problems, NULL);
+    cJSON_Delete(report);
+    cJSON_Delete(cameras);
+    return status;
+}
+
 /* All faults, a line each. */
-static bool settings_are_good(const cJSON *settings) {
+static bool settings_are_good(const char *outputs, const cJSON *settings) {
     cJSON *problems = cJSON_CreateArray();
     enum status status = render_settings_check(settings, RENDER_FILES_ANYWHERE, problems, NULL);
+    if (status == STATUS_OK)
+        status = check_room(outputs, settings, problems);
     for (const cJSON *p = problems->child; p; p = p->next) {
         const char *hint = cJSON_GetStringValue(cJSON_GetObjectItem(p, "hint"));
         fprintf(stderr, "unbaked: setting %s %s%s%s\n", cJSON_GetStringValue(cJSON_GetObjectItem(p, "name")),
@@ -186,7 +202,7 @@ int relight_command(int argc, char **argv) {
     if (status != STATUS_OK)
         fprintf(stderr, "unbaked: %s\n", err.message);
     code = EXIT_USAGE;
-    if (status == STATUS_OK && settings_are_good(settings) && (!is_file || add_format(out, settings))) {
+    if (status == STATUS_OK && settings_are_good(a.word[0], settings) && (!is_file || add_format(out, settings))) {
         struct relight_job job = {.outputs = a.word[0], .settings = settings, .out = out};
         if (!is_file)
             status = file_make_dirs(out, &err);

@@ -49,6 +49,8 @@ try hdr 25 0.1 2
 # In another light it is near the true room in that light (relight_room.c): a glowing ball, each lamp alone.
 "$build/tests/render/relight_room" "$work/hdr" "$work/hdr.out" "$work/relit" views=0,2 spp=16 label=hdr least=24 ratio=1.05 ||
     fail "relit it is not near the truth"
+"$build/unbaked" relight "$work/hdr.out" --set light.99=off --view 99 --out "$work/none.png" 2>"$work/none"
+equal "$? $(grep -c 'setting light.99\|setting view' "$work/none")" "2 2" "relight of what the room has not"
 # A job compares it with the truth that comes with a room, and finds what the command does.
 tar -C "$work/hdr" -cf "$work/known.tar" .
 known=$(curl -s -X POST -T "$work/known.tar" -H 'Content-Type: application/x-tar' "$url/v1/scenes?name=known" | jq -r .id)

@@ -32,6 +32,10 @@ has "$err" "settings.nothing"; has "$err" "settings.spp"
 post 422 '{"kind":"render","source":1,"settings":{"executor":"nowhere","parts":1001}}'
 equal "$(names)" "settings.executor settings.parts"
 run 7 render 1 --environment "$work/none.hdr"
+# what the room has not
+post 422 '{"kind":"render","source":1,"settings":{"light.99":"off","segment.77.specular":0.5,"remove":"door","view":"0,99"}}'
+equal "$(names)" "settings.light.99 settings.remove settings.segment.77.specular settings.view"
+post 422 '{"kind":"render","source":1,"settings":{"cameras":"photographs","path":"0,8"}}'; equal "$(names)" "settings.path"
 
 # --- a picture, and what it is beforehand ---
 # shellcheck disable=SC2086
@@ -112,11 +116,12 @@ cannot() { # cannot PART ARGUMENT...: the render fails with its first attempt
     [ ! -e "$work/none" ] || fail "a render that failed has left files"
     equal "$("$build/unbake" list --kind render --json | jq -c '.[0] | [.attempt, .attempts_left]')" '[1,9]' "attempts of what cannot be"
 }
-# shellcheck disable=SC2086
-cannot 'setting view: views.json has no view "99" among its' $lamp --view 99
 cannot "Nothing shines" --lights off --environment none
 call GET "/v1/jobs?kind=render"; has "$(field '.items[0].hint')" "add a lamp"
-cannot "setting remove: the room has segments" --set remove=99
+printf '{"w":8,"h":6,"fl_x":8,"fl_y":8,"frames":[{"file_path":"a","transform_matrix":[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}]}' \
+    >"$work/cameras.json"
+# shellcheck disable=SC2086
+cannot 'setting view: cameras.json has no view "99" among its 1' $lamp --set cameras="$work/cameras.json" --view 99
 
 # --- a small render does not wait behind a reconstruction, a large one does ---
 run 0 submit "$work/room" --set texture_size=64 --set texels_per_metre=2 --set iterations=1000000000 --set texels_per_iteration=64 -q

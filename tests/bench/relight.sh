@@ -6,8 +6,13 @@
 # tests/render/relight_room.c. FLIP is flip-evaluator's (PyPI, into BUILD/flip); where that is not to be had its rows are
 # left out, and that is said.
 #
+# What takes long is kept under BUILD/relight and used again: a reconstruction as long as room, settings and program are the
+# same, a picture as long as its room, light and program are. So a run that was broken off goes on, and RELIGHT_ROOMS may
+# grow from run to run.
+#
 # RELIGHT_ROOMS    "demo staircase2 bathroom staircase2-scan bathroom-scan staircase2-phone bathroom-phone"
 # RELIGHT_QUALITY  of the reconstructions (standard)
+# RELIGHT_SCANS    the same of scans and phone captures (as RELIGHT_QUALITY)
 # RELIGHT_TEXTURE  their texture_size (1024)
 # RELIGHT_SPP      samples a pixel of each of the four renders (64)
 #
@@ -17,7 +22,6 @@ build=$1
 . tests/bench/lib.sh
 rows=$build/relight.tsv
 sky=$data/hdri/lythwood_room_1k.hdr
-rm -rf "$build/relight"
 mkdir -p "$build/relight"
 : >"$rows"
 
@@ -30,33 +34,62 @@ fi
 [ -n "$has_flip" ] || echo "flip-evaluator is not to be had: FLIP is left out" >&2
 [ -e "$sky" ] || echo "no $sky: the sky is left out" >&2
 
-# segment OUT OBJECT: which segment of a reconstruction an object is.
-segment() {
-    jq -r ".segments[] | select(.id == $2).segment" "$1/report.json" | head -n 1
-}
-
-# window ROOM: the object that a sky would come in through.
-window() {
+# windows ROOM: the objects, with commas between, that a sky comes in through when they are away; of staircase2 its lamps, too.
+windows() {
     case $1 in
     demo) echo 21 ;;
+    staircase2) seq -s , 18 30 ;;
     bathroom) echo 16 ;;
     esac
 }
 
-# recover ROOM FOLDER: once in a run for all rows that need it.
+# segments OUT OBJECTS: which segments of a reconstruction the objects are.
+segments() {
+    jq -r "[.segments[] | select(.id | IN($2)).segment] | join(\",\")" "$1/report.json"
+}
+
+# is_kept FILE KEY: whether what FILE stands for was made from what KEY says.
+is_kept() { [ "$(cat "$1" 2>/dev/null)" = "$2" ]; }
+
+# make_demo: the demo room, as the program makes it now.
+make_demo() {
+    local key
+    key=$(sha256sum <"$build/unbaked")
+    is_kept "$build/relight/demo/room.key" "$key" && return
+    rm -rf "$build/relight/demo/room" "$build/relight/demo/room.key"
+    "$build/unbaked" demo-room "$build/relight/demo/room" --opening && echo "$key" >"$build/relight/demo/room.key"
+}
+
+# recover ROOM FOLDER QUALITY
 recover() {
-    [ -e "$build/relight/$1/out/report.json" ] ||
-        reconstruct "$2" "$build/relight/$1/out" "texture_size=${RELIGHT_TEXTURE:-1024}" \
-            "quality=${RELIGHT_QUALITY:-standard}" report_samples=1
+    local out=$build/relight/$1/out key settings=("texture_size=${RELIGHT_TEXTURE:-1024}" "quality=$3" report_samples=1)
+    key=$({
+        sha256sum <"$build/tests/bench/reconstruct_room"
+        echo "${settings[@]}"
+        cd "$2" && find . -path ./truth -prune -o -type f -print0 | sort -z | xargs -0 sha256sum
+    } | sha256sum)
+    is_kept "$out.key" "$key" && return
+    rm -f "$out.key"
+    reconstruct "$2" "$out" "${settings[@]}" && echo "$key" >"$out.key"
+}
+
+# keep_pictures ROOM BASE: takes away what an earlier program, or another reconstruction, has rendered.
+keep_pictures() {
+    local dir=$build/relight/$1 key
+    key=$(cat "$build/relight/$1/out.key" "$build/relight/$2/out.key"; sha256sum <"$build/tests/render/relight_room")
+    is_kept "$dir/renders.key" "$key" && return
+    rm -rf "$dir/renders" "$dir/truth" "$dir"/*.png
+    echo "$key" >"$dir/renders.key"
 }
 
 measure() { # ROOM
-    local name=$1 base=${1%-scan} room options window scan=
+    local name=$1 base=${1%-scan} quality=${RELIGHT_QUALITY:-standard} room options windows scan=
     base=${base%-phone}
     room=$data/rooms/$base
     [ "$base" = demo ] && room=$build/relight/demo/room
-    if [ "$base" = demo ] && [ ! -e "$room/transforms.json" ]; then
-        "$build/unbaked" demo-room "$room" --opening || return
+    if [ "$base" = demo ]; then
+        mkdir -p "$build/relight/demo"
+        make_demo || return
     fi
     if [ ! -e "$room/truth/objects.json" ]; then
         echo "$name: no $room with a truth: left out" >&2
@@ -64,11 +97,11 @@ measure() { # ROOM
     fi
     echo "== $name" >&2
     mkdir -p "$build/relight/$name"
-    recover "$base" "$room" || return
+    recover "$base" "$room" "$quality" || return
     options=("label=$name" "spp=${RELIGHT_SPP:-64}")
-    window=$(window "$base")
-    if [ -n "$window" ] && [ -e "$sky" ]; then
-        options+=("sky=$sky" "remove=$(segment "$build/relight/$base/out" "$window")")
+    windows=$(windows "$base")
+    if [ -n "$windows" ] && [ -e "$sky" ]; then
+        options+=("sky=$sky" "remove=$(segments "$build/relight/$base/out" "$windows")")
     fi
     case $name in
     *-scan)
@@ -85,10 +118,12 @@ measure() { # ROOM
             echo "$name: no $scan: left out" >&2
             return
         fi
-        recover "$name" "$scan" || return
+        recover "$name" "$scan" "${RELIGHT_SCANS:-$quality}" || return
         # segments of a scan have other numbers: no window of it can be named
-        options=("label=$name" "spp=${RELIGHT_SPP:-64}" "scan=$build/relight/$name/out")
+        options=("label=$name" "spp=${RELIGHT_SPP:-64}" "scan=$build/relight/$name/out" "truth=$build/relight/$base")
     fi
+    keep_pictures "$base" "$base"
+    keep_pictures "$name" "$base"
     "$build/tests/render/relight_room" "$room" "$build/relight/$base/out" "$build/relight/$name" "${options[@]}" >>"$rows"
     [ -n "$has_flip" ] && "$build/flip/bin/python" tests/bench/flip.py "$name" "$build/relight/$name" >>"$rows"
 }

@@ -10,12 +10,14 @@
  * that of sRGB pictures at one exposure a lighting, of which the mean square is the mean of (o1 - a) (o2 - b), to which
  * noise adds nothing. The ratio is that of the means of radiance. Prints "what<TAB>value<TAB>goal<TAB>better" and writes
  * DIR/LIGHTING_N_ours.png and _true.png beside each other, means of two renders, and for comparisons that noise does add
- * to, single ones: _o1.png, _a.png, _b.png.
+ * to, single ones: _o1.png, _a.png, _b.png. The true room's outputs go to DIR/truth, renders to DIR/renders, and a render
+ * that is there already is not made again; the caller removes what another program has made.
  *
  * Options: views=0,3,6 (numbers of held-out views), spp=64 (of each of the four), sky=FILE, remove=NAME, label=TEXT,
  * scan=OUTPUTS (those of a reconstruction of the same room on another mesh: they are compared, under the ball and the sky,
- * with the truth on the first). The exit status is 1 where a figure misses one of least=PSNR, ratio=FACTOR. */
+ * with the truth on the first), truth=DIR (where the true room and its renders are, or go to, in place of DIR). The exit status is 1 where a figure misses one of least=PSNR, ratio=FACTOR. */
 #include <stdio.h>
+#include <unistd.h>
 
 #include "server/export/pictures.h"
 #include "tests/relit.h"
@@ -29,7 +31,7 @@
 #define GOAL_RATIO 1.03
 
 struct relight_bench {
-    const char *room, *outputs, *dir, *scan, *views, *sky, *remove, *label;
+    const char *room, *outputs, *dir, *scan, *true_dir, *views, *sky, *remove, *label;
     double spp, least_db, most_ratio;
     struct true_room truth;
     char *true_outputs;
@@ -172,18 +174,22 @@ static enum status try_lighting(struct relight_bench *b, const char *name, const
     char *out[RENDERS] = {0};
     enum status status = STATUS_OK;
     for (int k = 0; k < RENDERS && status == STATUS_OK; k++) {
-        const char *outputs = k >= OURS ? b->true_outputs : b->scan ? b->scan : b->outputs;
+        bool is_true = k >= OURS;
+        const char *outputs = is_true ? b->true_outputs : b->scan ? b->scan : b->outputs;
         char *settings = mem_printf("{\"view\":\"%s\",\"cameras\":\"%s/views.json\",\"format\":\"exr\",\"spp\":%g,"
                                     "\"seed\":%d,\"lights\":\"off\",%s}",
                                     b->views, b->true_outputs, b->spp, k + 1, light);
-        status = relit_run(outputs, settings, b->pool, &out[k], err);
+        out[k] = mem_printf("%s/renders/%s_%s_%d", is_true ? b->true_dir : b->dir, name, is_true ? "true" : "ours",
+                            k % OURS);
+        status = file_make_dirs(out[k], err);
+        if (status == STATUS_OK)
+            status = relit_into(out[k], outputs, settings, b->pool, err);
         mem_free(settings);
     }
     if (status == STATUS_OK)
         status = compare(b, name, out, err);
     for (int k = 0; k < RENDERS; k++)
-        if (out[k])
-            relit_remove(out[k]);
+        mem_free(out[k]);
     return status;
 }
 
@@ -273,7 +279,8 @@ static enum status try_sky(struct relight_bench *b, struct error *err) {
 }
 
 static bool read_option(struct relight_bench *b, const char *text) {
-    static const char *const name[] = {"views=", "spp=", "sky=", "remove=", "label=", "scan=", "least=", "ratio="};
+    static const char *const name[] = {
+        "views=", "spp=", "sky=", "remove=", "label=", "scan=", "least=", "ratio=", "truth="};
     const char *value = strchr(text, '=') + 1;
     size_t which = 0;
     while (which < sizeof name / sizeof *name && strncmp(text, name[which], strlen(name[which])) != 0)
@@ -287,17 +294,22 @@ static bool read_option(struct relight_bench *b, const char *text) {
     case 5: b->scan = value; break;
     case 6: b->least_db = atof(value); break;
     case 7: b->most_ratio = atof(value); break;
+    case 8: b->true_dir = value; break;
     default: return false;
     }
     return true;
 }
 
 static enum status run(struct relight_bench *b, struct error *err) {
-    b->true_outputs = file_join(b->dir, "truth");
+    if (!b->true_dir)
+        b->true_dir = b->dir;
+    b->true_outputs = file_join(b->true_dir, "truth");
+    char *last = file_join(b->true_outputs, TRUE_ROOM_LAST_FILE);
+    bool is_there = access(last, F_OK) == 0;
     enum status status = file_make_dirs(b->true_outputs, err);
     if (status == STATUS_OK)
         status = true_room_init(&b->truth, b->room, b->outputs, b->pool, err);
-    if (status == STATUS_OK)
+    if (status == STATUS_OK && !is_there)
         status = true_room_save(&b->truth, b->outputs, b->true_outputs, b->pool, err);
     if (status == STATUS_OK)
         status = try_ball(b, err);
@@ -307,6 +319,7 @@ static enum status run(struct relight_bench *b, struct error *err) {
         status = try_sky(b, err);
     true_room_release(&b->truth);
     mem_free(b->true_outputs);
+    mem_free(last);
     return status;
 }
 

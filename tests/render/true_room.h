@@ -18,6 +18,7 @@
 
 #define TRUE_ROOM_BYTES ((size_t)1 << 28) /* of a file that is read */
 #define TRUE_ROOM_TRIANGLES ((size_t)1 << 24)
+#define TRUE_ROOM_LAST_FILE "report.json" /* written last, when all others are there */
 #define TRUE_ROOM_LEAST_COSINE 0.15f /* of a view's direction: pixels of surface that is seen flatly mix more of it */
 
 /* What objects.json says of the object that a segment is. */
@@ -230,7 +231,7 @@ static inline enum status true_room_save(const struct true_room *t, const char *
         status = true_room_write(t, out, "specular.exr", TRUE_ROOM_SPECULAR, err);
     if (status == STATUS_OK)
         status = true_room_write(t, out, "emission.exr", TRUE_ROOM_EMISSION, err);
-    static const char *const same[] = {"scene.ply", "views.json", "cameras.json", "report.json"};
+    static const char *const same[] = {"scene.ply", "views.json", "cameras.json", TRUE_ROOM_LAST_FILE};
     for (size_t i = 0; i < sizeof same / sizeof *same && status == STATUS_OK; i++)
         status = true_room_copy(outputs, out, same[i], err);
     image_release(&color);

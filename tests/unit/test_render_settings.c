@@ -103,6 +103,67 @@ static void test_faults(void) {
     CHECK(check_text("{\"environment\":\"../sky.hdr\"}", RENDER_FILES_ANYWHERE, NULL) == STATUS_OK);
 }
 
+/* The names of all problems, in their order, with spaces between; the caller's. */
+static char *names_of(cJSON *problems) {
+    char *names = mem_strdup("");
+    for (const cJSON *p = problems->child; p; p = p->next) {
+        char *more = mem_printf("%s%s%s", names, *names ? " " : "", cJSON_GetObjectItem(p, "name")->valuestring);
+        mem_free(names);
+        names = more;
+    }
+    cJSON_Delete(problems);
+    return names;
+}
+
+/* Settings that do not go together are told with those that are wrong by themselves; what one of these may have meant
+ * is not guessed. */
+static void test_faults_at_once(void) {
+    static const struct {
+        const char *settings, *names;
+    } bad[] = {
+        {"{\"nosie\":1,\"lamp.1.radius\":1,\"date\":\"2024-01-01\",\"path_count\":9,\"insert.2.scale\":2}",
+         "nosie date path_count lamp.1.kind insert.2.file"},
+        {"{\"environment\":\"sky\",\"date\":\"yesterday\",\"longitude\":8.5}", "date latitude"},
+        {"{\"environment\":7,\"date\":\"2024-01-01\"}", "environment"},
+        {"{\"lamp.1.kind\":\"tube\",\"lamp.1.size\":\"1,1\",\"lamp.2.kind\":\"spot\",\"lamp.2.position\":\"0\"}",
+         "lamp.1.kind lamp.2.position lamp.2.direction"},
+        {"{\"format\":\"jpg\",\"multilayer\":true,\"precision\":\"float\"}", "format"},
+    };
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        cJSON *problems = cJSON_CreateArray();
+        CHECK(check_text(bad[i].settings, RENDER_FILES_ATTACHED, problems) == STATUS_INPUT);
+        char *names = names_of(problems);
+        CHECK_STRING(names, bad[i].names);
+        mem_free(names);
+    }
+}
+
+/* Segments and views that the room has not, all of them; where a list is not known nothing is said. */
+static void test_room(void) {
+    cJSON *segments = parse("[{\"segment\":0,\"name\":null},{\"segment\":1,\"name\":\"door\"}]"),
+          *frames = parse("[{\"file_path\":\"images/7.png\"},{\"file_path\":\"a\"}]"), *problems = cJSON_CreateArray();
+    static const char bad[] = "{\"light.2\":\"off\",\"segment.1.roughness\":0.5,\"segment.9.emission\":\"1,1,1\","
+                              "\"remove\":\"0,door,dor,2\",\"view\":\"0,images/7.png,2,b\"}";
+    cJSON *settings = parse(bad);
+    struct error err;
+    CHECK(render_settings_check_room(settings, segments, frames, problems, &err) == STATUS_INPUT);
+    char *names = names_of(problems);
+    CHECK_STRING(names, "light.2 segment.9.emission remove remove view view");
+    mem_free(names);
+    CHECK(render_settings_check_room(settings, NULL, NULL, NULL, &err) == STATUS_OK);
+    CHECK(render_settings_name_segments(settings));
+    cJSON_Delete(settings);
+    settings = parse("{\"light.1\":\"off\",\"remove\":\"door\",\"path\":\"a,0\"}");
+    CHECK_THAT(render_settings_check_room(settings, segments, frames, NULL, &err) == STATUS_OK, "%s", err.message);
+    cJSON_Delete(settings);
+    settings = parse("{\"view\":\"all\"}");
+    CHECK(render_settings_check_room(settings, segments, frames, NULL, &err) == STATUS_OK);
+    CHECK(!render_settings_name_segments(settings));
+    cJSON_Delete(settings);
+    cJSON_Delete(segments);
+    cJSON_Delete(frames);
+}
+
 static void test_values(void) {
     cJSON *s =
         parse("{\"light.27\":\"2,1.8,1.2\",\"light.3\":\"off\",\"light.4\":0.5,\"lamp.2.position\":[1,2,3],"
@@ -150,6 +211,8 @@ int main(void) {
     test_table();
     test_good();
     test_faults();
+    test_faults_at_once();
+    test_room();
     test_values();
     test_assignments();
     return check_result();

@@ -101,7 +101,13 @@ static void check_settings(struct job_submission *s) {
     }
 }
 
-/* 409 where the state of what is read forbids the job. */
+static struct response *reply_invalid(struct job_submission *s) {
+    struct response *reply = problem_invalid(s->r, "the job is invalid", s->params);
+    s->params = NULL;
+    return reply;
+}
+
+/* 409 where the state of what is read forbids the job, 422 where a render's settings name what its room has not. */
 static struct response *check_states(struct job_submission *s) {
     struct error err;
     if (s->w.kind == JOB_RECONSTRUCT)
@@ -109,8 +115,8 @@ static struct response *check_states(struct job_submission *s) {
     if (store_source_look(s->api->store, s->source.id, &err) != STATUS_OK)
         return problem_from(s->r, &err);
     if (s->w.kind == JOB_RENDER) {
-        render_request_look(s->api, &s->render, s->source.id);
-        return NULL;
+        render_request_look(s->api, &s->render, s->source.id, s->params);
+        return cJSON_GetArraySize(s->params) > 0 ? reply_invalid(s) : NULL;
     }
     if (s->scene.state == SCENE_READY && !work_file_has_truth(s->api->config.data_dir, s->scene.id)) {
         error_set(&err, STATUS_CONFLICT, "scene %.12s has no truth to compare with", s->scene.id);
@@ -206,10 +212,8 @@ static struct response *check_submission(const struct request *r, bool *dry_run)
 static struct response *submit(struct job_submission *s, bool dry_run) {
     check_settings(s);
     struct response *reply = find_what_is_read(s);
-    if (!reply && cJSON_GetArraySize(s->params) > 0) {
-        reply = problem_invalid(s->r, "the job is invalid", s->params);
-        s->params = NULL;
-    }
+    if (!reply && cJSON_GetArraySize(s->params) > 0)
+        reply = reply_invalid(s);
     if (!reply)
         reply = check_states(s);
     if (!reply && !dry_run)

@@ -13,6 +13,7 @@
 #include "server/transport/problem.h"
 
 #define VIEWS "views.json"              /* the cameras of a reconstruction's held-out views, as an output */
+#define CAMERAS "cameras.json"          /* those of all photographs */
 #define REPORT "report.json"            /* what it found: its segments, and which of them emit */
 #define OUTPUT_LIMIT ((size_t)64 << 20) /* bytes of either */
 
@@ -103,18 +104,16 @@ static double count_family(const cJSON *settings, const char *family) {
 
 /* Pictures of a view: with per_light one of each source too, at most: of the emitters found, of those that the settings
  * add or light, of sky and sun. 0: not known. */
-static double count_pictures(struct api *api, const cJSON *settings, int64_t source) {
+static double count_pictures(const cJSON *settings, const cJSON *segments) {
+    const cJSON *segment;
+    double count = 0.0;
     if (!render_settings_bool(settings, "per_light"))
         return 1.0;
-    cJSON *report = read_output(api, source, REPORT);
-    const cJSON *segments = cJSON_GetObjectItemCaseSensitive(report, "segments"), *segment;
-    double count = 0.0;
     if (segments)
         count = 3.0 + count_family(settings, "segment.") + count_family(settings, "lamp.") +
                 count_family(settings, "insert.");
     cJSON_ArrayForEach(segment, segments)
         count += cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(segment, "emitter"));
-    cJSON_Delete(report);
     return count;
 }
 
@@ -126,14 +125,27 @@ static double cost_of(const cJSON *settings, const cJSON *frames) {
            render_settings_number(settings, "spp");
 }
 
-void render_request_look(struct api *api, struct render_request *q, int64_t source) {
-    cJSON *none = cJSON_CreateObject();
+/* The cameras that the settings mean; NULL: a file has them that is still to come. The caller's. */
+static cJSON *read_cameras(struct api *api, const cJSON *settings, int64_t source) {
+    if (render_settings_is(settings, "cameras", "held_out"))
+        return read_output(api, source, VIEWS);
+    return render_settings_is(settings, "cameras", "photographs") ? read_output(api, source, CAMERAS) : NULL;
+}
+
+void render_request_look(struct api *api, struct render_request *q, int64_t source, cJSON *params) {
+    cJSON *none = cJSON_CreateObject(), *problems = cJSON_CreateArray();
     const cJSON *settings = q->settings ? q->settings : none;
-    bool knows_cameras = render_settings_is(settings, "cameras", "held_out");
-    cJSON *views = knows_cameras ? read_output(api, source, VIEWS) : NULL;
-    q->cost =
-        cost_of(settings, cJSON_GetObjectItemCaseSensitive(views, "frames")) * count_pictures(api, settings, source);
+    bool needs_segments = render_settings_bool(settings, "per_light") || render_settings_name_segments(settings);
+    cJSON *views = read_cameras(api, settings, source);
+    cJSON *report = needs_segments ? read_output(api, source, REPORT) : NULL;
+    const cJSON *frames = cJSON_GetObjectItemCaseSensitive(views, "frames"),
+                *segments = cJSON_GetObjectItemCaseSensitive(report, "segments");
+    if (render_settings_check_room(settings, segments, frames, problems, NULL) != STATUS_OK)
+        job_request_faults(problems, params);
+    q->cost = cost_of(settings, frames) * count_pictures(settings, segments);
+    cJSON_Delete(report);
     cJSON_Delete(views);
+    cJSON_Delete(problems);
     cJSON_Delete(none);
 }
 
