@@ -8,7 +8,7 @@
 #include "common/buf.h"
 #include "common/json.h"
 
-#define MATRIX_MAX 1024 /* combinations: a slip of the pen is more */
+#define MATRIX_MAX 1024 /* combinations; more are probably a mistake */
 
 struct matrix_axis {
     char *key;     /* owned */

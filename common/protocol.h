@@ -7,20 +7,20 @@
 #define UNBAKE_VERSION "0.1.0"
 #define PROTOCOL_API "v1" /* the first part of every path; names and meanings in it only grow */
 
-/* Event types of GET /v1/jobs/{id}/events. */
 /* A webhook's secret as standardwebhooks.com writes it: this and the base64 of a key of so many bytes. The text of any
  * other secret is the key itself. */
 #define WEBHOOK_SECRET_PREFIX "whsec_"
 #define WEBHOOK_KEY_LEAST 24
 #define WEBHOOK_KEY_MOST 64
 
+/* Event types of GET /v1/jobs/{id}/events. */
 #define EVENT_STATE "state"
 #define EVENT_PROGRESS "progress"
 #define EVENT_METRIC "metric"
 #define EVENT_PREVIEW "preview"
 #define EVENT_OUTPUT "output"
 #define EVENT_LOG "log"
-#define EVENT_RESYNC "resync" /* events that the reader has not seen are gone: GET tells what is so */
+#define EVENT_RESYNC "resync" /* events that the reader has not seen are gone: it must GET the current state */
 
 /* Job states; see server/job/job.h for the diagram. */
 #define JOB_STATE_QUEUED "queued"
@@ -29,7 +29,7 @@
 #define JOB_STATE_SUCCEEDED "succeeded"
 #define JOB_STATE_FAILED "failed"
 #define JOB_STATE_CANCELLED "cancelled"
-#define JOB_WAITING_IN "waiting in " /* so begins the reason of one that is running and waits in a cluster's queue */
+#define JOB_WAITING_IN "waiting in " /* the reason of a running job that waits in a cluster's queue begins so */
 
 /* Kinds of jobs. */
 #define JOB_KIND_RECONSTRUCT "reconstruct"
@@ -44,9 +44,9 @@
 
 #define TUS_VERSION "1.0.0" /* of the protocol of /v1/uploads: tus.io */
 
-/* The field in which an `unbaked node` says which of them it is: random hex digits. */
-#define NODE_LOG_MAX 65536 /* bytes of a worker's log, its end, that a node sends */
-#define NODE_CLAIMANT_FIELD "Unbake-Claimant"
+#define NODE_CLAIMANT_FIELD                                                                                            \
+    "Unbake-Claimant"      /* header in which an `unbaked node` identifies itself: random hex digits */
+#define NODE_LOG_MAX 65536 /* bytes of the end of a worker's log that a node sends */
 
 #define MIME_JSON "application/json"
 #define MIME_PROBLEM "application/problem+json"

@@ -11,8 +11,8 @@
 
 #include "server/capture/robust.h"
 
-/* Half of a photograph, 0 or 1, in one of HALVES_SPLITS pseudo-random splits. */
-#define HALVES_SPLITS 32 /* +25 %: +0.01 dB */
+#define HALVES_SPLITS 32 /* pseudo-random ones; +25 %: +0.01 dB */
+/* Half of a photograph, 0 or 1, in split [0, HALVES_SPLITS). */
 int halves_of(uint32_t source, int split);
 
 /* Draws the error of the weighted mean of the samples. False, with *draw unchanged, where there is only one source or

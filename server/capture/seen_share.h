@@ -11,13 +11,13 @@ struct seen_share {
     double open;    /* share of the training photographs' pixels that meet no surface */
 };
 
-/* Looks at SEEN_SHARE_POINTS points, spread over the area. The same for any number of threads. */
-#define SEEN_SHARE_POINTS 4096 /* +25 %: no change */
+#define SEEN_SHARE_POINTS 4096 /* of the surface, spread over its area; +25 %: no change */
+/* By SEEN_SHARE_POINTS points. The same for any number of threads. */
 struct seen_share seen_share_measure(const struct views *views, struct parallel *pool);
 
+#define SEEN_SHARE_LEAST 0.1 /* share of the surface; +25 %: no change */
 /* STATUS_INPUT, with the likely reason, where nothing can be measured; and, unless `ignored`, less than
  * SEEN_SHARE_LEAST of the surface. */
-#define SEEN_SHARE_LEAST 0.1 /* +25 %: no change */
 enum status seen_share_require(const struct seen_share *share, bool ignored, struct error *err);
 
 #endif

@@ -6,10 +6,11 @@
 
 #define CHECK_OVERLAYS 6 /* photographs, spread over the capture */
 
-/* Writes the pictures into the folder `dir`, which exists, and appends {"name", "caption"} of each to the array
- * `previews`, in the order in which they are to be shown. `drawn` may be NULL. */
 /* Told when pictures are in the folder and in `previews`. */
 typedef void check_pictures_drawn(void *user);
+
+/* Writes the pictures into the folder `dir`, which exists, and appends {"name", "caption"} of each to the array
+ * `previews`, in the order in which they are to be shown. `drawn` may be NULL. */
 
 enum status check_pictures_write(const struct scene_check *room, const char *dir, struct parallel *pool,
                                  cJSON *previews, check_pictures_drawn *drawn, void *user, struct error *err);

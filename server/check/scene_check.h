@@ -5,6 +5,9 @@
 #include "server/check/fit.h"
 #include "server/ingest/bundle.h"
 
+/* Called when the bundle has been read, before it is judged; again where a remedy was taken. */
+typedef void scene_check_read(void *user, const struct scene *scene);
+
 struct scene_check {
     struct scene scene;
     struct accel *accel;    /* of the scene's mesh; owned */
@@ -14,14 +17,11 @@ struct scene_check {
     struct fit_result given; /* of the scene as it was given, where a remedy was taken */
     struct reading given_reading;
     double load_sec, fit_sec;
-    void (*read)(void *user, const struct scene *scene);
+    scene_check_read *read; /* may be NULL */
     void *user;
 };
 
-/* Told when the bundle is read, before it is judged; again where a remedy was taken. */
-typedef void scene_check_read(void *user, const struct scene *scene);
-
-/* As bundle_load; *room is the caller's (scene_check_release) in any case. Members of the reading that the user gave
+/* As bundle_load; *check is the caller's (scene_check_release) in any case. Members of the reading that the user gave
  * are never replaced: their remedy is only told. `read` may be NULL. */
 enum status scene_check(struct scene_check *check, const char *dir, const struct reading *reading,
                         const struct bundle_limits *limits, struct parallel *pool, cJSON *problems,

@@ -4,10 +4,9 @@
  * also object_id, -1 for background), summed over views:
  *
  *   base colour  10 log10(1 / mean squared error) over channels and pixels without an emitter or background sample,
- *                values clamped to [0, 1]; once over pixels all of whose samples are seen by a training view (seen.h;
- *                the headline figure), once over all
- *                and the ratio of the means of both over the seen ones: light is told from albedo only up to a factor
- *                and once more over the pixels of the next two lines
+ *                values clamped to [0, 1]: over pixels all of whose samples are seen by a training view (seen.h; the
+ *                headline figure), over all pixels, and over those of roughness and specular below. Also the ratio of
+ *                the means, recovered to true, over the seen pixels: light and albedo are ambiguous up to a factor
  *   roughness,   the same over seen pixels whose 3 x 3 neighbourhood is one object of the truth
  *   specular
  *   emission     intersection over union of the emitting pixels; mean over pixels and channels of

@@ -11,9 +11,9 @@
 #include "common/image.h"
 
 struct smooth_areas {
-    double render,
-        noise;    /* sums over pixels: MSRE of the re-renders, free of their noise, and of the photograph's noise */
-    size_t count; /* pixels */
+    double render; /* sum over pixels of the MSRE of the re-renders, free of their noise */
+    double noise;  /* the same of the photograph's noise */
+    size_t count;  /* pixels */
 };
 
 /* Adds the smooth areas of a view. All pictures are of one size: photograph and halves as in metrics.h, truth with

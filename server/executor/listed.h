@@ -17,9 +17,9 @@ struct listed_jobs {
     size_t count;
 };
 
-/* Takes the lines that look as site->status_line says and whose name begins with NAME_PREFIX. False where it is
- * garbage: there are lines, and none looks so. */
-#define NAME_PREFIX "unbake-"
+#define NAME_PREFIX "unbake-" /* of our jobs at the site */
+/* Takes the lines that match site->status_line and whose name begins with NAME_PREFIX. False where the text is garbage:
+ * there are lines, and none matches. */
 bool listed_read(struct listed_jobs *listing, const struct site *site, const char *text);
 void listed_release(struct listed_jobs *listing);
 /* NULL: the site does not know it. */

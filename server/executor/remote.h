@@ -6,9 +6,9 @@
  *
  * 1. The attempt's row (store/remote.h) is on disk before its submission is sent. Whether a submission has come
  *    through, its reply does not decide alone: a failed one is found by name in the site's listing, and repeated, under
- *    another name and token, only after ABSENT_MAX good listings without it.
+ *    another name and token, only after REMOTE_ABSENT_MAX good listings without it.
  * 2. A status command that fails, comes too late or says nothing that can be understood changes nothing.
- * 3. An attempt is lost when UNKNOWN_MAX listings in a row do not have it alive, and its node has been silent for one
+ * 3. An attempt is lost when REMOTE_UNKNOWN_MAX listings in a row do not have it alive, and its node has been silent for one
  *    and a half of its lease; both by a monotonic clock, which begins anew with the daemon. Then its row is closed,
  *    which shuts its node out, and only after its last writer has left it has ended.
  * 4. What the site has ended for its own reasons (pre-empted, out of time, a broken node), or started again, counts as
@@ -28,9 +28,9 @@
 #include "server/job/run.h"
 #include "server/store/store.h"
 
-#define REMOTE_UNKNOWN_MAX 3
-#define REMOTE_ABSENT_MAX 3
-#define REMOTE_TRIES_MAX 3 /* submissions that did not come through before it is given up, and the job waits for help */
+#define REMOTE_UNKNOWN_MAX 3 /* good listings in a row, as 3 says; by hand */
+#define REMOTE_ABSENT_MAX 3  /* good listings in a row, as 1 says; by hand */
+#define REMOTE_TRIES_MAX 3   /* failed submissions after which the attempt is given up and the job waits for help */
 
 struct remote_figures {
     atomic_ullong waiting, running;                      /* attempts at this moment */

@@ -59,7 +59,7 @@ struct export_input {
     const struct materials *materials;
     const float *observation_count;             /* [height][width] photographs of each texel; NULL until known */
     const bool *is_emitter;                     /* [segment_count] */
-    const struct image *environment;            /* R G B; NULL: no distant light; */
+    const struct image *environment;            /* R G B; NULL: no distant light */
     const struct image *environment_confidence; /* count, spread; NULL together with environment */
     size_t comparison_count;
     const struct export_comparison *comparison;

@@ -44,9 +44,9 @@ struct output_picture {
 /* Makes picture `index`, to be released by the caller. May be called by several threads at once. */
 typedef void output_make(const void *user, size_t index, struct image *image);
 
-/* Makes and writes picture[count] as PNG files, several at a time: as many as have OUTPUT_PICTURES_BYTES of pixels
- * together where each has `bytes` at most. They are listed and announced in their order. */
-#define OUTPUT_PICTURES_BYTES ((size_t)256 << 20)
+#define OUTPUT_PICTURES_BYTES ((size_t)256 << 20) /* of pixels, of pictures that are made at the same time */
+/* Makes and writes picture[count] as PNG files, several at a time: as many as fit into OUTPUT_PICTURES_BYTES where each
+ * has `bytes` at most. They are listed and announced in their order. */
 enum status output_files_pictures(struct output_files *f, const char *type, size_t count,
                                   const struct output_picture *picture, size_t bytes, output_make *make,
                                   const void *user, struct error *err);

@@ -29,8 +29,8 @@ struct listing {
     char **folder; /* [folder_count] bases, "" first, then the shallower first, then sorted; owned */
 };
 
+#define LISTING_MAX_DEPTH 8 /* folders below the root */
 /* Lists folder `root` down to LISTING_MAX_DEPTH. *l is the caller's (listing_release) in any case. */
-#define LISTING_MAX_DEPTH 8
 enum status listing_read(struct listing *l, const char *root, struct error *err);
 /* Of files in memory; copies the paths. */
 void listing_of_memory(struct listing *l, const struct listed_file *file, size_t count);

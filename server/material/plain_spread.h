@@ -15,9 +15,9 @@
 #include "server/scene/surface.h"
 #include "server/scene/texture.h"
 
+#define PLAIN_SPREAD_CELLS 32 /* fewer do not tell a median */
 /* The relative standard deviation, from the observed texels (observed[height][width] above 0: photographs that show it)
  * of segments that do not emit (is_emitter[segment_count]). NaN where fewer than PLAIN_SPREAD_CELLS cells tell it. */
-#define PLAIN_SPREAD_CELLS 32
 float plain_spread(const struct surface *surface, const struct texture *base_color, const float *observed,
                    const bool *is_emitter);
 

@@ -17,9 +17,9 @@ struct baked {
     uint32_t *part;         /* [height][width] number of the material, where valid; owned */
 };
 
+#define BAKE_MAX_SIZE 4096 /* texels a side */
 /* Of a mesh whose object_id are the look's materials. As fine as the pictures are on it, up to BAKE_MAX_SIZE a side;
  * STATUS_INPUT: the mesh is in more pieces than that holds. */
-#define BAKE_MAX_SIZE 4096
 enum status bake_make(const struct mesh *mesh, const struct mesh_look *look, struct parallel *pool, struct baked *baked,
                       struct error *err);
 void bake_release(struct baked *baked);

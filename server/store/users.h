@@ -49,8 +49,8 @@ enum status store_scene_access(struct store *store, const struct caller *who, co
 /* Whether a user exists or ever did: from then on every caller needs a token. */
 bool store_has_users(struct store *store);
 
-/* Makes a token that ends at expires_ms (0: never), and the user if the name is new: 1 to 64 letters, digits
- * and . _ - @. STATUS_INPUT where that time is past. */
+/* Makes a token that ends at expires_ms (0: never), and the user if the name is new: 1 to 64 letters, digits and
+ * the characters . _ - @. STATUS_INPUT where that time is past. */
 enum status store_token_add(struct store *store, const char *name, enum role role, int64_t expires_ms,
                             char token[TOKEN_SIZE], int64_t *id, struct error *err);
 /* The caller that presents this token; STATUS_CONFLICT where it has expired, which only its secret is told;
