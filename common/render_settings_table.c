@@ -66,6 +66,8 @@ static const struct render_setting table[] = {
     {"lights", RENDER_CHOICE, "", 0, 0, 0, "on|off", "on",
      "whether the room's emitters shine; light.27 says otherwise of one"},
     {"longitude", RENDER_REAL, "degrees", -180, 180, 0, NULL, "", "environment=sky: east of Greenwich"},
+    {"look_in", RENDER_BOOL, "", 0, 0, 0, NULL, "false",
+     "the backs of surfaces are not shown, so that a camera outside looks into the room; light does not pass them"},
     {"luminance_per_unit", RENDER_REAL, "cd/m2", 0, 1e9, 0, NULL, "0",
      "luminance of radiance 1, which makes light absolute; 0: what the reconstruction's report says, where it knows"},
     {"max_depth", RENDER_INT, "segments", 1, 32, 0, NULL, "16", "longest path from the camera"},

@@ -302,6 +302,7 @@ static void shape(const cJSON *settings, struct cameras *v) {
             make_panorama(&v->compass, width, height, &v->view[i].camera);
         else if (is_sized)
             camera_resize(&v->view[i].camera, width, height);
+        v->view[i].camera.looks_in = render_settings_bool(settings, "look_in");
     }
 }
 

@@ -1,6 +1,7 @@
 /* film.c -- see film.h. A work item is a row of pixels. */
 #include "server/render/film.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -9,6 +10,7 @@
 #include "server/scene/surface.h"
 
 #define BATCH 1024
+#define PASSED_SHARE 0x1p-16f /* of a distance: more than its rounding, as in accel_offset */
 
 /* Channels of the picture. */
 enum film_kind {
@@ -37,6 +39,16 @@ struct film_slot {
     rgb *sum;    /* [width][FILM_GROUPS] */
     rgb *direct; /* [width] the same over all groups */
 };
+
+/* Distance of the last back that a ray of a camera that looks in passes before it meets a front; 0 of others. */
+static float first_front(const struct film *f, vec3 origin, vec3 direction) {
+    float near_m = 0.0f;
+    struct accel_hit hit;
+    while (f->camera->looks_in && accel_intersect(f->world->accel, origin, direction, near_m, INFINITY, &hit) &&
+           vec3_dot(f->world->triangle[hit.triangle].normal, direction) > 0.0f)
+        near_m = hit.distance_m * (1.0f + PASSED_SHARE) + FLT_MIN;
+    return near_m;
+}
 
 static void trace(struct film *f, struct film_slot *s, size_t count) {
     path_batch_trace(s->batch, f->world, f->settings, count, s->ray, s->key, s->radiance);
@@ -97,11 +109,13 @@ static void render_row(void *user, size_t row, int thread) {
             struct path_key key = {y * width + x, f->iteration * FILM_GROUPS + i / f->spp, i % f->spp};
             uint32_t stream = sampler_key(f->settings->seed, key.index, key.iteration);
             vec2 jitter = sampler_pair(stream, key.sample, 0);
-            s->ray[count].origin = origin;
+            struct ray *ray = &s->ray[count];
             s->key[count] = key;
             s->pixel[count] = x;
-            if (camera_direction(f->camera, (float)x + jitter.x, (float)y + jitter.y, &s->ray[count].direction))
+            if (camera_direction(f->camera, (float)x + jitter.x, (float)y + jitter.y, &ray->direction)) {
+                ray->origin = vec3_mad(origin, first_front(f, origin, ray->direction), ray->direction);
                 count++;
+            }
             if (count == BATCH) {
                 trace(f, s, count);
                 count = 0;
@@ -228,7 +242,7 @@ static void first_hit_row(void *user, size_t row, int thread) {
             vec3 direction;
             struct accel_hit hit;
             if (!camera_direction(f->camera, (float)x + jitter.x, (float)y + jitter.y, &direction) ||
-                !accel_intersect(f->world->accel, origin, direction, 0.0f, INFINITY, &hit))
+                !accel_intersect(f->world->accel, origin, direction, first_front(f, origin, direction), INFINITY, &hit))
                 continue;
             bool is_panorama = f->camera->model == CAMERA_PANORAMA;
             float along = is_panorama ? 1.0f : rigid_direction(&f->camera->camera_from_world, direction).z;

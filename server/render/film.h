@@ -11,7 +11,10 @@
 #include "server/scene/camera.h"
 
 #define FILM_GROUPS 4 /* of the samples of a pixel, from whose means its standard error is estimated */
-/* Renders `spp` paths per pixel, jittered over the pixel (box filter), into a new image of channels R G B and err.R
+
+/* Of a camera that looks in (camera.h), rays pass the backs of surfaces up to the first front; light does not.
+ *
+ * Renders `spp` paths per pixel, jittered over the pixel (box filter), into a new image of channels R G B and err.R
  * err.G err.B: the mean and its standard error, estimated from FILM_GROUPS independent groups of samples (spp is
  * rounded up to a multiple; each group is stratified). Renders of different `iteration` are independent. Returns the
  * number of non-finite samples dropped. Pixels without a direction (lens model) stay 0. The result does not depend on

@@ -36,6 +36,7 @@ struct camera {
     float p[2];             /* tangential; OPENCV and THIN_PRISM_FISHEYE */
     float s[2];             /* thin prism; THIN_PRISM_FISHEYE only */
     float fold;             /* set by camera_find_fold, see there; 0: no limit */
+    bool looks_in;          /* its pictures (film.h) do not show the backs of surfaces: from outside, a room's inside */
     struct rigid camera_from_world, world_from_camera;
 };
 

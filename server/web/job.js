@@ -47,7 +47,7 @@ export class JobView {
     this.room = null;
     this.roomRender = null;
     this.slider = new Slider(this.at("compare"));
-    this.mixer = new Mixer(this.at("mixer"), this.server, () => (this.room?.mesh ? this.room.frame() : null), goTo);
+    this.mixer = new Mixer(this.at("mixer"), this.server, () => (this.room?.mesh ? { frame: this.room.frame(), look: this.room.look() } : null), goTo);
     this.at("again").addEventListener("click", () => go({ scene: this.server.jobs.get(this.id).scene, like: this.id }));
     this.at("close").addEventListener("click", () => go({ [this.slot]: null }));
     this.at("log-details").addEventListener("toggle", () => this.showLog());

@@ -15,7 +15,7 @@ const strength = (row) => 2 ** Number(row.querySelector("input[type=range]").val
 const shown = (factor) => `× ${factor < 10 ? factor.toFixed(2) : factor.toFixed(1)}`;
 
 export class Mixer {
-  // server: {me, jobs}; camera(): the frame of the room as it is seen in three dimensions, or null; whenStarted(job)
+  // server: {me, jobs}; camera(): {frame, look} of the room as it is seen in three dimensions, or null; whenStarted(job)
   constructor(root, server, camera, whenStarted) {
     Object.assign(this, { root, server, camera, whenStarted, frames: [] });
     this.at = (name) => root.querySelector(`.mixer-${name}`);
@@ -75,13 +75,13 @@ export class Mixer {
   }
 
   async make(isSmall) {
-    const { value } = this.at("view"), isOwn = value === "room", frame = isOwn ? this.camera() : this.frames[Number(value)];
+    const { value } = this.at("view"), isOwn = value === "room", seen = isOwn ? this.camera() : null, frame = isOwn ? seen?.frame : this.frames[Number(value)];
     this.isAsked = true;
     this.at("small").disabled = this.at("large").disabled = true;
     try {
       if (!frame) throw new Error(isOwn ? "The room is not shown yet." : "There is no photograph to look from.");
       const size = sizeOf(frame, isSmall ? SMALL_WIDTH : LARGE_WIDTH), own = isOwn ? frame : null;
-      const settings = { per_light: true, precision: "half", size, ...(isOwn ? {} : { view: value }) };
+      const settings = { per_light: true, precision: "half", size, ...(isOwn ? seen.look : { view: value }) };
       const all = isSmall ? await inLane(this.source, settings, own) : { ...settings, spp: LARGE_SPP };
       const started = await startRender(this.source, `${this.job.name}, each light`, all, own);
       this.server.jobs.set(started.id, started);

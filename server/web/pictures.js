@@ -6,7 +6,8 @@ import { load } from "./ask.js";
 
 // --- photograph and re-render -----------------------------------------------------------------
 
-const GAP = 4; // pixels between the pictures
+const GAP = 4;      // pixels between the pictures
+const SHARP = 1000; // pixels that the canvas has across at least
 
 // compare/NNN.png is photograph | re-render | difference, side by side (server/export/pictures.c).
 export class Slider {
@@ -22,8 +23,9 @@ export class Slider {
     this.view.addEventListener("change", () => this.open());
     const drag = (event) => {
       if (event.buttons !== 1) return;
-      const box = this.canvas.getBoundingClientRect();
-      this.range.value = 100 * (event.clientX - box.left) / box.width;
+      const box = this.canvas.getBoundingClientRect(), { width, height } = this.canvas;
+      const shown = Math.min(box.width, box.height * width / height); // beside it there may be margins
+      this.range.value = 50 + 100 * (event.clientX - box.left - box.width / 2) / shown;
       this.draw();
     };
     this.canvas.addEventListener("pointerdown", drag);
@@ -54,16 +56,17 @@ export class Slider {
   draw() {
     const width = Math.floor((this.image.naturalWidth - 2 * GAP) / 3), height = this.image.naturalHeight;
     if (!width) return;
-    Object.assign(this.canvas, { width, height });
+    const scale = Math.max(1, Math.ceil(SHARP / width)); // the line between them is thin in small pictures, too
+    Object.assign(this.canvas, { width: scale * width, height: scale * height });
     const paint = this.canvas.getContext("2d"), cut = Math.round(width * this.range.value / 100);
     const panel = (at, from, to) => {
       if (to > from)
-        paint.drawImage(this.image, at * (width + GAP) + from, 0, to - from, height, from, 0, to - from, height);
+        paint.drawImage(this.image, at * (width + GAP) + from, 0, to - from, height, scale * from, 0, scale * (to - from), scale * height);
     };
     panel(0, 0, cut);
     panel(this.difference.checked ? 2 : 1, cut, width);
     paint.fillStyle = "#fff";
-    paint.fillRect(cut - 1, 0, 2, height);
+    paint.fillRect(scale * cut - 1, 0, 2, scale * height);
     this.canvas.ariaLabel = `${Math.round(100 - this.range.value)} % ${this.difference.checked ? "difference" : "re-render"}, ` +
       "the rest the photograph";
   }

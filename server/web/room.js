@@ -136,6 +136,9 @@ export class Room {
       transform_matrix: [0, 1, 2, 3].map((row) => [e[row], e[row + 4], e[row + 8], e[row + 12]]) };
   }
 
+  // A render shows no more than is shown: no backs of surfaces.
+  look() { return this.at("open").checked ? { look_in: true } : {}; }
+
   get isOutside() { return !this.walk.isWalking; }
 
   hidden() { return [...Array(this.mesh.segmentCount).keys()].filter((segment) => this.mesh.get(segment, 0) !== 0); }

@@ -27,10 +27,10 @@ export class RoomRender {
   async small() {
     const hidden = this.room.hidden();
     this.frame = this.room.frame();
-    this.without = hidden.length > 0 ? { remove: hidden.join(",") } : {};
+    this.as = { ...this.room.look(), ...(hidden.length > 0 ? { remove: hidden.join(",") } : {}) };
     this.about = hidden.length > 0 ? `, without what is hidden (${hidden.length})`
-      : this.room.isOutside ? ". From outside one sees the backs of walls: hide some, or walk through the room" : "";
-    const settings = await inLane(this.job.id, { size: sizeOf(this.frame, SMALL_WIDTH), ...this.without }, this.frame);
+      : this.room.isOutside && !this.as.look_in ? ". From outside one sees the backs of walls: look in from outside, or walk through the room" : "";
+    const settings = await inLane(this.job.id, { size: sizeOf(this.frame, SMALL_WIDTH), ...this.as }, this.frame);
     this.render = await startRender(this.job.id, `${this.job.name}, a look`, settings, this.frame);
     this.server.jobs.set(this.render.id, this.render);
     this.update();
@@ -38,7 +38,7 @@ export class RoomRender {
 
   async large() {
     const { w, h } = this.frame;
-    const job = await startRender(this.job.id, `${this.job.name}, a view`, { size: `${w}x${h}`, spp: LARGE_SPP, ...this.without },
+    const job = await startRender(this.job.id, `${this.job.name}, a view`, { size: `${w}x${h}`, spp: LARGE_SPP, ...this.as },
       this.frame);
     this.server.jobs.set(job.id, job);
     this.whenStarted(job);

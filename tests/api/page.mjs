@@ -256,15 +256,42 @@ async function resumeUpload(files) {
 
 // --- the room ---------------------------------------------------------------------------------
 
-// The picture from where the room is looked at shows what the room in three dimensions shows: the camera is inside.
+// Code values of red, in the page.
+const meanOfImage = (image) => {
+  const canvas = new OffscreenCanvas(image.naturalWidth, image.naturalHeight), paint = canvas.getContext("2d");
+  paint.drawImage(image, 0, 0);
+  const { data } = paint.getImageData(0, 0, canvas.width, canvas.height);
+  return data.reduce((sum, x, i) => sum + (i % 4 === 0 ? x : 0), 0) / (data.length / 4);
+};
+
+// The line between photograph and re-render is where it is drawn to, also where there are margins beside the pictures.
+async function dragLine() {
+  const page = await open("#job=1", { width: 1200, height: 500 });
+  await page.waitForFunction(() => document.querySelector("#job .compare canvas")?.width >= 1000);
+  const found = await page.$eval("#job .compare", (figure) => {
+    const canvas = figure.querySelector("canvas"), box = canvas.getBoundingClientRect();
+    const shown = Math.min(box.width, box.height * canvas.width / canvas.height), clientX = box.left + (box.width - shown) / 2 + shown / 4;
+    canvas.dispatchEvent(new PointerEvent("pointerdown", { buttons: 1, clientX }));
+    return { value: Number(figure.querySelector("input").value), margin: (box.width - shown) / 2 };
+  });
+  check(found.margin > 50 && found.value === 25, `the line: ${JSON.stringify(found)}`);
+  await page.close();
+}
+
+// The picture from where the room is looked at shows what the room in three dimensions shows; when one walks, the camera is
+// inside.
 async function renderFromRoom() {
   const page = await open("#job=1");
   await page.waitForFunction(() => document.querySelectorAll("#job .room-segment option").length > 1);
-  await page.click("#job .room-walk");
   await page.$eval("#job .view-small", (button) => button.click());
   await page.waitForSelector("#job .view-figure:not([hidden])", { timeout: 60000 });
+  check(await page.$eval("#job .view-image", meanOfImage) > 20, "from outside one does not look into the room");
+  await page.click("#job .room-walk");
+  await page.$eval("#job .view-small", (button) => button.click());
+  await page.waitForFunction((before) => document.querySelector("#job .view-caption").textContent !== before, { timeout: 60000 },
+    await page.$eval("#job .view-caption", (caption) => caption.textContent));
   const looks = (await get("jobs?kind=render")).items.filter(({ name }) => name.endsWith(", a look"));
-  check(looks.length === 1 && looks[0].settings.cameras === "view.json", `the looks: ${JSON.stringify(looks)}`);
+  check(looks.length === 2 && looks[0].settings.cameras === "view.json", `the looks: ${JSON.stringify(looks)}`);
   const { frames } = await get(`jobs/${looks[0].id}/outputs/views.json`), m = frames[0].transform_matrix;
   check([0, 1, 2].every((r) => Math.abs(m[r][3]) < 0.1), `it looks from ${JSON.stringify(m)}, not from the room's middle`);
   check(Math.abs(m[1][1] - 1) < 1e-3, `the camera is not upright: ${JSON.stringify(m)}`);
@@ -294,6 +321,7 @@ await compareSum(page);
 await page.close();
 await mixLights();
 await failLights();
+await dragLine();
 await renderFromRoom();
 await browser.close();
 process.exit(faults > 0 ? 1 : 0);

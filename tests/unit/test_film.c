@@ -1,6 +1,6 @@
 /* film.h, light.h: what is no number goes nowhere. Non-finite samples count as black, are counted, and spoil no other
  * pixel; pixels of the environment that are not finite, or negative, are black to what looks at it and to what samples
- * it. */
+ * it. A camera that looks in sees no backs. */
 #include "server/render/film.h"
 #include "server/scene/latlong.h"
 #include "tests/unit/plane_rig.h"
@@ -84,6 +84,48 @@ static void test_halves(void) {
     plane_rig_release(&rig);
 }
 
+/* The share of a camera's pixels that the plane covers, and its picture's mean. */
+static void look(const struct plane_rig *rig, const struct camera *camera, double *covered, double *mean) {
+    struct path_settings path = {.max_depth = 3, .roulette_depth = 3, .seed = 1};
+    struct image image, first;
+    film_render(&rig->r.world, camera, 4, &path, 0, rig->pool, &image);
+    film_render_first_hits(&rig->r.world, camera, 4, 1, rig->pool, &first);
+    int coverage = image_channel(&first, "coverage");
+    *covered = *mean = 0.0;
+    for (size_t i = 0; i < PLANE_PIXELS * PLANE_PIXELS; i++) {
+        *covered += (double)first.pixel[i * first.channel_count + (size_t)coverage] / (PLANE_PIXELS * PLANE_PIXELS);
+        *mean += (double)image.pixel[i * image.channel_count] / (PLANE_PIXELS * PLANE_PIXELS);
+    }
+    image_release(&image);
+    image_release(&first);
+}
+
+/* What looks in sees fronts as before, and through the backs of surfaces. */
+static void test_looks_in(void) {
+    struct plane_rig rig;
+    struct image sky;
+    rgb black = {0.0f, 0.0f, 0.0f};
+    plane_rig_init(&rig, 2, 1);
+    make_sky(&sky);
+    world_set_environment(&rig.r.world, &sky, rig.pool);
+    for (int side = -1; side <= 1; side += 2) {
+        vec3 from = {0.0f, 0.0f, 3.0f * (float)side};
+        struct camera camera = plane_rig_add(&rig, from, (vec3){0, 0, 0}, 0.2f, plane_paint_one, &black)->camera;
+        double covered[2], mean[2];
+        for (int k = 0; k < 2; k++) {
+            camera.looks_in = k == 1;
+            look(&rig, &camera, &covered[k], &mean[k]);
+        }
+        CHECK(covered[0] > 0.2);
+        CHECK(side > 0 ? covered[1] == covered[0] && mean[1] == mean[0] : covered[1] == 0.0);
+        if (side < 0)
+            CHECK_NEAR(mean[1], (double)RADIANCE, 1e-6);
+    }
+    image_release(&sky);
+    views_init(&rig.views, &rig.scene, &rig.r.segments, rig.r.world.accel, rig.pool);
+    plane_rig_release(&rig);
+}
+
 static void test_environment(void) {
     static const float wrong[] = {NAN, INFINITY, -INFINITY, -3.0f};
     struct image sky;
@@ -115,6 +157,7 @@ static void test_environment(void) {
 int main(void) {
     test_dropped();
     test_halves();
+    test_looks_in();
     test_environment();
     return check_result();
 }
