@@ -4,12 +4,14 @@
 #include <errno.h>
 #include <poll.h>
 #include <pthread.h>
+#include <string.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/time.h>
 #include <unistd.h>
 
+#include "common/file.h"
 #include "common/mem.h"
 #include "server/admin/admin_request.h"
 #include "server/admin/admin_wire.h"
@@ -162,17 +164,29 @@ static enum status ask_daemon(int socket_fd, const cJSON *request, cJSON **reply
     return status;
 }
 
-/* Root acts as the folder's owner; otherwise the daemon could not open the files made. */
-static enum status become_owner(const char *dir, struct error *err) {
-    struct stat info;
-    if (geteuid() != 0)
-        return STATUS_OK;
-    if (stat(dir, &info) != 0) { /* the owner of a new folder is unknown */
+/* Whether it is a daemon's data folder. A token may be made before the daemon's first start; all else asks for what a
+ * daemon has left, and must not make an empty database where the folder is the wrong one. */
+static enum status check_folder(const char *dir, const cJSON *request, struct stat *info, struct error *err) {
+    const char *command = cJSON_GetStringValue(cJSON_GetObjectItem(request, "command"));
+    if (stat(dir, info) != 0) { /* whose a new folder would be is unknown */
         error_set_errno(err, errno, "cannot look at the data folder %s", dir);
-        return error_hint(err, "start the daemon once, or make the folder for its user");
+        return error_hint(err,
+                          "--data DIR or --config FILE names the daemon's; or start the daemon once, or make the folder"
+                          " for its user");
     }
-    if (info.st_uid == 0)
+    bool is_first = command && strcmp(command, "token-add") == 0;
+    if (is_first || file_is_in(dir, LAYOUT_STATE))
         return STATUS_OK;
+    error_set(err, STATUS_NOT_FOUND, "%s is not a data folder: it has no " LAYOUT_STATE, dir);
+    return error_hint(err, "--data DIR or --config FILE names the daemon's");
+}
+
+/* Root acts as the folder's owner; otherwise the daemon could not open the files made. */
+static enum status become_owner(const char *dir, const cJSON *request, struct error *err) {
+    struct stat info;
+    enum status status = check_folder(dir, request, &info, err);
+    if (status != STATUS_OK || geteuid() != 0 || info.st_uid == 0)
+        return status;
     if (setegid(info.st_gid) == 0 && seteuid(info.st_uid) == 0)
         return STATUS_OK;
     return error_set_errno(err, errno, "cannot act as the owner of %s", dir);
@@ -181,7 +195,7 @@ static enum status become_owner(const char *dir, struct error *err) {
 static enum status do_alone(const char *data_dir, const cJSON *request, cJSON **reply, int *fd, struct error *err) {
     struct store *store = NULL;
     int lock_fd = -1;
-    enum status status = become_owner(data_dir, err);
+    enum status status = become_owner(data_dir, request, err);
     if (status == STATUS_OK)
         status = folder_lock(data_dir, &lock_fd, err);
     if (status == STATUS_CONFLICT)
@@ -191,6 +205,7 @@ static enum status do_alone(const char *data_dir, const cJSON *request, cJSON **
     if (status == STATUS_OK) {
         *reply = cJSON_CreateObject();
         status = admin_request_do(data_dir, store, request, *reply, fd, err);
+        json_add_bool(*reply, "daemon_runs", false);
     }
     store_close(store);
     if (lock_fd >= 0)

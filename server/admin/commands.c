@@ -48,11 +48,11 @@ int command_begin(const char *file, struct invocation *in, int argc, char **argv
     return code;
 }
 
-/* Asks the daemon, and prints its reply as JSON where that is asked for, else by print(action, reply). The end of a
+/* Asks the daemon, and prints its reply as JSON where that is asked for, else by print(in, reply). The end of a
  * command, whose `code` is not below 0 where it has failed already: frees `request` and *in, returns the exit
  * status. */
-static int ask(int code, struct invocation *in, cJSON *request, void print(const char *action, const cJSON *reply),
-               const char *action) {
+static int ask(int code, struct invocation *in, cJSON *request,
+               void print(const struct invocation *in, const cJSON *reply)) {
     struct error err;
     cJSON *reply = NULL;
     int fd;
@@ -63,7 +63,7 @@ static int ask(int code, struct invocation *in, cJSON *request, void print(const
         printf("%s\n", text);
         mem_free(text);
     } else if (code < 0) {
-        print(action, reply);
+        print(in, reply);
     }
     cJSON_Delete(request);
     cJSON_Delete(reply);
@@ -116,11 +116,14 @@ static bool read_expiry(const char *text, int64_t *expires_ms) {
     return *expires_ms > 0;
 }
 
-static void print_token_reply(const char *action, const cJSON *reply) {
+static void print_token_reply(const struct invocation *in, const cJSON *reply) {
+    const char *action = in->arguments.word[0];
     if (strcmp(action, "list") == 0) {
         print_tokens(cJSON_GetObjectItem(reply, "items"));
     } else if (strcmp(action, "add") == 0) {
-        fputs("This is shown once; whoever has it is this user:\n", stderr);
+        bool is_alone = cJSON_IsFalse(cJSON_GetObjectItem(reply, "daemon_runs"));
+        fprintf(stderr, "This is shown once; whoever has it is user %s of the data folder %s%s:\n",
+                in->arguments.word[1], in->config.data_dir, is_alone ? ", on which no daemon runs now" : "");
         printf("%s\n", cJSON_GetStringValue(cJSON_GetObjectItem(reply, "token")));
     } else {
         printf("revoked: %d\n", cJSON_GetObjectItem(reply, "count")->valueint);
@@ -163,7 +166,7 @@ int token_command(int argc, char **argv) {
         json_add_string(request, "role", invocation_value(&in, "role", "user"));
         json_add_int(request, "expires_ms", expires_ms);
     }
-    return ask(code, &in, request, print_token_reply, action);
+    return ask(code, &in, request, print_token_reply);
 }
 
 /* --- usage --------------------------------------------------------------------------------- */
@@ -182,9 +185,9 @@ static void print_field(const char *text) {
         putchar('"');
 }
 
-static void print_usage(const char *action, const cJSON *reply) {
+static void print_usage(const struct invocation *in, const cJSON *reply) {
     const cJSON *item;
-    (void)action;
+    (void)in;
     puts("month,user,cpu_hours");
     cJSON_ArrayForEach(item, cJSON_GetObjectItem(reply, "items")) {
         const char *month = "", *user = "";
@@ -203,7 +206,7 @@ int usage_command(int argc, char **argv) {
     cJSON *request = cJSON_CreateObject();
     int code = command_begin(CONFIG_FILE_DEFAULT, &in, argc, argv, usage_flags, 0, 0);
     json_add_string(request, "command", "usage");
-    return ask(code, &in, request, print_usage, "");
+    return ask(code, &in, request, print_usage);
 }
 
 /* --- check-config -------------------------------------------------------------------------- */

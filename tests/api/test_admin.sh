@@ -14,9 +14,16 @@ refused() { # WANTED-STATUS PART-OF-THE-MESSAGE COMMAND...
 }
 
 # --- tokens without a daemon ---
-[ "$(id -u)" -ne 0 ] || refused 1 "make the folder for its user" unbaked token add alice --data "$data"
+refused 1 "make the folder for its user" unbaked token add alice --data "$data"
 mkdir -m 750 "$data"
+# Nothing is made of a folder that is not a daemon's.
+for command in "token list" "token revoke alice" usage "backup $work/none.db"; do
+    # shellcheck disable=SC2086
+    refused 1 "$data is not a data folder: it has no state.db" unbaked $command --data "$data"
+done
+equal "$(ls -A "$data")" "" "what refused commands leave"
 alice=$(unbaked token add alice --data "$data") || fail "token add: $(cat "$work/err")"
+grep -qF "user alice of the data folder $data, on which no daemon runs now:" "$work/err" || fail "token add says: $(cat "$work/err")"
 [[ $alice =~ ^unbake_1_[0-9a-f]{48}$ ]] || fail "the token is '$alice'"
 equal "$(unbaked token list --data "$data" | awk 'NR > 1 {print $1, $2, $3}')" "1 alice user" "token list"
 refused 2 'there is no role "king"' unbaked token add bob --role king --data "$data"
