@@ -80,7 +80,8 @@ static enum status pick(cJSON *items, const struct options *o, struct error *err
         if (found)
             continue;
         error_set(err, STATUS_INPUT, "there is no setting \"%.100s\"", o->word[w]);
-        return nearest.best ? error_hint(err, "did you mean %s?", nearest.best) : STATUS_INPUT;
+        return nearest.best ? error_hint(err, "did you mean %s?", nearest.best)
+                            : error_hint(err, "`unbake settings` lists them");
     }
     for (int i = cJSON_GetArraySize(items); o->word_count && i-- > 0;) {
         bool named = false;

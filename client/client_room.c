@@ -72,7 +72,7 @@ static enum status measure(struct client_room *room, const char *path, struct er
     enum status status = pack_open(&room->pack, path, err);
     if (status == STATUS_NOT_FOUND || status == STATUS_INPUT) {
         err->status = STATUS_INPUT;
-        return error_hint(err, "ROOM is a folder or an archive");
+        return *err->hint ? STATUS_INPUT : error_hint(err, "ROOM is a folder or an archive");
     }
     if (status != STATUS_OK)
         return status;

@@ -56,6 +56,13 @@ static int by_name(const void *a, const void *b) {
     return strcmp(((const struct pack_entry *)a)->name, ((const struct pack_entry *)b)->name);
 }
 
+/* What stat cannot reach: the name was just listed, so what is not there is what a link leads to. */
+static enum status refuse_entry(const char *path, int number, struct error *err) {
+    error_set_errno(err, number, "cannot look at %s", path);
+    return number == ENOENT ? error_hint(err, "it is a link to what is not there: remove it, or put that in its place")
+                            : err->status;
+}
+
 /* Adds the files under `folder`; their names in the archive begin with `prefix`. */
 static enum status list_folder(struct pack *p, const char *folder, const char *prefix, int depth, struct error *err) {
     if (depth > DEEPEST)
@@ -70,7 +77,7 @@ static enum status list_folder(struct pack *p, const char *folder, const char *p
         char *name = mem_printf("%s%s", prefix, names[i]);
         struct stat info;
         if (stat(path, &info) != 0)
-            status = error_set_errno(err, errno, "cannot look at %s", path);
+            status = refuse_entry(path, errno, err);
         else if (S_ISREG(info.st_mode))
             add_entry(p, name, (uint64_t)info.st_size);
         else if (S_ISDIR(info.st_mode)) {

@@ -11,21 +11,24 @@ static size_t least(size_t a, size_t b, size_t c) {
     return least_two < c ? least_two : c;
 }
 
-/* Levenshtein distance of words of at most LENGTH_MAX bytes, one row of its table at a time. */
+/* Levenshtein distance of words of at most LENGTH_MAX bytes in which two neighbours that were swapped count as one edit
+ * (optimal string alignment, Damerau 1964). Three rows of its table are kept. */
 static size_t distance(const char *a, const char *b) {
-    size_t row[LENGTH_MAX + 1], length = strlen(b);
+    size_t rows[3][LENGTH_MAX + 1], length = strlen(b), i;
     for (size_t j = 0; j <= length; j++)
-        row[j] = j;
-    for (size_t i = 1; a[i - 1]; i++) {
-        size_t diagonal = row[0];
+        rows[0][j] = j;
+    for (i = 1; a[i - 1]; i++) {
+        size_t *row = rows[i % 3];
+        const size_t *above = rows[(i - 1) % 3], *swapped = rows[(i + 1) % 3]; /* one row and two rows before */
         row[0] = i;
         for (size_t j = 1; j <= length; j++) {
-            size_t changed = diagonal + (a[i - 1] != b[j - 1]);
-            diagonal = row[j];
-            row[j] = least(changed, row[j] + 1, row[j - 1] + 1);
+            row[j] = least(above[j - 1] + (a[i - 1] != b[j - 1]), above[j] + 1, row[j - 1] + 1);
+            bool is_swap = i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1];
+            if (is_swap && swapped[j - 2] + 1 < row[j])
+                row[j] = swapped[j - 2] + 1;
         }
     }
-    return row[length];
+    return rows[(i - 1) % 3][length];
 }
 
 void nearest_init(struct nearest *n, const char *typed) { *n = (struct nearest){.typed = typed}; }

@@ -30,16 +30,18 @@ static void offer(struct nearest *nearest, const struct command_option *table) {
 
 static enum status unknown(const char *argument, const struct command_option *own, const struct command_option *shared,
                            struct error *err) {
-    if (argument[1] != '-')
-        return error_set(err, STATUS_INPUT, "unknown option -%c", argument[1]);
+    if (argument[1] != '-') {
+        error_set(err, STATUS_INPUT, "unknown option -%c", argument[1]);
+        return error_hint(err, "--help lists the options");
+    }
     char *name = mem_strndup(argument + 2, strcspn(argument + 2, "="));
     struct nearest nearest;
     nearest_init(&nearest, name);
     offer(&nearest, own);
     offer(&nearest, shared);
-    enum status status = error_set(err, STATUS_INPUT, "unknown option --%s", name);
-    if (nearest.best)
-        status = error_hint(err, "did you mean --%s?", nearest.best);
+    error_set(err, STATUS_INPUT, "unknown option --%s", name);
+    enum status status = nearest.best ? error_hint(err, "did you mean --%s?", nearest.best)
+                                      : error_hint(err, "--help lists the options");
     mem_free(name);
     return status;
 }

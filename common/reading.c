@@ -165,7 +165,7 @@ enum status reading_parse(const cJSON *json, struct reading *reading, struct err
 enum status reading_parse_assignment(const char *text, cJSON *object, struct error *err) {
     const char *equals = strchr(text, '=');
     if (!equals || equals == text)
-        return error_set(err, STATUS_INPUT, "\"%s\" is not of the form NAME=VALUE", text);
+        return error_set(err, STATUS_INPUT, "\"%.100s\" is not of the form NAME=VALUE", text);
     char *key = mem_strndup(text, (size_t)(equals - text)), *end;
     double value = strtod(equals + 1, &end);
     bool is_number = (strcmp(key, "scale") == 0 || strcmp(key, "shift") == 0 || strcmp(key, "lens") == 0) &&

@@ -213,7 +213,7 @@ static void read_line(struct config *c, char *line, const char *where, bool *see
     char *name, *value;
     bool is_one = assignment_split(line, &name, &value);
     if (!is_one && *name != '\0')
-        buf_printf(problems, "%s: \"%s\" is not of the form name = value\n", where, name);
+        buf_printf(problems, "%s: \"%.100s\" is not of the form name = value\n", where, name);
     if (!is_one)
         return;
     const struct config_option *option = find(name);

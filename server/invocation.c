@@ -18,7 +18,7 @@ static void apply_flag(struct config *c, const char *flag, const char *value, st
         return;
     const char *equals = strchr(value, '=');
     if (!equals) {
-        buf_printf(problems, "--set: \"%s\" is not of the form NAME=VALUE\n", value);
+        buf_printf(problems, "--set: \"%.100s\" is not of the form NAME=VALUE\n", value);
         return;
     }
     char *name = mem_strndup(value, (size_t)(equals - value));

@@ -104,11 +104,23 @@ static bool settings_are_good(const char *outputs, const cJSON *settings) {
         status = check_room(outputs, settings, problems);
     for (const cJSON *p = problems->child; p; p = p->next) {
         const char *hint = cJSON_GetStringValue(cJSON_GetObjectItem(p, "hint"));
-        fprintf(stderr, "unbaked: setting %s %s%s%s\n", cJSON_GetStringValue(cJSON_GetObjectItem(p, "name")),
+        fprintf(stderr, "unbaked: setting %s: %s%s%s\n", cJSON_GetStringValue(cJSON_GetObjectItem(p, "name")),
                 cJSON_GetStringValue(cJSON_GetObjectItem(p, "reason")), hint ? "; " : "", hint ? hint : "");
     }
     cJSON_Delete(problems);
     return status == STATUS_OK;
+}
+
+/* Whether `out` can be written: a name that ends like a picture of another format is hardly meant to be a folder. */
+static bool is_writable(const char *out) {
+    static const char *const others[] = {".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".hdr", ".heic", ".avif"};
+    for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
+        if (!has_ending(out, others[i]))
+            continue;
+        fprintf(stderr, "unbaked: --out %.200s: pictures are .png, or .exr for linear radiance\n", out);
+        return false;
+    }
+    return true;
 }
 
 /* A file's ending says the format. */
@@ -202,7 +214,8 @@ int relight_command(int argc, char **argv) {
     if (status != STATUS_OK)
         fprintf(stderr, "unbaked: %s\n", err.message);
     code = EXIT_USAGE;
-    if (status == STATUS_OK && settings_are_good(a.word[0], settings) && (!is_file || add_format(out, settings))) {
+    if (status == STATUS_OK && settings_are_good(a.word[0], settings) && is_writable(out) &&
+        (!is_file || add_format(out, settings))) {
         struct relight_job job = {.outputs = a.word[0], .settings = settings, .out = out};
         if (!is_file)
             status = file_make_dirs(out, &err);

@@ -51,6 +51,9 @@ try hdr 25 0.1 2
     fail "relit it is not near the truth"
 "$build/unbaked" relight "$work/hdr.out" --set light.99=off --view 99 --out "$work/none.png" 2>"$work/none"
 equal "$? $(grep -c 'setting light.99\|setting view' "$work/none")" "2 2" "relight of what the room has not"
+"$build/unbaked" relight "$work/hdr.out" --view 0 --out "$work/none.jpg" 2>"$work/none"
+equal "$? $(grep -c 'pictures are .png' "$work/none")" "2 1" "relight into another format"
+[ ! -e "$work/none.jpg" ] || fail "a folder with the name of a picture"
 # A job compares it with the truth that comes with a room, and finds what the command does.
 tar -C "$work/hdr" -cf "$work/known.tar" .
 known=$(curl -s -X POST -T "$work/known.tar" -H 'Content-Type: application/x-tar' "$url/v1/scenes?name=known" | jq -r .id)

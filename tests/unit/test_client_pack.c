@@ -147,6 +147,13 @@ static void test_refusals(void) {
     CHECK(open_error("absent", &err) == STATUS_NOT_FOUND);
     mem_free(path);
 
+    put("linked", "x.txt", 1, 0644);
+    path = mem_printf("%s/linked/gone.png", root);
+    CHECK(symlink("../absent.png", path) == 0);
+    CHECK(open_error("linked", &err) == STATUS_NOT_FOUND && strstr(err.message, "gone.png") &&
+          strstr(err.hint, "a link"));
+    mem_free(path);
+
     put("loop", "x.txt", 1, 0644);
     path = mem_printf("%s/loop/again", root);
     CHECK(symlink(".", path) == 0);

@@ -108,8 +108,8 @@ static void test_options(void) {
     } bad[] = {
         {"--wach", "unknown option --wach", "did you mean --watch?"},
         {"--jsno=1", "unknown option --jsno", "did you mean --json?"},
-        {"--quite-else", "unknown option --quite-else", ""},
-        {"-x", "unknown option -x", ""},
+        {"--quite-else", "unknown option --quite-else", "--help lists the options"},
+        {"-x", "unknown option -x", "--help lists the options"},
         {"--watch=1", "--watch takes no value", ""},
         {"--name", "--name needs a value: --name NAME", ""},
         {"--priority=1.5", "--priority must be a whole number, not \"1.5\"", ""},
@@ -126,7 +126,7 @@ static void test_options(void) {
 }
 
 static const char *correction(const char *typed) {
-    static const char *const names[] = {"submit", "settings", "scenes", "show", "list", "rm"};
+    static const char *const names[] = {"submit", "settings", "scenes", "seed", "size", "show", "list", "rm"};
     struct nearest n;
     nearest_init(&n, typed);
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
@@ -139,6 +139,7 @@ static void test_nearest(void) {
     CHECK_STRING(correction("scene"), "scenes");
     CHECK_STRING(correction("set"), "settings");
     CHECK_STRING(correction("lsit"), "list");
+    CHECK_STRING(correction("siez"), "size"); /* two swapped letters are nearer than two others */
     CHECK_STRING(correction("frobnicate"), "none");
     CHECK_STRING(correction(""), "none");
 }
