@@ -38,6 +38,7 @@ struct watch {
     struct sse sse;
     bool only_log;      /* `logs` */
     bool only_past;     /* ends after the stored events: `logs` without --follow */
+    bool from_first;    /* begins with what happened before: not with how the job is now, a stream's first event */
     bool printed;       /* a line of the log was printed */
     bool connected;     /* something arrived over the current connection */
     double heard_at;    /* when the last event came */
@@ -126,7 +127,9 @@ static bool on_event(void *user, const char *type, const char *data, const char 
     w->heard_at = clock_sec();
     if (json_parse(data, strlen(data), "event", &value, NULL) != STATUS_OK)
         return true; /* one malformed event does not end the watching */
-    view_event(&w->view, type, value);
+    bool is_snapshot = cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(value, "snapshot"));
+    if (!w->from_first || !is_snapshot)
+        view_event(&w->view, type, value);
     if (strcmp(type, EVENT_PROGRESS) == 0)
         w->progress_at = w->heard_at;
     bool is_log = strcmp(type, EVENT_LOG) == 0;
@@ -218,6 +221,7 @@ static int watch_events(struct watch *w, struct client *c, int64_t job, bool all
     struct error err;
     int code = CLIENT_OK;
     w->client = c;
+    w->from_first = all;
     view_init(&w->view, job);
     sse_init(&w->sse, on_event, w);
     reply_init(&reply);
