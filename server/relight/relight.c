@@ -23,7 +23,7 @@
 
 #define ROULETTE_DEPTH 5
 #define UNTIL_SPP 65536 /* with noise or time_limit, where spp is not given */
-#define METER_WIDTH 80 /* pixels of the picture that chooses the exposure; before the first preview: kept cheap */
+#define METER_WIDTH 80  /* pixels of the picture that chooses the exposure; before the first preview: kept cheap */
 #define METER_SPP 16
 #define PREVIEW_INTERVAL_SEC 1.0
 #define PICTURE_SEED UINT64_C(0x9e3779b97f4a7c15) /* between the seeds of two pictures */

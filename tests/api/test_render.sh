@@ -5,7 +5,11 @@ set -u
 . tests/api/client.sh "$@"
 lamp="--set lamp.1.kind=sphere --set lamp.1.position=0,1,0 --set lamp.1.radius=0.3"
 make_room "$work/room" 8
+mkdir "$work/lib"
+ln -s "$build/tests/chaos/preload/oidn.so" "$work/lib/libOpenImageDenoise.so.2"
+export LD_LIBRARY_PATH=$work/lib # of the daemon
 daemon_start --set threads=2 --set small_render_paths=100000 --set max_attempts=9
+unset LD_LIBRARY_PATH
 # shellcheck disable=SC2086
 run 0 submit "$work/room" $tiny --watch
 scene=$("$build/unbake" show 1 --json | jq -r .scene)
@@ -84,6 +88,16 @@ run 0 get "$id" -q -o "$work/m"
 equal "$(jq -c '[.settings["insert.1.file"], .settings["attach.1"]]' "$work/m/views.json")" '["m.obj","m.mtl"]' "files"
 run 0 logs "$id"; has "$out" 'not rendered: transparency (1)'
 
+# --- a denoiser's library, where there is one: guided by base colour and normals, and said in the files ---
+# shellcheck disable=SC2086
+run 0 render 1 $lamp --spp 4 --set denoise=true --set format=exr --set passes=radiance,direct -q -o "$work/smooth"
+equal "$(jq -c '[.denoiser, .frames[].denoised]' "$work/smooth/views.json")" '["Open Image Denoise 2.99.1",true]' "the denoiser"
+for pass in radiance direct; do
+    grep -aq "Open Image Denoise 2.99.1" "$work/smooth/00000_$pass.exr" || fail "$pass does not say that it is denoised"
+    # of 32 x 24 equal pixels
+    [ "$(stat -c %s "$work/smooth/00000_$pass.exr")" -lt 1024 ] || fail "$pass is not what the library made of it"
+done
+
 # --- a worker dies in the middle of several pictures: those that are done stay, and all bytes are the same ---
 many="--set cameras=photographs --view all --size 64x48 --spp 400 --set format=both"
 # shellcheck disable=SC2086
@@ -92,6 +106,12 @@ rendered() { [ "$("$build/unbake" show "$id" --json | jq '[.outputs[] | select(.
 attempt() { "$build/unbake" show "$id" --json | jq .attempt; }
 worker() { grep "job $id: attempt $(attempt) runs as process" "$work/log" | sed 's/.*process \([0-9]*\) .*/\1/'; }
 wait_for 60 rendered 2
+# what has happened is told in its order, not what is so now before it
+"$build/unbake" watch "$id" --all >"$work/told" &
+background=$!
+wait_for 60 test -s "$work/told"
+kill "$background"
+has "$(head -n 1 "$work/told")" queued
 kill -KILL "$(worker)"
 died() { [ "$(attempt)" = 2 ]; }
 wait_for 60 died
