@@ -99,7 +99,7 @@ static enum status write_exposures(const struct scene_check *room, const char *d
     enum status status = write_canvas(&drawing, dir, "exposure.png", err);
     drawing_release(&drawing);
     char *given = range.given_stops > 0.0
-                      ? mem_printf("; in red the exposures that are told, over %.1f stops", range.given_stops)
+                      ? mem_printf("; in red the exposures that the files state, over %.1f stops", range.given_stops)
                       : mem_strdup("");
     add(previews, "exposure.png",
         mem_printf("by frame, a line a stop: in blue the photographs' brightness, over %.1f stops%s",

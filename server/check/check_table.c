@@ -92,13 +92,13 @@ static void tell_exposures(const struct scene *scene, struct buf *text) {
     else if (hdr > 0)
         buf_printf(text, "%zu of high dynamic range; ", hdr);
     if (told == 0)
-        buf_puts(text, "not told: they are estimated");
+        buf_puts(text, "not stated: they are estimated");
     else if (told < count)
-        buf_printf(text, "told of %zu of %zu, ", told, count);
+        buf_printf(text, "stated for %zu of %zu, ", told, count);
     else
-        buf_puts(text, "told of all, ");
+        buf_puts(text, "stated for all, ");
     if (told > 0)
-        buf_printf(text, largest > 1.001 * least ? "over %.1f stops" : "one for all", log2(largest / least));
+        buf_printf(text, largest > 1.001 * least ? "over %.1f stops" : "the same for all", log2(largest / least));
 }
 
 /* --- the mesh -------------------------------------------------------------------------------------------- */
@@ -122,7 +122,7 @@ static void tell_segments(const struct mesh *mesh, struct buf *text) {
         segments_from_object_id(&segments, mesh);
     else
         segments_automatic(&segments, mesh);
-    buf_printf(text, "%zu, %s", segments.count, mesh->object_id ? "as the mesh tells objects" : "found in the mesh");
+    buf_printf(text, "%zu, %s", segments.count, mesh->object_id ? "the objects of the mesh" : "found in the mesh");
     segments_release(&segments);
 }
 

@@ -108,13 +108,14 @@ static void judge_disagreement(struct fit_result *fit) {
         tell(fit, mem_printf("most rays miss the mesh%s: the poses may be of another place or origin", others));
         mem_free(others);
     } else if (fit->detail < DETAIL_LEAST) {
-        tell(fit, mem_printf("only %.0f %% of the photographs' area shows detail: whether they agree cannot be told",
-                             100.0 * fit->detail));
+        tell(fit,
+             mem_printf("only %.0f %% of the photographs' area shows detail: whether they agree cannot be determined",
+                        100.0 * fit->detail));
     } else if (expected < POWER) {
         tell(
             fit,
             mem_printf(
-                "the photographs, and the points that they have in common, are too few: whether they agree cannot be told"));
+                "the photographs, and the points that they have in common, are too few: whether they agree cannot be determined"));
     } else {
         fit->verdict = FIT_NO;
         tell(fit, mem_printf("the photographs show detail and see common points, but do not agree about them, and no "
@@ -138,7 +139,7 @@ static void judge_agreement(struct fit_result *fit) {
                              fit->search.moved.correlation, (double)offset.x, (double)offset.y, (double)offset.z));
     else if (!fit->search.given_has_parallax)
         tell(fit, mem_printf("they agree as well were the mesh larger or smaller: whether its size is right cannot be "
-                             "told"));
+                             "determined"));
     else if (a->correlation < CORRELATION_FITS)
         tell(fit, mem_printf("they agree, but less than those of a room that fits: poses may be inaccurate"));
     else if (a->hit_share < HITS_SOME)

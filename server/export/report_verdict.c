@@ -116,14 +116,15 @@ static void put_lights(struct buf *out, const cJSON *report, int *reasons) {
         most = fmax(most, isfinite(deviation) ? deviation : 0.0);
     }
     if (hidden > 0)
-        buf_printf(out, "<li>%d source%s of light in no photograph: told from what is lit alone.</li>", hidden,
+        buf_printf(out, "<li>%d source%s of light in no photograph: estimated from lit surfaces alone.</li>", hidden,
                    hidden == 1 ? "" : "s");
     if (saturated > 0)
-        buf_printf(out, "<li>%d source%s of light too bright for every photograph: told from what is lit alone.</li>",
+        buf_printf(out,
+                   "<li>%d source%s of light too bright for every photograph: estimated from lit surfaces alone.</li>",
                    saturated, saturated == 1 ? "" : "s");
     if (uncertain > 0)
         buf_printf(out,
-                   "<li>The brightness of %d source%s of light cannot be told well: the standard deviation is up to "
+                   "<li>The brightness of %d source%s of light is uncertain: the standard deviation is up to "
                    "%.0f %%.</li>",
                    uncertain, uncertain == 1 ? "" : "s", 100.0 * most);
     *reasons += (hidden > 0) + (saturated > 0) + (uncertain > 0);

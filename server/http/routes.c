@@ -195,7 +195,7 @@ static struct response *check_media_type(const struct request *r) {
              field_is_type(type, "multipart/form-data"))
         detail = "a form is not supported: send the file itself as the body, as curl -T does";
     else if (body == ROUTE_BODY_JSON && !is_json(r))
-        detail = "the body must be JSON and Content-Type say so";
+        detail = "the body must be JSON, and its Content-Type application/json";
     else if (body == ROUTE_BODY_PATCH && !(type && field_is_type(type, MIME_TUS)))
         detail = "Content-Type must be " MIME_TUS ", or " MIME_JSON " for a change of how long it is kept";
     if (!detail)

@@ -37,7 +37,7 @@ int main(void) {
     CHECK_STRING(value_of(facts, "source"), "a folder of tests");
     CHECK_STRING(value_of(facts, "frames used"), "16 of 17, 1 of them held out: 016.jpg is damaged and was left out");
     CHECK_STRING(value_of(facts, "sizes"), "16 of 96 x 72");
-    CHECK_STRING(value_of(facts, "exposures"), "told of 2 of 16, over 3.0 stops");
+    CHECK_STRING(value_of(facts, "exposures"), "stated for 2 of 16, over 3.0 stops");
     CHECK_THAT(strncmp(value_of(facts, "mesh"), "48 triangles, 5 x 3.2 x 4 m, ", 29) == 0, "%s",
                value_of(facts, "mesh"));
     CHECK_STRING(value_of(facts, "holes and rims"), "none");

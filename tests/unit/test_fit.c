@@ -211,7 +211,7 @@ static void test_plain_walls(float noise) {
     fit_rig_judge(&rig, &fit);
     CHECK(fit.verdict == FIT_DOUBTFUL);
     CHECK(!fit.has_remedy);
-    CHECK(strstr(fit.evidence[fit.evidence_count - 1], "cannot be told") != NULL);
+    CHECK(strstr(fit.evidence[fit.evidence_count - 1], "cannot be determined") != NULL);
     fit_release(&fit);
     turn_y_up(&rig.scene);
     fit_rig_judge(&rig, &fit);

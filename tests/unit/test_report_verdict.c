@@ -39,7 +39,7 @@ int main(void) {
     CHECK(says(bad, "Few photographs: 5."));
     CHECK(says(bad, "20 % of the light's directions"));
     CHECK(says(bad, "2 sources of light in no photograph"));
-    CHECK(says(bad, "brightness of 1 source of light cannot be told well: the standard deviation is up to 50 %"));
+    CHECK(says(bad, "brightness of 1 source of light is uncertain: the standard deviation is up to 50 %"));
     CHECK(!says(bad, "No weakness is known"));
     const char *holes = "{\"holes\": {\"filled\": 2, \"filled_m2\": 3.25, \"openings_kept\": 1, \"openings_m2\": 0.5}}";
     CHECK(says(holes, "2 holes of the mesh were filled, 3.2 m²"));
