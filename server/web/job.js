@@ -16,6 +16,7 @@ const ACTIONS = {
 const OUTPUTS_WAIT_MS = 300;
 const PICTURE_MOST = 8 << 20; // bytes; larger ones are opened from the list of files
 
+const isRendered = ({ name }) => /^\d{5}_\w+\.png$/.test(name);
 const isComparison = ({ name }) => /^compare\/.*\.png$/.test(name);
 const isThumbnail = ({ name, bytes: size }) => /\.png$/.test(name) && size < PICTURE_MOST && name !== "base_color.png";
 
@@ -110,6 +111,9 @@ export class JobView {
     const seen = report.seen_surface_share;
     showFigures(this.at("figures"), [
       ["held-out views", ...verdictOf(metrics)],
+      ["render of", job.kind === "render" && `job ${job.source}`],
+      ["size", job.kind === "render" && job.settings?.size],
+      ["paths a pixel", job.kind === "render" && job.settings?.spp],
       ["lamps", this.report && segments.filter((s) => s.emitter).length],
       ["segments", this.report && segments.length],
       ["surface seen", seen !== undefined && `${Math.round(100 * seen)} %`, "share of the surface that photographs show"],
@@ -140,7 +144,9 @@ export class JobView {
     if (id !== this.id) return;
     const job = this.server.jobs.get(id), compared = items.filter(isComparison);
     this.slider.show(compared, (this.report?.views ?? []).map((view) => view.name));
-    showThumbnails(this.at("pictures"), items.filter((o) => isThumbnail(o) && !isComparison(o)));
+    const isDone = job?.kind === "render" && items.some(isRendered); // then what there was before is one of them
+    this.at("pictures").classList.toggle("renders", job?.kind === "render");
+    showThumbnails(this.at("pictures"), items.filter((o) => isThumbnail(o) && !isComparison(o) && !(isDone && o.name === "preview/render.png")));
     showEach(this.at("files"), items, (output) => output.name, makeFileRow, fillFileRow);
     const page = items.find((o) => o.name === "report.html");
     this.at("report").hidden = !page;

@@ -141,8 +141,9 @@ async function start() {
   showWho();
   showPeople(server.me);
   await loadJobs();
-  const newest = [...server.jobs.values()].filter((job) => job.state === "succeeded").sort((a, b) => b.id - a.id)[0];
-  if (!place().job && newest) go({ job: newest.id }, true); // what one sees first is a room
+  const done = [...server.jobs.values()].filter((job) => job.state === "succeeded").sort((a, b) => b.id - a.id);
+  const newest = done.find((job) => job.kind !== "render") ?? done[0];
+  if (!place().job && newest) go({ job: newest.id }, true); // what one sees first is a room, not a look at one
   if (server.jobs.size === 0) $("new").open = true;
   follow();
 }

@@ -77,12 +77,18 @@ export class Slider {
 const ABOUT = {
   "preview/radiance.png": "Measured light", "preview/base_color.png": "Base colour", "preview/roughness.png": "Roughness",
   "preview/specular.png": "Specular", "preview/emission.png": "Emission", "preview/confidence.png": "Confidence",
-  "preview/environment.png": "Distant light",
+  "preview/environment.png": "Distant light", "preview/render.png": "So far",
 };
+
+// 00003_base_color.png is a pass of a render's fourth picture.
+function titleOf(name) {
+  const [, picture, pass] = /^(\d{5})_(\w+)\.png$/.exec(name) ?? [];
+  return ABOUT[name] ?? (pass ? `Picture ${Number(picture) + 1}, ${pass.replaceAll("_", " ")}` : name);
+}
 
 function makeThumbnail(output) {
   const figure = element("figure", null), button = element("button", null, { type: "button" });
-  const title = ABOUT[output.name] ?? output.name;
+  const title = titleOf(output.name);
   button.append(element("img", null, { alt: `${title}, open large` }));
   button.addEventListener("click", () => openLarge(figure.parentElement, figure));
   figure.append(button, element("figcaption", title));

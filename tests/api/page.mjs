@@ -309,6 +309,19 @@ async function renderFromRoom() {
   await page.close();
 }
 
+// What is seen first is a room, however many looks at it are newer; of a look, its pictures, which fill the page.
+async function openFirst() {
+  const page = await open("");
+  await page.waitForSelector("#job .compare:not([hidden])");
+  const [look] = (await get("jobs?kind=render")).items.filter(({ state, settings }) => state === "succeeded" && settings.cameras);
+  await page.evaluate((id) => { location.hash = `#job=${id}`; }, look.id);
+  await page.waitForSelector("#job .renders img[src]");
+  const shown = await page.$eval("#job", (job) => ({ width: job.querySelector(".renders img").clientWidth,
+    titles: [...job.querySelectorAll(".renders figcaption")].map((f) => f.textContent), figures: job.querySelector(".figures").textContent }));
+  check(shown.width > 400 && shown.titles.join() === "Picture 1, radiance" && shown.figures.includes("job 1"), `a look: ${JSON.stringify(shown)}`);
+  await page.close();
+}
+
 const page = await open("");
 await page.waitForSelector("#jobs button");
 await saveSettings(page);
@@ -323,5 +336,6 @@ await mixLights();
 await failLights();
 await dragLine();
 await renderFromRoom();
+await openFirst();
 await browser.close();
 process.exit(faults > 0 ? 1 : 0);
