@@ -236,8 +236,21 @@ static enum status submit(struct submission *s, const char *path, const char *sc
     return status == STATUS_OK && !dry_run ? queue(s, reply, err) : status;
 }
 
+/* Where the room's problems have been printed and are all that is wrong, they are the reason, and not the request that
+ * would list them. */
+static void say_rejected(const struct submission *s, struct reply *reply, struct error *err) {
+    const cJSON *params = cJSON_GetObjectItemCaseSensitive(reply->json, "invalid_params");
+    bool is_rejected = s->room.found && strcmp(client_room_state(&s->room), SCENE_STATE_REJECTED) == 0;
+    if (!is_rejected || s->client->json || s->client->quiet || cJSON_GetArraySize(params) != 1 ||
+        strcmp(member_text(params->child, "name"), "scene") != 0)
+        return;
+    cJSON_DeleteItemFromObjectCaseSensitive(reply->json, "invalid_params");
+    error_set(err, err->status, "the room was rejected, for the reasons above: no job is queued");
+}
+
 /* A refusal's JSON tells what the check has found, too. */
 static int fail(struct submission *s, const char *word, struct reply *reply, struct error *err) {
+    say_rejected(s, reply, err);
     if (err->status == STATUS_CANCELLED && s->is_one)
         error_hint(err, "no job was queued; the same command continues where this one stopped");
     else if (err->status == STATUS_CANCELLED && *group_of(s))

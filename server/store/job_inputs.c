@@ -41,7 +41,9 @@ enum status store_source_ready(struct store *store, int64_t id, struct error *er
     if (status == STATUS_OK && now.state != JOB_SUCCEEDED) {
         error_set(err, STATUS_CONFLICT, "job %lld has no results to read: it is %s", (long long)id,
                   job_state_name(now.state));
-        return error_hint(err, job_is_terminal(now.state) ? "Retry it first." : "Wait for its end.");
+        return error_hint(err, job_is_terminal(now.state) ? "Retry it first."
+                               : now.state == JOB_PAUSED  ? "Resume it first."
+                                                          : "Wait for its end.");
     }
     if (status == STATUS_OK)
         status = sql_int(&store->sql, 0, &files, err, "SELECT count(*) FROM outputs WHERE job_id = ? AND name = ?",

@@ -233,7 +233,11 @@ jq -e '.status == 422 and (.invalid_params | length) == 1' <<<"$err" >/dev/null 
 
 echo "this is no archive" >"$work/bad.zip"
 run 4 submit "$work/bad.zip" --watch
-has "$err" "was rejected"
+has "$err" "cannot be read as a zip"
+has "$err" "the room was rejected, for the reasons above"
+[[ $err != *GET\ /v1* ]] || fail "a request where the reason is printed: $err"
+run 4 submit -q "$work/bad.zip"
+has "$err" "was rejected (GET /v1/scenes/"
 bad=$("$build/unbake" scenes -q | head -n 1)
 run 4 submit --scene "$bad" --json
 jq -e --arg id "$bad" '.invalid_params[0].hint | startswith("GET /v1/scenes/" + $id)' <<<"$err" >/dev/null || fail "no hint that names the scene: $err"
