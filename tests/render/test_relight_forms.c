@@ -420,8 +420,21 @@ static void test_progress(void) {
     relit_remove(dir);
 }
 
-/* A render that was stopped goes on where it was: what is there whole is not
- * rendered again. */
+/* Base colour as somebody has painted it over. */
+static void paint(const char *dir) {
+    struct image image;
+    struct error err;
+    char *path = file_join(dir, "base_color.exr");
+    CHECK(relit_read(dir, "base_color.exr", &image, &err) == STATUS_OK);
+    for (size_t i = 0; i < (size_t)image.width * image.height * image.channel_count; i++)
+        image.pixel[i] *= 0.5f;
+    CHECK(image_write_exr(path, &image, IMAGE_FLOAT, false, &err) == STATUS_OK);
+    image_release(&image);
+    mem_free(path);
+}
+
+/* A render that was stopped goes on where it was: what is there whole is not rendered again, but where the outputs are
+ * others. */
 static void test_resume(void) {
     char *dir = lit_room(CENTRE_VIEW), *out, *path;
     struct error err;
@@ -438,6 +451,9 @@ static void test_resume(void) {
     CHECK(relight_run(&job, NULL, pool, &err) == STATUS_OK);
     CHECK(sha256_of_file(path, after, &err) == STATUS_OK && strcmp(before, after) == 0);
     CHECK(stat(other, &now) == 0 && now.st_ino == kept.st_ino);
+    paint(dir);
+    CHECK(relight_run(&job, NULL, pool, &err) == STATUS_OK);
+    CHECK(sha256_of_file(path, after, &err) == STATUS_OK && strcmp(before, after) != 0);
     cJSON_Delete(settings);
     mem_free(path);
     mem_free(other);
