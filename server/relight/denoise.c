@@ -36,7 +36,7 @@ struct denoiser {
 };
 
 static void *open_library(void) {
-    static const char *const names[] = {DENOISE_LIBRARY_DIR "/libOpenImageDenoise.so.2", "libOpenImageDenoise.so.2",
+    static const char *const names[] = {"libOpenImageDenoise.so.2", DENOISE_LIBRARY_DIR "/libOpenImageDenoise.so.2",
                                         "libOpenImageDenoise.so.1", "libOpenImageDenoise.so.0"};
     void *library = NULL;
     for (size_t i = 0; i < sizeof names / sizeof *names && !library; i++)

@@ -13,8 +13,8 @@
 #include "common/mem.h"
 
 #define RECORD_LIMIT ((size_t)1 << 30) /* bytes of views.jsonl */
-#define NUMBER_DIGITS 5
-#define HALF_MOST 65504.0f /* largest finite number of IEEE 754 binary16 */
+#define LEAST_DIGITS 5                 /* of a picture's number in names */
+#define HALF_MOST 65504.0f             /* largest finite number of IEEE 754 binary16 */
 
 /* --- the record ------------------------------------------------------------------------------------------------- */
 
@@ -60,6 +60,12 @@ void output_digest(const struct relight_job *job, char digest[SHA256_HEX_SIZE]) 
     sha256_hex(&hash, digest);
 }
 
+void output_count(struct output *o, uint64_t pictures) {
+    o->digits = LEAST_DIGITS;
+    for (uint64_t most = 100000; most < pictures && o->digits < 19; most *= 10)
+        o->digits++;
+}
+
 static void key_of(uint64_t picture, char key[24]) { snprintf(key, 24, "%llu", (unsigned long long)picture); }
 
 /* Takes the record; a later one of the same picture replaces it. */
@@ -87,7 +93,7 @@ static void read_lines(struct output *o, const char *text) {
 enum status output_open(struct output *o, const struct relight_job *job, const struct relight_watch *watch,
                         struct error *err) {
     struct buf text;
-    *o = (struct output){.job = job, .watch = watch, .done = cJSON_CreateObject()};
+    *o = (struct output){.job = job, .watch = watch, .digits = LEAST_DIGITS, .done = cJSON_CreateObject()};
     output_digest(job, o->digest);
     char *path = file_join(job->out, OUTPUT_RECORD);
     buf_init(&text, RECORD_LIMIT);
@@ -234,7 +240,7 @@ enum status output_pass(struct output *o, uint64_t picture, const struct render_
     enum status status = STATUS_OK;
     if (formats.is_exr || (is_data && formats.is_png)) {
         struct image measured;
-        char *file = mem_printf("%0*llu_%s.exr", NUMBER_DIGITS, (unsigned long long)picture, name);
+        char *file = mem_printf("%0*llu_%s.exr", o->digits, (unsigned long long)picture, name);
         image_copy(image, &measured);
         pass_measure(pass, &o->look, &measured);
         if (is_half)
@@ -246,7 +252,7 @@ enum status output_pass(struct output *o, uint64_t picture, const struct render_
         mem_free(file);
     }
     if (formats.is_png && !is_data && status == STATUS_OK) {
-        char *file = mem_printf("%0*llu_%s.png", NUMBER_DIGITS, (unsigned long long)picture, name);
+        char *file = mem_printf("%0*llu_%s.png", o->digits, (unsigned long long)picture, name);
         pass_show(pass, &o->look, image);
         status = put(o, file, FORM_PNG, image, err);
         if (status == STATUS_OK)
@@ -258,7 +264,7 @@ enum status output_pass(struct output *o, uint64_t picture, const struct render_
 
 enum status output_layers(struct output *o, uint64_t picture, const struct image *image, cJSON *files,
                           struct error *err) {
-    char *file = mem_printf("%0*llu.exr", NUMBER_DIGITS, (unsigned long long)picture);
+    char *file = mem_printf("%0*llu.exr", o->digits, (unsigned long long)picture);
     enum status status = put(o, file, FORM_FLOAT, image, err);
     if (status == STATUS_OK)
         status = list(o, file, "all", files, err);
@@ -268,7 +274,7 @@ enum status output_layers(struct output *o, uint64_t picture, const struct image
 
 enum status output_preview(struct output *o, uint64_t picture, struct image *image, struct error *err) {
     char *folder = file_join(o->job->out, "preview");
-    char *file = mem_printf("preview/%0*llu.png", NUMBER_DIGITS, (unsigned long long)picture);
+    char *file = mem_printf("preview/%0*llu.png", o->digits, (unsigned long long)picture);
     enum status status = file_make_dirs(folder, err);
     pass_show(passes_radiance(), &o->look, image);
     if (status == STATUS_OK)

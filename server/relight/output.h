@@ -1,6 +1,6 @@
 /* output.h -- the files of a render's pictures, and the record of which are done.
  *
- * NNNNN is the picture's number. A pass is NNNNN_radiance.png or .exr, a source alone NNNNN_light_27.exr, a multilayer
+ * NNNNN is the picture's number, with more digits where there are more pictures: names sort as numbers do. A pass is NNNNN_radiance.png or .exr, a source alone NNNNN_light_27.exr, a multilayer
  * EXR NNNNN.exr. views.jsonl has a line of JSON for each picture that is done, with the sizes and digests of its files,
  * appended when all of them have their final names; a line that was cut off counts as none. When all are
  * done it is put in their order, and views.json is made of it. */
@@ -20,6 +20,7 @@ struct output {
     const struct relight_job *job;
     const struct relight_watch *watch;
     struct view_look look;
+    int digits;                   /* of a picture's number in names */
     char digest[SHA256_HEX_SIZE]; /* of what the pictures depend on: settings, outputs */
     cJSON *done;                  /* records of this digest, by picture; owned */
     const char *note;             /* a comment in EXR headers; NULL: none; borrowed */
@@ -32,6 +33,8 @@ void output_digest(const struct relight_job *job, char digest[SHA256_HEX_SIZE]);
 enum status output_open(struct output *o, const struct relight_job *job, const struct relight_watch *watch,
                         struct error *err);
 void output_close(struct output *o);
+/* How many pictures the job has, for their names; before any of them. */
+void output_count(struct output *o, uint64_t pictures);
 
 /* Whether the picture's files are there as its record says. */
 bool output_is_done(const struct output *o, uint64_t picture);

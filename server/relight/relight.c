@@ -367,6 +367,7 @@ enum status relight_run(const struct relight_job *job, const struct relight_watc
     if (status == STATUS_OK)
         status = run_open(&r, err);
     uint64_t pictures = (uint64_t)r.views.count * r.suns, last = pictures;
+    output_count(&r.output, pictures);
     if (status == STATUS_OK && job->view_count > 0 && job->view_count < pictures - job->first_view)
         last = job->first_view + job->view_count;
     r.total = (double)(last - job->first_view);

@@ -461,6 +461,24 @@ static void test_resume(void) {
     relit_remove(dir);
 }
 
+/* Names of pictures sort as their numbers do, however many there are. */
+static void test_names(void) {
+    static const char text[] = "{\"path\":\"0,0\",\"path_count\":100000,\"suns\":2,\"environment\":\"sky\","
+                               "\"date\":\"2024-06-21\",\"latitude\":47,\"longitude\":8.5,\"spp\":4,\"size\":\"2x2\"}";
+    char *dir = lit_room(CENTRE_VIEW), out[] = "/tmp/unbake-names-XXXXXX";
+    struct error err;
+    struct image image;
+    cJSON *settings = NULL;
+    CHECK(json_parse(text, strlen(text), "settings", &settings, &err) == STATUS_OK && mkdtemp(out) != NULL);
+    struct relight_job job = {.outputs = dir, .settings = settings, .out = out, .first_view = 7, .view_count = 1};
+    CHECK_THAT(relight_run(&job, NULL, pool, &err) == STATUS_OK, "%s", err.message);
+    CHECK(relit_read(out, "000007_radiance.png", &image, &err) == STATUS_OK);
+    image_release(&image);
+    cJSON_Delete(settings);
+    CHECK(file_remove_tree(out, NULL) == STATUS_OK);
+    relit_remove(dir);
+}
+
 int main(void) {
     pool = parallel_new(2);
     test_furnace();
@@ -472,6 +490,7 @@ int main(void) {
     test_closed();
     test_progress();
     test_resume();
+    test_names();
     parallel_free(pool);
     return check_result();
 }
