@@ -134,7 +134,7 @@ static size_t find_likeliest(struct lamp_search *s) {
         if (c->all)
             continue;
         c->all = mem_calloc(m->points.count + 1, sizeof *c->all);
-        segment_light_add(&m->lamps.light, m->points.point, m->points.count, c->segment, SEGMENT_LIGHT_POINTS, c->all);
+        light_model_respond_hidden(m, c->segment, c->all);
     }
     s->all = true;
     forget_guesses(&m->fit, m->first_guess);

@@ -3,9 +3,11 @@
 
 #include <assert.h>
 #include <math.h>
+#include <string.h>
 
 #include "common/mem.h"
 #include "common/quantile.h"
+#include "server/light/bounced_light.h"
 #include "server/light/joint_alike.h"
 
 /* What is filled in, of the sky and of surfaces that no photograph shows, is right within a factor of two: the standard
@@ -20,7 +22,7 @@
 #define ALIKE_EDGES 3.5f
 
 void light_model_init(struct light_model *m, struct reconstruction *r, const struct views *views, bool again) {
-    *m = (struct light_model){.r = r};
+    *m = (struct light_model){.r = r, .albedo = mem_array(r->segments.count + 1, sizeof *m->albedo)};
     light_lamps_init(&m->lamps, r, views->median_radiance);
     light_sky_init(&m->sky, &r->environment);
     if (r->environment.map.pixel && r->environment.saturated_share > 0.0 && !r->sky_is_fitted) {
@@ -36,6 +38,7 @@ void light_model_init(struct light_model *m, struct reconstruction *r, const str
 void light_model_release(struct light_model *m) {
     joint_fit_release(&m->fit);
     mem_free(m->joint);
+    mem_free(m->albedo);
     light_points_release(&m->points);
     light_sky_release(&m->sky);
     light_lamps_release(&m->lamps);
@@ -123,16 +126,94 @@ static void allow_for_highlights(struct light_model *m) {
     for (size_t first = 0, end; first < m->points.count; first = end) {
         for (end = first; end < m->points.count && p[end].segment == p[first].segment; end++)
             albedo[end - first] = p[end].observed / (float)joint_fit_light(&m->fit, end, x);
-        float highlight = ALBEDO_HIGHLIGHT / quantile(albedo, end - first, 0.5);
+        float median = quantile(albedo, end - first, 0.5);
         for (size_t i = first; i < end; i++)
-            p[i].deviation = hypotf(p[i].deviation, highlight);
+            p[i].deviation = hypotf(p[i].deviation, ALBEDO_HIGHLIGHT / median);
+        m->albedo[p[first].segment] = fminf(median, (float)ALBEDO_WHITE);
     }
     mem_free(x);
     mem_free(albedo);
 }
 
+/* Discs of what unseen surfaces reflect of a hidden lamp; the first result is the caller's. */
+static struct segment_light_disc *find_bounced(const struct light_model *m, uint32_t segment, size_t *count) {
+    struct segment_light_disc *disc = mem_array(BOUNCED_MOST, sizeof *disc);
+    *count = bounced_light_find(&m->lamps.light, segment, m->albedo, m->lamps.is_lamp, disc);
+    return disc;
+}
+
+void light_model_respond_hidden(const struct light_model *m, uint32_t segment, float *lit) {
+    const struct light_points *p = &m->points;
+    size_t count;
+    struct segment_light_disc *disc = find_bounced(m, segment, &count);
+    segment_light_add(&m->lamps.light, p->point, p->count, segment, SEGMENT_LIGHT_POINTS, lit);
+    segment_light_add_discs(&m->lamps.light, p->point, p->count, disc, count, lit);
+    mem_free(disc);
+}
+
+/* Puts the discs of a region first; returns their number. */
+static size_t put_first(const struct light_points *p, struct segment_light_disc *disc, size_t count, size_t region) {
+    size_t first = 0;
+    for (size_t i = 0; i < count; i++) {
+        if (light_points_region(p, disc[i].at.position) == region) {
+            struct segment_light_disc other = disc[first];
+            disc[first++] = disc[i], disc[i] = other;
+        }
+    }
+    return first;
+}
+
+/* Once unseen surfaces are known to be lit by a hidden lamp, their light has what they reflect of it: it is taken off,
+ * as the lamp's column has it. */
+static void take_bounced_off(struct light_model *m, const struct light_lamp *lamp) {
+    size_t count, points = m->points.count;
+    struct segment_light_disc *disc = find_bounced(m, lamp->segment[0], &count);
+    float *bounced = mem_array(points + 1, sizeof *bounced);
+    for (size_t k = 0; k < LIGHT_REGIONS; k++) {
+        size_t of_region = put_first(&m->points, disc, count, k);
+        if (of_region == 0)
+            continue;
+        memset(bounced, 0, points * sizeof *bounced);
+        segment_light_add_discs(&m->lamps.light, m->points.point, points, disc, of_region, bounced);
+        for (size_t i = 0; i < points; i++) {
+            float *guessed = m->points.point[i].guessed ? m->points.point[i].guessed + 3 * k : NULL;
+            for (size_t c = 0; c < 3 && guessed; c++)
+                guessed[c] = fmaxf(guessed[c] - bounced[i] * (&lamp->radiance.r)[c], 0.0f);
+            if (guessed)
+                m->fit.response[i * m->fit.source_most + m->first_guess + k] = guess_mean(&m->points.point[i], k);
+        }
+    }
+    mem_free(bounced);
+    mem_free(disc);
+}
+
+/* A lamp's column of the response. */
+static void respond(struct light_model *m, struct light_lamp *lamp) {
+    if (lamp->kind != ESTIMATED_HIDDEN) {
+        light_lamps_respond(&m->lamps, lamp, &m->points);
+        return;
+    }
+    lamp->lit = mem_calloc(m->points.count + 1, sizeof *lamp->lit);
+    light_model_respond_hidden(m, lamp->segment[0], lamp->lit);
+    take_bounced_off(m, lamp);
+}
+
+static void add_lamps(struct light_model *m, bool hidden) {
+    for (size_t i = 0; i < m->lamps.count; i++) {
+        struct light_lamp *lamp = &m->lamps.lamp[i];
+        struct joint_source source = light_lamps_prior(&m->lamps, lamp);
+        if ((lamp->kind == ESTIMATED_HIDDEN) != hidden)
+            continue;
+        respond(m, lamp);
+        lamp->source = m->fit.source_count;
+        joint_fit_add(&m->fit, &source, lamp->lit);
+    }
+}
+
 static void make_fit(struct light_model *m) {
     bool any_escapes = false;
+    for (size_t s = 0; s < m->r->segments.count; s++)
+        m->albedo[s] = NEUTRAL_BASE_COLOR;
     m->joint = mem_array(m->points.count + 1, sizeof *m->joint);
     for (size_t i = 0; i < m->points.count; i++) {
         const struct light_point *p = &m->points.point[i];
@@ -141,19 +222,14 @@ static void make_fit(struct light_model *m) {
         any_escapes = any_escapes || p->escaping > 0.0f;
     }
     joint_fit_init(&m->fit, m->joint, m->points.count, 1 + LIGHT_LAMPS_MOST + SKY_CELLS + LIGHT_REGIONS, m->r->pool);
-    for (size_t i = 0; i < m->lamps.count; i++) {
-        struct light_lamp *lamp = &m->lamps.lamp[i];
-        struct joint_source source = light_lamps_prior(&m->lamps, lamp);
-        light_lamps_respond(&m->lamps, lamp, &m->points);
-        lamp->source = m->fit.source_count;
-        joint_fit_add(&m->fit, &source, lamp->lit);
-    }
+    add_lamps(m, false);
     m->fit.tie = m->tie;
     tie_ground(m);
     if (any_escapes)
         add_cells(m);
     add_guesses(m);
     allow_for_highlights(m);
+    add_lamps(m, true);
 }
 
 void light_model_survey(struct light_model *m, const struct views *views, const struct light_field *field,

@@ -12,6 +12,7 @@ struct light_model {
     struct light_sky sky;
     struct light_points points;
     struct joint_point *joint; /* [points.count] means of the channels; owned */
+    float *albedo;             /* [segment_count] of what points show of a segment, at the priors; owned */
     struct joint_fit fit;
     double patches_alike;                    /* so many patches are worth one (joint_alike.h) */
     bool has_sky;                            /* unseen sky lights the points: */
@@ -27,6 +28,9 @@ void light_model_release(struct light_model *m);
 /* Makes points and fit. The arguments are those of survey_init and light_points_init. */
 void light_model_survey(struct light_model *m, const struct views *views, const struct light_field *field,
                         const struct fused *observed);
+
+/* Adds to lit[points.count] the response of a hidden lamp: its own light and what unseen surfaces reflect of it. */
+void light_model_respond_hidden(const struct light_model *m, uint32_t segment, float *lit);
 
 /* Adds a hidden lamp of which `lit` is the column of the response; takes it over. Its radiance is of the fit's value. */
 void light_model_add_hidden(struct light_model *m, uint32_t segment, const struct joint_source *source, float *lit);

@@ -24,9 +24,7 @@ struct gathering {
     const struct survey *survey;
     const struct light_sky *sky;
     const struct fused *observed; /* or NULL */
-    struct light_point *point;
-    vec3 least, most; /* corners of the room */
-    float edge_m;     /* of a patch */
+    struct light_points *points;
 };
 
 static rgb observed_at(const struct gathering *g, uint32_t texel) {
@@ -37,7 +35,7 @@ static rgb observed_at(const struct gathering *g, uint32_t texel) {
 }
 
 static uint32_t patch_of(const struct gathering *g, const struct surface_point *at) {
-    vec3 from = vec3_scale(vec3_sub(at->position, g->least), 1.0f / g->edge_m);
+    vec3 from = vec3_scale(vec3_sub(at->position, g->points->least), 1.0f / g->points->edge_m);
     const float along[3] = {from.x, from.y, from.z};
     uint32_t patch =
         (at->normal.x > 0.0f) | (uint32_t)(at->normal.y > 0.0f) << 1 | (uint32_t)(at->normal.z > 0.0f) << 2;
@@ -48,9 +46,9 @@ static uint32_t patch_of(const struct gathering *g, const struct surface_point *
 
 static float part_along(float x, float least, float most) { return (x - least) / fmaxf(most - least, 1e-20f); }
 
-static size_t region_of(const struct gathering *g, vec3 p) {
-    const float part[3] = {part_along(p.x, g->least.x, g->most.x), part_along(p.y, g->least.y, g->most.y),
-                           part_along(p.z, g->least.z, g->most.z)};
+size_t light_points_region(const struct light_points *p, vec3 place) {
+    const float part[3] = {part_along(place.x, p->least.x, p->most.x), part_along(place.y, p->least.y, p->most.y),
+                           part_along(place.z, p->least.z, p->most.z)};
     size_t region = 0;
     for (int i = 0; i < 3; i++)
         region = 4 * region + (size_t)clampf(4.0f * part[i], 0.0f, 3.0f);
@@ -77,7 +75,8 @@ static void set_guesses_apart(const struct gathering *g, struct incident *in, st
             (g->survey->field.specular_only && g->survey->field.specular_only[t->segment]))
             continue;
         rgb radiance = rgb_scale(rgb_from_half(g->survey->field.radiance[texel]), 1.0f / SURVEY_RAYS);
-        float *of_region = light[region_of(g, vec3_mad(in->ray[i].origin, hit->distance_m, in->direction[i]))];
+        vec3 place = vec3_mad(in->ray[i].origin, hit->distance_m, in->direction[i]);
+        float *of_region = light[light_points_region(g->points, place)];
         for (size_t c = 0; c < 3; c++)
             of_region[c] += (&radiance.r)[c];
         sum = rgb_add(sum, radiance);
@@ -121,7 +120,7 @@ static void gather_point(void *user, size_t index, int thread) {
     const struct gathering *g = user;
     const struct reconstruction *r = g->survey->r;
     struct incident *in = &g->survey->scratch[thread];
-    struct light_point *p = &g->point[index];
+    struct light_point *p = &g->points->point[index];
     uint32_t texel = g->survey->texel[index];
     struct irradiance light;
     *p = (struct light_point){.segment = reconstruction_segment(r, texel), .observed = observed_at(g, texel)};
@@ -210,12 +209,11 @@ static void find_deviations(struct light_points *p, float median_radiance) {
 void light_points_init(struct light_points *p, const struct survey *survey, const struct light_sky *sky,
                        const struct fused *observed, float median_radiance) {
     const struct mesh *mesh = &survey->r->scene->mesh;
-    struct gathering g = {.survey = survey, .sky = sky, .observed = observed};
-    g.point = mem_array(survey->count + 1, sizeof *g.point);
-    g.edge_m = PATCH_PART * (float)sqrt(mesh_area(mesh));
-    mesh_bounds(mesh, &g.least, &g.most);
+    struct gathering g = {survey, sky, observed, p};
+    *p = (struct light_points){.count = survey->count, .point = mem_array(survey->count + 1, sizeof *p->point)};
+    p->edge_m = PATCH_PART * (float)sqrt(mesh_area(mesh));
+    mesh_bounds(mesh, &p->least, &p->most);
     parallel_for(survey->r->pool, survey->count, gather_point, &g);
-    *p = (struct light_points){survey->count, g.point, g.edge_m};
     qsort(p->point, p->count, sizeof *p->point, by_patch);
     float dark = fmaxf(SURVEY_DARK * median_radiance, 1e-20f);
     for (size_t i = 0; i < p->count; i++) {

@@ -26,7 +26,11 @@ struct light_points {
     size_t count;
     struct light_point *point; /* [count] by segment and patch; owned */
     float edge_m;              /* of a patch */
+    vec3 least, most;          /* corners of the room */
 };
+
+/* The region of a place. */
+size_t light_points_region(const struct light_points *p, vec3 place);
 
 /* Makes the points from a survey, the world lit by light_sky_known. Observed radiance is that of `observed` around each,
  * or fused radiance where that has none or is NULL. median_radiance: of the room. The same for any number of threads. */

@@ -28,9 +28,8 @@ struct lighting {
     const struct accel *accel;
     const struct light_point *point;
     float *lit;
-    float area_m2; /* that a point stands for */
-    size_t source_count;
-    struct surface_point source[SEGMENT_LIGHT_POINTS];
+    size_t disc_count;
+    const struct segment_light_disc *disc;
 };
 
 /* Irradiance from a point that represents a disc, with visibility. */
@@ -54,9 +53,10 @@ static void light_point(void *user, size_t index, int thread) {
     (void)thread;
     const struct lighting *l = user;
     const struct surface_point *at = &l->point[index].at;
-    for (size_t i = 0; i < l->source_count; i++) {
-        float light = disc_light(&l->source[i], at, l->area_m2);
-        if (light > 0.0f && !is_between(l->accel, &l->source[i], at))
+    for (size_t i = 0; i < l->disc_count; i++) {
+        const struct segment_light_disc *disc = &l->disc[i];
+        float light = disc->radiance * disc_light(&disc->at, at, disc->area_m2);
+        if (light > 0.0f && !is_between(l->accel, &disc->at, at))
             l->lit[index] += light;
     }
 }
@@ -74,25 +74,28 @@ static struct surface_point point_in(const struct mesh *mesh, uint32_t triangle,
                                   .shading = normal};
 }
 
-/* Points of a segment that stand for equal parts of its area, `wanted` of them. */
-static void spread_points(const struct segment_light *l, uint32_t segment, size_t wanted, struct lighting *job) {
+size_t segment_light_spread(const struct segment_light *l, uint32_t segment, size_t wanted,
+                            struct segment_light_disc *disc) {
     const struct mesh *mesh = &l->r->scene->mesh;
     double part = (double)l->area_m2[segment] / (double)wanted, passed = 0.0;
+    size_t count = 0;
     for (size_t i = l->triangles.first[segment]; i < l->triangles.first[segment + 1]; i++) {
         uint32_t triangle = l->triangles.triangle[i];
         passed += (double)mesh_triangle_area(mesh, triangle);
-        while (job->source_count < wanted && passed > ((double)job->source_count + 0.5) * part) {
-            job->source[job->source_count] = point_in(mesh, triangle, job->source_count);
-            job->source_count++;
-        }
+        for (; count < wanted && passed > ((double)count + 0.5) * part; count++)
+            disc[count] = (struct segment_light_disc){point_in(mesh, triangle, count), (float)part, 1.0f};
     }
+    return count;
+}
+
+void segment_light_add_discs(const struct segment_light *l, const struct light_point *point, size_t count,
+                             const struct segment_light_disc *disc, size_t disc_count, float *lit) {
+    struct lighting job = {l->r->world.accel, point, lit, disc_count, disc};
+    parallel_for(l->r->pool, count, light_point, &job);
 }
 
 void segment_light_add(const struct segment_light *l, const struct light_point *point, size_t count, uint32_t segment,
                        size_t points, float *lit) {
-    const struct reconstruction *r = l->r;
-    struct lighting job = {.accel = r->world.accel, .point = point, .lit = lit};
-    spread_points(l, segment, points, &job);
-    job.area_m2 = l->area_m2[segment] / fmaxf((float)job.source_count, 1.0f);
-    parallel_for(r->pool, count, light_point, &job);
+    struct segment_light_disc disc[SEGMENT_LIGHT_POINTS];
+    segment_light_add_discs(l, point, count, disc, segment_light_spread(l, segment, points, disc), lit);
 }

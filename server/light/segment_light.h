@@ -15,8 +15,21 @@ struct segment_light {
 void segment_light_init(struct segment_light *l, const struct reconstruction *r);
 void segment_light_release(struct segment_light *l);
 
-/* Adds to lit[count] what a surface of albedo 1 at each point would send of a radiance of 1 from the front of the whole
- * segment, by as many points of it as given, SEGMENT_LIGHT_POINTS at most, evenly spread by area. */
+/* A diffuse emitter that is small beside its distance to what it lights. */
+struct segment_light_disc {
+    struct surface_point at; /* position, normal */
+    float area_m2, radiance;
+};
+
+/* Fills disc[wanted] with discs of radiance 1 that stand for equal parts of a segment's area; returns their number. */
+size_t segment_light_spread(const struct segment_light *l, uint32_t segment, size_t wanted,
+                            struct segment_light_disc *disc);
+
+/* Adds to lit[count] what a surface of albedo 1 at each point would send of the light of discs. */
+void segment_light_add_discs(const struct segment_light *l, const struct light_point *point, size_t count,
+                             const struct segment_light_disc *disc, size_t disc_count, float *lit);
+
+/* The same of a radiance of 1 from the front of the whole segment, by so many discs, SEGMENT_LIGHT_POINTS at most. */
 #define SEGMENT_LIGHT_POINTS 32
 void segment_light_add(const struct segment_light *l, const struct light_point *point, size_t count, uint32_t segment,
                        size_t points, float *lit);

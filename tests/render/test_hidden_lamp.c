@@ -1,5 +1,6 @@
-/* hidden_lamps.h: a lamp that no photograph shows is found by what it lights, and is as bright as it is; where the lamp
- * was photographed, be it thinner than a pixel, nothing else is taken for one. The same for any number of threads. */
+/* hidden_lamps.h: a lamp that no photograph shows is found by what it lights, and is as bright as it is, also where
+ * most of its light leaves a gap by way of surfaces that none shows; where the lamp was photographed, be it thinner
+ * than a pixel, nothing else is taken for one. The same for any number of threads. */
 #include "server/state/evidence.h"
 #include "server/state/reconstruction.h"
 #include "tests/check.h"
@@ -75,6 +76,57 @@ static void test_thin(struct parallel *pool) {
     scene_release(&scene);
 }
 
+#define PANEL 1 /* of one object with the ceiling */
+#define GAP 0.06f
+
+static rgb four_times(vec3 place) { return (void)place, rgb_gray(4.0f); }
+
+static void add_panel(struct mesh *m, vec3 a, vec3 b) {
+    vec3 d = vec3_sub(b, a), x = {d.x, 0, 0}, y = {0, d.y, 0}, z = {0, 0, d.z};
+    add_quad(m, PANEL, a, y, x);
+    add_quad(m, PANEL, vec3_add(a, z), x, y);
+    add_quad(m, PANEL, a, z, y);
+    add_quad(m, PANEL, vec3_add(a, x), y, z);
+    add_quad(m, PANEL, a, x, z);
+    add_quad(m, PANEL, vec3_add(a, y), z, x);
+}
+
+/* Strips behind a panel that stands before a wall, which they face: without what wall and panel reflect of it in the
+ * gap they come out four times too bright. */
+static void test_gap(struct parallel *pool) {
+    struct scene scene = {0};
+    struct mesh *m = &scene.mesh;
+    start_room(m, OBJECTS + 8);
+    for (size_t i = 0; i < m->triangle_count; i++)
+        m->object_id[i] = m->object_id[i] == 3 ? 2 : m->object_id[i];
+    add_quad(m, 4, (vec3){0, 0, 0}, (vec3){4, 0, 0}, (vec3){0, 3, 0});
+    add_quad(m, 5, (vec3){0, 0, 3}, (vec3){0, 3, 0}, (vec3){4, 0, 0});
+    add_panel(m, (vec3){1, 1, GAP}, (vec3){3, 2.2f, 1.5f * GAP});
+    add_quad(m, LAMP, (vec3){1.04f, 1.05f, GAP - 0.005f}, (vec3){0, 1.1f, 0}, (vec3){0.05f, 0, 0});
+    add_quad(m, LAMP, (vec3){2.91f, 1.05f, GAP - 0.005f}, (vec3){0, 1.1f, 0}, (vec3){0.05f, 0, 0});
+    add_quad(m, 3, (vec3){1.8f, 2.9f, 1.3f}, (vec3){0.4f, 0, 0}, (vec3){0, 0, 0.4f});
+    other_lamp = 3, lamp_picture = four_times;
+    wall_color[4] = wall_color[PANEL] = rgb_gray(0.83f), wall_color[2] = rgb_gray(0.55f);
+    photograph_mesh(&scene, lamp_radiance, NULL, look_anywhere, pool);
+    struct settings settings = shell_settings(SHELL_SMALL);
+    struct shell shell = {.polls_until_stop = 1}; /* light is estimated before */
+    struct reconstruction r;
+    CHECK(shell_run(&scene, &settings, 0, &shell, &r) == STATUS_CANCELLED);
+    for (size_t s = 0; s < r.segments.count; s++) {
+        bool is_lamp = r.segments.id[s] == LAMP;
+        float factor = rgb_mean(r.evidence[s].radiance) / (4.0f * rgb_mean(lamp_radiance));
+        CHECK_THAT(r.evidence[s].is_hidden == is_lamp, "segment %zu", s);
+        if (is_lamp) {
+            printf("in a gap: %.2f of the true radiance\n", (double)factor);
+            CHECK_THAT(factor > 0.6f && factor < 1.6f, "%g of the true radiance", (double)factor);
+        }
+    }
+    reconstruct_release(&r);
+    settings_release(&settings);
+    shell_release(&shell);
+    scene_release(&scene);
+}
+
 int main(void) {
     struct parallel *pool = parallel_new(0);
     photograph_samples = 32;
@@ -82,6 +134,7 @@ int main(void) {
     if (!IS_BRIEF) {
         test_none_hidden(pool);
         test_thin(pool);
+        test_gap(pool);
     }
     parallel_free(pool);
     return check_result();

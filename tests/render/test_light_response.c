@@ -1,9 +1,13 @@
-/* segment_light.h, light_point.h: what sources send to points, against closed forms. A sphere over a floor; a sky
- * through a hole in the ceiling, all of it and by cell; nothing behind a wall; and the joint fit finds the sky's
- * radiance from these responses, which noise would make too small. */
+/* segment_light.h, bounced_light.h, light_point.h: what sources send to points, against closed forms. A sphere over a
+ * floor; a lamp that shines at an unseen ceiling only; one in an unseen box with a hole; a sky through a hole in the
+ * ceiling, all of it and by cell; nothing behind a wall; and the joint fit finds the sky's radiance from these
+ * responses, which noise would make too small. sky_doubt.h: half of that sky, of bright texels alone. */
+#include "server/light/bounced_light.h"
 #include "server/light/joint_fit.h"
-#include "server/light/segment_light.h"
+#include "server/light/sky_doubt.h"
 #include "server/render/bsdf.h"
+#include "server/scene/rgb_half.h"
+#include "server/state/evidence.h"
 #include "tests/check.h"
 #include "tests/render/small_room.h"
 
@@ -140,6 +144,116 @@ static void test_sphere(void) {
     rig_release(&g);
 }
 
+/* --- by way of unseen surfaces -------------------------------------------------------------------------------- */
+
+#define CEILING_ALBEDO 0.6f
+#define LAMP_SIDE 0.02f
+#define BOX_SIDE 0.4f /* inside; its hole is in the floor */
+#define BOX_HOLE 0.1f
+#define BOX_ALBEDO 0.8f
+
+static size_t segment_of(const struct rig *g, int64_t object) {
+    size_t found = 0;
+    for (size_t s = 0; s < g->r.segments.count; s++)
+        found = g->r.segments.id[s] == object ? s : found;
+    return found;
+}
+
+/* Light of the lamp at the floor's points by way of one object's surfaces of an albedo, all others being black; as many
+ * particles fall on the floor or a black surface. The caller's. */
+static float *bounced_at(const struct rig *g, const struct light_point *point, size_t count, int64_t object,
+                         float albedo_of) {
+    struct segment_light light;
+    struct segment_light_disc *disc = mem_array(BOUNCED_MOST, sizeof *disc);
+    float *lit = mem_calloc(count + 1, sizeof *lit), albedo[OBJECTS] = {0};
+    bool is_lamp[OBJECTS] = {0};
+    size_t lamp = segment_of(g, LAMP);
+    segment_light_init(&light, &g->r);
+    albedo[segment_of(g, object)] = albedo_of;
+    is_lamp[lamp] = true;
+    size_t discs = bounced_light_find(&light, (uint32_t)lamp, albedo, is_lamp, disc);
+    segment_light_add_discs(&light, point, count, disc, discs, lit);
+    segment_light_release(&light);
+    mem_free(disc);
+    return lit;
+}
+
+/* A small lamp close below the ceiling, which it faces, is a Lambertian spot of the ceiling: a A h^2 / (pi d^4). */
+static void test_ceiling(void) {
+    struct rig g = {0};
+    double sum[2] = {0.0, 0.0};
+    const vec3 at = {1.0f, 3.0f, 1.5f};
+    start_room(&g.scene.mesh, 6);
+    add_quad(&g.scene.mesh, WALL, (vec3){WALL_AT, 0, 0}, (vec3){0, 0, 3}, (vec3){0, 3, 0});
+    add_quad(&g.scene.mesh, LAMP, vec3_sub(at, (vec3){0.5f * LAMP_SIDE, 0.1f, 0.5f * LAMP_SIDE}),
+             (vec3){0, 0, LAMP_SIDE}, (vec3){LAMP_SIDE, 0, 0});
+    rig_init(&g);
+    size_t count, hidden = 0;
+    struct light_point *point = floor_points(&g, &count);
+    float *lit = bounced_at(&g, point, count, 1, CEILING_ALBEDO);
+    for (size_t i = 0; i < count; i++) {
+        vec3 way = vec3_sub(at, point[i].at.position);
+        double square = (double)vec3_dot(way, way);
+        if (point[i].at.position.x > WALL_AT + 0.3f) {
+            CHECK_THAT(lit[i] == 0.0f, "%g behind the wall", (double)lit[i]);
+            hidden++;
+        } else if (point[i].at.position.x < WALL_AT - 0.1f) {
+            sum[0] += (double)lit[i];
+            sum[1] += (double)(CEILING_ALBEDO * LAMP_SIDE * LAMP_SIDE * way.y * way.y) / (PI * square * square);
+        }
+    }
+    CHECK(hidden > 100 && count - hidden > 100);
+    printf("by way of a ceiling: %.3f of the closed form\n", sum[0] / sum[1]);
+    CHECK_NEAR(sum[0] / sum[1], 1.0, 0.05);
+    mem_free(lit);
+    for (size_t i = 0; i < g.model.inverse.valid_count; i++)
+        g.r.fused.count[g.model.inverse.valid[i]] = 1.0f;
+    lit = bounced_at(&g, point, count, 1, CEILING_ALBEDO);
+    for (size_t i = 0; i < count; i++)
+        CHECK_THAT(lit[i] == 0.0f, "%g by way of what photographs show", (double)lit[i]);
+    mem_free(lit);
+    mem_free(point);
+    rig_release(&g);
+}
+
+/* A lamp in a box: about uniform radiance a A / (S (1 - a (1 - h))) inside, by way of surfaces of area S of which h is
+ * a hole, Ulbricht's formula of the integrating sphere. What leaves by the hole falls on the floor below. */
+static void test_box(void) {
+    struct rig g = {0};
+    struct mesh *m = &g.scene.mesh;
+    const float s = BOX_SIDE, e = 0.5f * (BOX_SIDE - BOX_HOLE), h = BOX_HOLE;
+    const vec3 o = {1.0f, 2.0f, 1.0f}, x = {s, 0, 0}, y = {0, s, 0}, z = {0, 0, s};
+    start_room(m, 14);
+    add_quad(m, WALL, vec3_add(o, y), x, z); /* all face inwards */
+    add_quad(m, WALL, o, y, z);
+    add_quad(m, WALL, vec3_add(o, x), z, y);
+    add_quad(m, WALL, o, x, y);
+    add_quad(m, WALL, vec3_add(o, z), y, x);
+    add_quad(m, WALL, o, z, (vec3){e, 0, 0});
+    add_quad(m, WALL, vec3_add(o, (vec3){e + h, 0, 0}), z, (vec3){e, 0, 0});
+    add_quad(m, WALL, vec3_add(o, (vec3){e, 0, 0}), (vec3){0, 0, e}, (vec3){h, 0, 0});
+    add_quad(m, WALL, vec3_add(o, (vec3){e, 0, e + h}), (vec3){0, 0, e}, (vec3){h, 0, 0});
+    add_quad(m, LAMP, vec3_add(o, (vec3){0.05f, 0.1f, 0.05f}), (vec3){0, 0, LAMP_SIDE}, (vec3){LAMP_SIDE, 0, 0});
+    rig_init(&g);
+    size_t count;
+    struct light_point *point = floor_points(&g, &count);
+    float *lit = bounced_at(&g, point, count, WALL, BOX_ALBEDO);
+    double area = 6.0 * (double)(s * s), hole = (double)(h * h) / area, a = (double)BOX_ALBEDO, found = 0.0;
+    double radiance = a * (double)(LAMP_SIDE * LAMP_SIDE) / (area * (1.0 - a * (1.0 - hole))), wanted = 0.0;
+    const vec3 middle = vec3_add(o, (vec3){0.5f * s, 0, 0.5f * s});
+    for (size_t i = 0; i < count; i++) {
+        vec3 way = vec3_sub(middle, point[i].at.position);
+        double square = (double)vec3_dot(way, way);
+        found += (double)lit[i];
+        wanted += radiance * (double)(h * h * way.y * way.y) / (PI * square * square);
+    }
+    printf("out of a box: %.3f of the closed form\n", found / wanted);
+    CHECK_NEAR(found / wanted, 1.0, 0.2);
+    mem_free(lit);
+    mem_free(point);
+    rig_release(&g);
+}
+
 /* --- a sky through a hole ------------------------------------------------------------------------------------ */
 
 /* The ceiling but for the hole; the other walls are those of start_room. */
@@ -241,8 +355,77 @@ static void test_sky(void) {
     rig_release(&g);
 }
 
+/* --- doubt about a sky that no photograph shows -------------------------------------------------------------- */
+
+/* Of the floor between two places along x: mean radiance of white texels by the half of a sky of radiance SKY towards
+ * -x, by the closed form and by sky_doubt; the other half was seen. */
+static double doubt_between(const struct rig *g, float from, float to, double *wanted) {
+    uint32_t *texel = mem_array(g->model.inverse.valid_count + 1, sizeof *texel);
+    size_t count = 0, bright = 0;
+    *wanted = 0.0;
+    for (size_t i = 0; i < g->model.inverse.valid_count; i++) {
+        struct surface_point at;
+        uint32_t t = g->model.inverse.valid[i];
+        if (!(g->r.fused.count[t] > 0.0f) || !surface_at_texel(&g->scene.mesh, &g->r.atlas, &g->r.inverse, t, &at) ||
+            at.position.x < from || at.position.x > to)
+            continue;
+        texel[count++] = t;
+        if (!evidence_is_bright(&g->r, t))
+            continue;
+        double area = (double)(HOLE * HOLE) / (PARTS * PARTS);
+        for (int k = 0; k < PARTS * PARTS; k++) {
+            vec3 way = vec3_sub((vec3){0.5f + HOLE * ((float)(k % PARTS) + 0.5f) / PARTS, 3.0f,
+                                       1.0f + HOLE * ((float)(k / PARTS) + 0.5f) / PARTS},
+                                at.position);
+            double square = (double)vec3_dot(way, way);
+            *wanted += way.x < 0.0f ? (double)SKY * area * (double)(way.y * way.y) / (PI * square * square) : 0.0;
+        }
+        bright++;
+    }
+    *wanted /= fmax((double)bright, 1.0);
+    double found = (double)sky_doubt(&g->r, texel, count);
+    mem_free(texel);
+    return found;
+}
+
+/* Texels near the wall are bright, as a lamp is; what the sky may send to all others does not count. */
+static void test_doubt(void) {
+    struct rig g = {0};
+    struct environment *e = &g.r.environment;
+    make_room_with_hole(&g.scene.mesh);
+    rig_init(&g);
+    environment_make_empty(e, 64);
+    for (size_t i = 0; i < environment_pixel_count(e); i++) {
+        for (size_t c = 0; c < 3; c++)
+            e->map.pixel[3 * i + c] = SKY;
+        e->confidence.pixel[2 * i] = environment_pixel_direction(e, i).x > 0.0f;
+    }
+    world_set_environment(&g.r.world, &e->map, g.pool);
+    g.r.evidence = mem_calloc(g.r.segments.count, sizeof *g.r.evidence);
+    for (size_t s = 0; s < g.r.segments.count; s++)
+        evidence_set_radiance(&g.r.evidence[s], rgb_gray(1.0f));
+    for (size_t i = 0; i < g.model.inverse.valid_count; i++) {
+        struct surface_point at;
+        uint32_t texel = g.model.inverse.valid[i];
+        if (surface_at_texel(&g.scene.mesh, &g.r.atlas, &g.r.inverse, texel, &at) && at.position.x > 1.6f)
+            rgb_to_half(g.r.fused.radiance[texel], rgb_gray(1.0f));
+    }
+    double wanted, all;
+    double near_wall = doubt_between(&g, 0.0f, WALL_AT - 0.1f, &wanted), left = doubt_between(&g, 0.0f, 1.0f, &all);
+    printf("doubt: %.3f (%.3f), beyond the hole %.3f\n", near_wall, wanted, left);
+    CHECK_NEAR(near_wall, wanted, 0.15 * wanted);
+    CHECK_THAT(left < 0.5 * near_wall, "%g, %g: the test is too easy", left, near_wall);
+    CHECK(doubt_between(&g, WALL_AT + 0.3f, 4.0f, &wanted) == 0.0);
+    mem_free(g.r.evidence);
+    environment_release(e);
+    rig_release(&g);
+}
+
 int main(void) {
     test_sphere();
+    test_ceiling();
+    test_box();
     test_sky();
+    test_doubt();
     return check_result();
 }
