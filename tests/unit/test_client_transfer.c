@@ -180,8 +180,11 @@ static void test_submit(void) {
     CHECK_PART(err_text, "sent room (2 files");
     CHECK_PART(err_text, "warning: it is dim");
     script_end(&s, "submit");
+}
 
-    /* Another process had begun: this one finds it and goes on; that it is gone is no end either. */
+/* Another process had begun: this one finds it and goes on; that it is gone is no end either. */
+static void test_submit_resumed(void) {
+    struct script s = {0};
     add_reply(&s, "404 Not Found", "", "{\"detail\":\"no\"}", "GET /v1/scenes/", NULL, NULL);
     add_reply(&s, "422 Invalid", "", UNKNOWN_SCENE, "POST /v1/jobs?dry_run=1 ", NULL, NULL);
     add_reply(&s, "200 OK", "",
@@ -200,8 +203,11 @@ static void test_submit(void) {
     CHECK_EXIT(client(&s, "submit %s/got/room/", root), 0);
     CHECK_PART(err_text, "512 B of 3.0 KiB are on the server already");
     script_end(&s, "submit, going on");
+}
 
-    /* A fault of a setting is told before anything is sent; that of the scene is none. */
+/* A fault of a setting is told before anything is sent; that of the scene is none. */
+static void test_submit_faults(void) {
+    struct script s = {0};
     add_reply(&s, "404 Not Found", "", "{\"detail\":\"no\"}", "GET /v1/scenes/", NULL, NULL);
     add_reply(&s, "422 Invalid", "",
               "{\"detail\":\"no\",\"invalid_params\":[{\"name\":\"scene\",\"reason\":\"unknown\"},"
@@ -280,6 +286,8 @@ int main(void) {
     test_get_resumes();
     test_get_distrusts();
     test_submit();
+    test_submit_resumed();
+    test_submit_faults();
     test_check();
     file_remove_tree(root, NULL);
     return check_result();

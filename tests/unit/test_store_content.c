@@ -8,15 +8,12 @@
 
 /* --- scenes ------------------------------------------------------------------------------------ */
 
-static void test_scenes(void) {
-    char *dir = fresh_dir();
-    struct store *store;
-    struct scene_row row, rows[2];
-    bool existed, is_gone;
-    char cursor[128];
-    size_t count;
-    OK(store_open(&store, dir, &err));
+/* A scene waits for its check, is rejected, checked again, and ready; a second upload changes nothing then. */
+static void check_states(struct store *store) {
+    struct scene_row row;
     struct unchecked waiting[2];
+    bool existed, is_gone;
+    size_t count;
     OK(store_scene_unchecked(store, NULL, 0, 2, waiting, &count, &err));
     CHECK(count == 0);
     OK(store_scene_add(store, SCENE_A, "one", 10, 0, &existed, &err));
@@ -42,7 +39,12 @@ static void test_scenes(void) {
     CHECK_STRING(row.name, "one");
     CHECK_STRING(row.facts, "{\"n\":1}");
     scene_row_release(&row);
+}
 
+/* By the beginning of its id. */
+static void check_find(struct store *store) {
+    struct scene_row row;
+    bool existed, is_gone;
     OK(store_scene_find(store, NULL, "aaaa", &row, &err));
     scene_row_release(&row);
     IS(store_scene_find(store, NULL, "aaa", &row, &err), STATUS_NOT_FOUND);
@@ -52,10 +54,13 @@ static void test_scenes(void) {
     IS(store_scene_find(store, NULL, "aaaa", &row, &err), STATUS_CONFLICT);
     OK(store_scene_reject(store, SCENE_C, NULL, "[]", "{}", &err));
     OK(store_scene_delete(store, SCENE_C, -1, false, &is_gone, &err));
+}
 
-    OK(store_scene_add(store, SCENE_B, "two", 1, 0, &existed, &err));
-    cursor[0] = '\0';
-    size_t seen = 0;
+/* Page by page, by cursor. */
+static void check_pages(struct store *store, size_t scenes) {
+    struct scene_row rows[2];
+    char cursor[128] = "";
+    size_t count, seen = 0;
     do {
         char at[128];
         memcpy(at, cursor, sizeof at);
@@ -64,8 +69,20 @@ static void test_scenes(void) {
         for (size_t i = 0; i < count; i++)
             scene_row_release(&rows[i]);
     } while (cursor[0] && seen < 10);
-    CHECK(seen == 2);
+    CHECK(seen == scenes);
     IS(store_scene_list(store, NULL, "1; DROP TABLE", 1, rows, &count, cursor, &err), STATUS_INPUT);
+}
+
+static void test_scenes(void) {
+    char *dir = fresh_dir();
+    struct store *store;
+    struct scene_row row;
+    bool existed, is_gone;
+    OK(store_open(&store, dir, &err));
+    check_states(store);
+    check_find(store);
+    OK(store_scene_add(store, SCENE_B, "two", 1, 0, &existed, &err));
+    check_pages(store, 2);
 
     int64_t job = add_job(store, SCENE_A, 0);
     IS(store_scene_delete(store, SCENE_A, -1, false, &is_gone, &err), STATUS_CONFLICT);
@@ -230,6 +247,31 @@ static void test_sent_again(void) {
 
 /* --- events and outputs ------------------------------------------------------------------------ */
 
+/* Names are plain, a later output replaces an earlier one. */
+static void check_outputs(struct store *store, int64_t id, int attempt) {
+    static const char *const bad[] = {"",        "/etc/passwd", "../x", "a/../b", "a//b",
+                                      ".hidden", "a/.b",        "a b",  "x/",     "caf\xc3\xa9"};
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
+        IS(store_output_put(store, id, attempt, EVENT_OUTPUT, bad[i], 1, SCENE_A, "t", &err), STATUS_INPUT);
+    IS(store_output_put(store, id, attempt, EVENT_OUTPUT, "a", 1, "short", "t", &err), STATUS_INPUT);
+    OK(store_output_put(store, id, attempt, EVENT_PREVIEW, "preview/a.png", 1, SCENE_A, "image/png", &err));
+    OK(store_output_put(store, id, attempt, EVENT_PREVIEW, "preview/a.png", 2, SCENE_B, "image/png", &err));
+    OK(store_output_put(store, id, attempt, EVENT_OUTPUT, "base_color.exr", 3, SCENE_A, "image/x-exr", &err));
+    struct output_row row, *rows;
+    size_t count;
+    OK(store_output_get(store, id, "preview/a.png", &row, &err));
+    CHECK(row.bytes == 2 && row.attempt == attempt);
+    CHECK_STRING(row.sha256, SCENE_B);
+    output_row_release(&row);
+    IS(store_output_get(store, id, "nothing", &row, &err), STATUS_NOT_FOUND);
+    OK(store_output_list(store, id, &rows, &count, &err));
+    CHECK(count == 2);
+    CHECK_STRING(rows[0].name, "base_color.exr");
+    for (size_t i = 0; i < count; i++)
+        output_row_release(&rows[i]);
+    mem_free(rows);
+}
+
 static void test_events(void) {
     char *dir = fresh_dir();
     struct store *store;
@@ -273,28 +315,7 @@ static void test_events(void) {
     CHECK(last == 0);
     CHECK(events_of(store, other) == 1);
 
-    /* Outputs: names are plain, a later one replaces an earlier one, each has its event. */
-    static const char *const bad[] = {"",        "/etc/passwd", "../x", "a/../b", "a//b",
-                                      ".hidden", "a/.b",        "a b",  "x/",     "caf\xc3\xa9"};
-    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
-        IS(store_output_put(store, id, attempt, EVENT_OUTPUT, bad[i], 1, SCENE_A, "t", &err), STATUS_INPUT);
-    IS(store_output_put(store, id, attempt, EVENT_OUTPUT, "a", 1, "short", "t", &err), STATUS_INPUT);
-    OK(store_output_put(store, id, attempt, EVENT_PREVIEW, "preview/a.png", 1, SCENE_A, "image/png", &err));
-    OK(store_output_put(store, id, attempt, EVENT_PREVIEW, "preview/a.png", 2, SCENE_B, "image/png", &err));
-    OK(store_output_put(store, id, attempt, EVENT_OUTPUT, "base_color.exr", 3, SCENE_A, "image/x-exr", &err));
-    struct output_row row, *rows;
-    size_t count;
-    OK(store_output_get(store, id, "preview/a.png", &row, &err));
-    CHECK(row.bytes == 2 && row.attempt == attempt);
-    CHECK_STRING(row.sha256, SCENE_B);
-    output_row_release(&row);
-    IS(store_output_get(store, id, "nothing", &row, &err), STATUS_NOT_FOUND);
-    OK(store_output_list(store, id, &rows, &count, &err));
-    CHECK(count == 2);
-    CHECK_STRING(rows[0].name, "base_color.exr");
-    for (size_t i = 0; i < count; i++)
-        output_row_release(&rows[i]);
-    mem_free(rows);
+    check_outputs(store, id, attempt);
     CHECK(events_of(store, id) == (int64_t)whole.count + 3);
     store_close(store);
     drop_dir(dir);

@@ -22,14 +22,9 @@ static void test_equal(void) {
     CHECK(!sha256_equal(b, b));
 }
 
-static void test_tokens(void) {
-    char *dir = fresh_dir(), token[TOKEN_SIZE], second[TOKEN_SIZE], wrong[TOKEN_SIZE + 40];
-    struct store *store;
-    struct caller who;
-    int64_t id, other;
-    size_t count;
-    OK(store_open(&store, dir, &err));
-    CHECK(!store_has_users(store));
+static void check_bad_names(struct store *store) {
+    char token[TOKEN_SIZE];
+    int64_t id;
     static const char *const bad[] = {"",
                                       "7up",
                                       "a b",
@@ -40,6 +35,67 @@ static void test_tokens(void) {
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
         IS(store_token_add(store, bad[i], ROLE_USER, 0, token, &id, &err), STATUS_INPUT);
     CHECK(!store_has_users(store));
+}
+
+/* Each digit counts, the secret of token `other` is not this one's, and forms that are none. */
+static void check_wrong_tokens(struct store *store, const char *token, int64_t other) {
+    char wrong[TOKEN_SIZE + 40];
+    struct caller who;
+    for (size_t i = 0; token[i]; i++) {
+        memcpy(wrong, token, TOKEN_SIZE);
+        wrong[i] = wrong[i] == '0' ? '1' : '0';
+        IS(store_token_find(store, wrong, &who, &err), STATUS_NOT_FOUND);
+        CHECK(who.user_id == 0 && who.token_id == 0 && who.role == ROLE_VIEWER);
+        memcpy(wrong, token, TOKEN_SIZE);
+        wrong[i] = '\0';
+        IS(store_token_find(store, wrong, &who, &err), STATUS_NOT_FOUND);
+    }
+    snprintf(wrong, sizeof wrong, "unbake_%lld%s", (long long)other, strchr(token + 7, '_'));
+    IS(store_token_find(store, wrong, &who, &err), STATUS_NOT_FOUND);
+    snprintf(wrong, sizeof wrong, "%s0", token);
+    IS(store_token_find(store, wrong, &who, &err), STATUS_NOT_FOUND);
+    IS(store_token_find(store, "unbake_99999999999999999999_", &who, &err), STATUS_NOT_FOUND);
+}
+
+/* The secret of a token is not in the database. */
+static void check_secrecy(const char *dir, const char *token) {
+    struct buf content;
+    buf_init(&content, (size_t)64 << 20);
+    char *path = file_join(dir, "state.db-wal");
+    OK(file_read(path, &content, &err));
+    CHECK(content.length > 0 && !memmem(content.data, content.length, strchr(token + 7, '_') + 1, 48));
+    mem_free(path);
+    buf_release(&content);
+}
+
+/* Revokes a token of alice's, who has two, by its number, then the other by her name. */
+static void check_revocation(struct store *store, const char *token, int64_t id, int64_t other) {
+    struct caller who;
+    struct token_row *rows;
+    size_t count;
+    char number[24];
+    OK(store_token_list(store, &rows, &count, &err));
+    CHECK(count == 2 && rows[0].id == id && rows[1].role == ROLE_VIEWER);
+    CHECK_STRING(rows[1].name, "alice");
+    mem_free(rows);
+    snprintf(number, sizeof number, "%lld", (long long)id);
+    OK(store_token_revoke(store, number, &count, &err));
+    CHECK(count == 1 && !store_token_is_valid(store, id) && store_token_is_valid(store, other));
+    IS(store_token_find(store, token, &who, &err), STATUS_NOT_FOUND);
+    IS(store_token_revoke(store, number, &count, &err), STATUS_NOT_FOUND);
+    IS(store_token_revoke(store, "bob", &count, &err), STATUS_NOT_FOUND);
+    OK(store_token_revoke(store, "alice", &count, &err));
+    CHECK(count == 1);
+}
+
+static void test_tokens(void) {
+    char *dir = fresh_dir(), token[TOKEN_SIZE], second[TOKEN_SIZE];
+    struct store *store;
+    struct caller who;
+    int64_t id, other;
+    OK(store_open(&store, dir, &err));
+    CHECK(!store_has_users(store));
+    check_bad_names(store);
     OK(store_token_add(store, "alice", ROLE_USER, 0, token, &id, &err));
     OK(store_token_add(store, "alice", ROLE_VIEWER, 0, second, &other, &err));
     CHECK(store_has_users(store) && id != other);
@@ -49,46 +105,9 @@ static void test_tokens(void) {
     int64_t alice = who.user_id;
     OK(store_token_find(store, second, &who, &err));
     CHECK(who.role == ROLE_VIEWER && who.user_id == alice);
-
-    /* Each digit counts, the other token's secret is not this one's, and forms that are none. */
-    for (size_t i = 0; token[i]; i++) {
-        memcpy(wrong, token, sizeof token);
-        wrong[i] = wrong[i] == '0' ? '1' : '0';
-        IS(store_token_find(store, wrong, &who, &err), STATUS_NOT_FOUND);
-        CHECK(who.user_id == 0 && who.token_id == 0 && who.role == ROLE_VIEWER);
-        memcpy(wrong, token, sizeof token);
-        wrong[i] = '\0';
-        IS(store_token_find(store, wrong, &who, &err), STATUS_NOT_FOUND);
-    }
-    snprintf(wrong, sizeof wrong, "unbake_%lld%s", (long long)other, strchr(token + 7, '_'));
-    IS(store_token_find(store, wrong, &who, &err), STATUS_NOT_FOUND);
-    snprintf(wrong, sizeof wrong, "%s0", token);
-    IS(store_token_find(store, wrong, &who, &err), STATUS_NOT_FOUND);
-    IS(store_token_find(store, "unbake_99999999999999999999_", &who, &err), STATUS_NOT_FOUND);
-
-    /* The secret is not in the database. */
-    struct buf content;
-    buf_init(&content, (size_t)64 << 20);
-    char *path = file_join(dir, "state.db-wal");
-    OK(file_read(path, &content, &err));
-    CHECK(content.length > 0 && !memmem(content.data, content.length, strchr(token + 7, '_') + 1, 48));
-    mem_free(path);
-    buf_release(&content);
-
-    struct token_row *rows;
-    OK(store_token_list(store, &rows, &count, &err));
-    CHECK(count == 2 && rows[0].id == id && rows[1].role == ROLE_VIEWER);
-    CHECK_STRING(rows[1].name, "alice");
-    mem_free(rows);
-    char number[24];
-    snprintf(number, sizeof number, "%lld", (long long)id);
-    OK(store_token_revoke(store, number, &count, &err));
-    CHECK(count == 1 && !store_token_is_valid(store, id) && store_token_is_valid(store, other));
-    IS(store_token_find(store, token, &who, &err), STATUS_NOT_FOUND);
-    IS(store_token_revoke(store, number, &count, &err), STATUS_NOT_FOUND);
-    IS(store_token_revoke(store, "bob", &count, &err), STATUS_NOT_FOUND);
-    OK(store_token_revoke(store, "alice", &count, &err));
-    CHECK(count == 1);
+    check_wrong_tokens(store, token, other);
+    check_secrecy(dir, token);
+    check_revocation(store, token, id, other);
     CHECK(store_has_users(store)); /* who had users once does not fall open */
     store_close(store);
     OK(store_open(&store, dir, &err));
@@ -290,70 +309,88 @@ static void test_ages(void) {
     drop_dir(dir);
 }
 
-static void test_lists(void) {
-    char *dir = fresh_dir();
-    struct store *store;
-    struct caller alice, bob, admin = {.role = ROLE_ADMIN};
+/* What three callers see of scenes, and of jobs that one of them shares. */
+struct callers {
+    struct caller alice, bob, admin;
+};
+
+static void check_scenes_seen(struct store *store, const struct callers *c) {
     struct scene_row row;
-    struct job job;
-    bool existed, is_gone;
-    enum access access;
-    OK(store_open(&store, dir, &err));
-    alice = add_user(store, "alice");
-    bob = add_user(store, "bob");
-    OK(store_scene_add(store, SCENE_A, "a", 1, alice.user_id, &existed, &err));
-    OK(store_scene_ready(store, SCENE_A, NULL, "{}", &err));
-    OK(store_scene_add(store, SCENE_C, "c", 1, bob.user_id, &existed, &err));
-    OK(store_scene_ready(store, SCENE_C, NULL, "{}", &err));
-    CHECK(scenes_seen(store, &alice) == 1 && scenes_seen(store, &bob) == 1 && scenes_seen(store, &admin) == 2);
-    OK(store_scene_find(store, &alice, "aaaa", &row, &err)); /* ambiguous only among one's own */
+    CHECK(scenes_seen(store, &c->alice) == 1 && scenes_seen(store, &c->bob) == 1 && scenes_seen(store, &c->admin) == 2);
+    OK(store_scene_find(store, &c->alice, "aaaa", &row, &err)); /* ambiguous only among one's own */
     CHECK_STRING(row.id, SCENE_A);
     CHECK_STRING(row.owner, "alice");
     scene_row_release(&row);
-    IS(store_scene_find(store, &admin, "aaaa", &row, &err), STATUS_CONFLICT);
-    IS(store_scene_find(store, &alice, "aaaac", &row, &err), STATUS_NOT_FOUND);
+    IS(store_scene_find(store, &c->admin, "aaaa", &row, &err), STATUS_CONFLICT);
+    IS(store_scene_find(store, &c->alice, "aaaac", &row, &err), STATUS_NOT_FOUND);
+}
 
-    /* One key each: bob's does not find alice's job. */
-    int64_t first = add_own_job(store, SCENE_A, alice.user_id, "key");
-    int64_t second = add_own_job(store, SCENE_A, bob.user_id, "key");
-    CHECK(first != second && add_own_job(store, SCENE_A, alice.user_id, "key") == first);
-    CHECK(jobs_seen(store, &alice, -1) == 1 && jobs_seen(store, &bob, JOB_QUEUED) == 1 &&
-          jobs_seen(store, &admin, -1) == 2 && jobs_seen(store, NULL, JOB_QUEUED) == 2);
-    OK(store_scene_access(store, &bob, SCENE_A, &access, &err));
+/* Alice's job becomes bob's to read, and its scene with it, and is taken back. */
+static void check_sharing(struct store *store, const struct callers *c, int64_t job_id) {
+    struct job job;
+    enum access access;
+    OK(store_scene_access(store, &c->bob, SCENE_A, &access, &err));
     CHECK(access == ACCESS_NONE);
-    OK(store_job_patch(store, first, -1, &(struct job_patch){.priority = INT_MIN, .shared = 1}, &err));
-    OK(store_job_get(store, first, &job, &err));
-    CHECK(job.is_shared && caller_access_job(&bob, &job) == ACCESS_READ &&
-          caller_access_job(&alice, &job) == ACCESS_CHANGE);
+    OK(store_job_patch(store, job_id, -1, &(struct job_patch){.priority = INT_MIN, .shared = 1}, &err));
+    OK(store_job_get(store, job_id, &job, &err));
+    CHECK(job.is_shared && caller_access_job(&c->bob, &job) == ACCESS_READ &&
+          caller_access_job(&c->alice, &job) == ACCESS_CHANGE);
     CHECK_STRING(job.owner, "alice");
     job_release(&job);
-    OK(store_scene_access(store, &bob, SCENE_A, &access, &err));
-    CHECK(access == ACCESS_READ && jobs_seen(store, &bob, -1) == 2 && scenes_seen(store, &bob) == 2);
-    OK(store_job_patch(store, first, -1, &(struct job_patch){.name = "x", .priority = INT_MIN, .shared = -1},
+    OK(store_scene_access(store, &c->bob, SCENE_A, &access, &err));
+    CHECK(access == ACCESS_READ && jobs_seen(store, &c->bob, -1) == 2 && scenes_seen(store, &c->bob) == 2);
+    OK(store_job_patch(store, job_id, -1, &(struct job_patch){.name = "x", .priority = INT_MIN, .shared = -1},
                        &err)); /* stays shared */
-    CHECK(jobs_seen(store, &bob, -1) == 2);
-    OK(store_job_patch(store, first, -1, &(struct job_patch){.priority = INT_MIN, .shared = 0}, &err));
-    CHECK(jobs_seen(store, &bob, -1) == 1);
+    CHECK(jobs_seen(store, &c->bob, -1) == 2);
+    OK(store_job_patch(store, job_id, -1, &(struct job_patch){.priority = INT_MIN, .shared = 0}, &err));
+    CHECK(jobs_seen(store, &c->bob, -1) == 1);
+}
 
-    /* Both have sent the same bytes: the scene stays until the last of them removes it. */
-    OK(store_scene_add(store, SCENE_A, "a", 1, bob.user_id, &existed, &err));
-    CHECK(!existed && scenes_seen(store, &bob) == 2);
+/* Both have sent the same bytes, and have a job each: the scene stays until the last of them removes it. */
+static void check_common_scene(struct store *store, const struct callers *c, int64_t first, int64_t second) {
+    bool existed, is_gone;
+    OK(store_scene_add(store, SCENE_A, "a", 1, c->bob.user_id, &existed, &err));
+    CHECK(!existed && scenes_seen(store, &c->bob) == 2);
     const struct retention past = {.sets_expiry = true, .expires_ms = 1}, pin = {.pin = KEEP_PIN_ON},
                            loose = {.pin = KEEP_PIN_OFF};
-    OK(store_scene_patch(store, &alice, SCENE_A, &(struct scene_patch){"mine", pin, NULL}, &err));
-    IS(store_scene_patch(store, &bob, SCENE_A, &(struct scene_patch){NULL, loose, NULL}, &err), STATUS_CONFLICT);
-    IS(store_scene_patch(store, &bob, SCENE_A, &(struct scene_patch){NULL, past, NULL}, &err), STATUS_CONFLICT);
-    OK(store_scene_patch(store, &admin, SCENE_A, &(struct scene_patch){NULL, loose, NULL}, &err));
-    IS(store_scene_delete(store, SCENE_A, alice.user_id, false, &is_gone, &err), STATUS_CONFLICT);
+    OK(store_scene_patch(store, &c->alice, SCENE_A, &(struct scene_patch){"mine", pin, NULL}, &err));
+    IS(store_scene_patch(store, &c->bob, SCENE_A, &(struct scene_patch){NULL, loose, NULL}, &err), STATUS_CONFLICT);
+    IS(store_scene_patch(store, &c->bob, SCENE_A, &(struct scene_patch){NULL, past, NULL}, &err), STATUS_CONFLICT);
+    OK(store_scene_patch(store, &c->admin, SCENE_A, &(struct scene_patch){NULL, loose, NULL}, &err));
+    IS(store_scene_delete(store, SCENE_A, c->alice.user_id, false, &is_gone, &err), STATUS_CONFLICT);
     OK(store_job_cancel(store, first, &err));
-    OK(store_scene_delete(store, SCENE_A, alice.user_id, false, &is_gone, &err));
-    CHECK(!is_gone && scenes_seen(store, &alice) == 0 && scenes_seen(store, &bob) == 2);
-    OK(store_scene_patch(store, &bob, SCENE_A, &(struct scene_patch){NULL, past, NULL},
+    OK(store_scene_delete(store, SCENE_A, c->alice.user_id, false, &is_gone, &err));
+    CHECK(!is_gone && scenes_seen(store, &c->alice) == 0 && scenes_seen(store, &c->bob) == 2);
+    OK(store_scene_patch(store, &c->bob, SCENE_A, &(struct scene_patch){NULL, past, NULL},
                          &err)); /* it is his alone now */
-    IS(store_scene_delete(store, SCENE_A, bob.user_id, false, &is_gone, &err), STATUS_CONFLICT);
+    IS(store_scene_delete(store, SCENE_A, c->bob.user_id, false, &is_gone, &err), STATUS_CONFLICT);
     OK(store_job_cancel(store, second, &err));
-    OK(store_scene_delete(store, SCENE_A, bob.user_id, false, &is_gone, &err));
-    CHECK(is_gone && scenes_seen(store, &admin) == 1);
+    OK(store_scene_delete(store, SCENE_A, c->bob.user_id, false, &is_gone, &err));
+    CHECK(is_gone && scenes_seen(store, &c->admin) == 1);
+}
+
+static void test_lists(void) {
+    char *dir = fresh_dir();
+    struct store *store;
+    bool existed;
+    OK(store_open(&store, dir, &err));
+    struct callers c = {.admin = {.role = ROLE_ADMIN}};
+    c.alice = add_user(store, "alice");
+    c.bob = add_user(store, "bob");
+    OK(store_scene_add(store, SCENE_A, "a", 1, c.alice.user_id, &existed, &err));
+    OK(store_scene_ready(store, SCENE_A, NULL, "{}", &err));
+    OK(store_scene_add(store, SCENE_C, "c", 1, c.bob.user_id, &existed, &err));
+    OK(store_scene_ready(store, SCENE_C, NULL, "{}", &err));
+    check_scenes_seen(store, &c);
+
+    /* One key each: bob's does not find alice's job. */
+    int64_t first = add_own_job(store, SCENE_A, c.alice.user_id, "key");
+    int64_t second = add_own_job(store, SCENE_A, c.bob.user_id, "key");
+    CHECK(first != second && add_own_job(store, SCENE_A, c.alice.user_id, "key") == first);
+    CHECK(jobs_seen(store, &c.alice, -1) == 1 && jobs_seen(store, &c.bob, JOB_QUEUED) == 1 &&
+          jobs_seen(store, &c.admin, -1) == 2 && jobs_seen(store, NULL, JOB_QUEUED) == 2);
+    check_sharing(store, &c, first);
+    check_common_scene(store, &c, first, second);
     store_close(store);
     drop_dir(dir);
 }
