@@ -26,27 +26,27 @@ unit/test_worker_faults chaos/test_disk_faults unit/test_attempt_faults api/test
 chaos/test_power_cut unit/test_scheduler_faults unit/test_scheduler_retries unit/test_delivery render/test_detail
 api/test_client_commands api/test_client_scripts render/test_sampling api/test_admin unit/test_corrections
 unit/test_luminance_unit api/test_older_data"
-# Names of the tests that have one thread: neither they nor a header that they include name threads, nor does the unit of
-# such a header begin one.
-in_one_thread() {
-    local threads='parallel|pthread|thread' headers
+# Names of the tests that begin no thread but those of a pool (common/parallel.h): neither they nor a header that they
+# include begin one, nor does the unit of such a header.
+without_own_threads() {
+    local begins='pthread_create|background_start|thrd_create' headers
     headers=$({
-        grep -lE "$threads" tests/*.h tests/*/*.h
-        grep -rlE --include='*.c' 'pthread_create|background_start' common server client | sed 's/c$/h/'
+        grep -lE "$begins" tests/*.h tests/*/*.h
+        grep -rlE --include='*.c' "$begins" common server client | grep -v '^common/parallel' | sed 's/c$/h/'
     } | tr '\n' '|')
-    grep -LE "$threads|${headers%|}" tests/unit/test_*.c tests/gradient/test_*.c tests/render/test_*.c |
-        sed 's|^tests/||; s|\.c$||' | tr '\n' ' '
+    grep -LE "$begins|${headers%|}" tests/unit/test_*.c tests/gradient/test_*.c tests/render/test_*.c |
+        grep -v unit/test_parallel | sed 's|^tests/||; s|\.c$||' | tr '\n' ' '
 }
 
-# The thread sanitizer has nothing to find in one thread either, nor in whole reconstructions what those of
-# api/test_webhooks, of a small room, do not tell.
+# The thread sanitizer has nothing to find in one thread either, nor in the engine's loops and whole reconstructions what
+# the reconstruction of a small room in api/test_webhooks does not tell.
 slow_tsan="$slow_asan render/test_relight_forms render/test_sun_caustics
 unit/test_checkpoint_faults unit/test_checkpoint_parts unit/test_export unit/test_store_faults
 api/test_one_job render/test_gather unit/test_checkpoint unit/test_captures api/test_client_check unit/test_bundle unit/test_segment
 unit/test_evaluate api/test_metrics
 api/test_http_durable api/test_http_threads render/test_inserts unit/test_demo
 chaos/test_memory_faults api/test_node_tls api/test_scenes render/test_furnace
-$(cd tests && echo fuzz/test_*.c | sed 's/\.c//g') $(in_one_thread)"
+$(cd tests && echo fuzz/test_*.c | sed 's/\.c//g') $(without_own_threads)"
 
 if [ "$only" = --slow ]; then
     case $1 in asan) echo $slow_asan ;; tsan) echo $slow_tsan ;; esac

@@ -41,8 +41,8 @@ stop() {
     daemon=
 }
 submit() {
-    "$build/unbake" submit "$dir/room" --set texture_size=128 --set iterations=60 \
-        --set gather_samples=64 --set gloss_passes=1 --set texels_per_iteration=2048 --set report_samples=4 --set preview_interval_sec=60 >/dev/null 2>&1 ||
+    "$build/unbake" submit "$dir/room" --set texture_size=96 --set iterations=40 \
+        --set gather_samples=32 --set gloss_passes=1 --set texels_per_iteration=2048 --set report_samples=4 --set preview_interval_sec=60 >/dev/null 2>&1 ||
         fail "submit"
 }
 # textures NAME: the hashes of what the job left.

@@ -23,8 +23,8 @@ static rgb wall_color[OBJECTS] = {{0.6f, 0.5f, 0.4f}, {0.8f, 0.8f, 0.8f}, {0.7f,
 /* A test may make walls glossy before they are photographed. */
 static float wall_roughness[OBJECTS] = {1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f};
 static float wall_specular[OBJECTS];
-/* Of each pixel. A test for whose outcome noise matters little may take fewer: a set takes .024 s for each. */
-static uint32_t photograph_samples = 64;
+/* Of each pixel. A test for whose outcome noise matters may take more: a set takes .024 s for each. */
+static uint32_t photograph_samples = 32;
 static const rgb lamp_radiance = {9.0f, 8.0f, 6.0f};
 /* A test may have another object shine as the lamp does. */
 static size_t other_lamp = LAMP;

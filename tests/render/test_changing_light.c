@@ -122,7 +122,6 @@ static void test_glossy(struct parallel *pool) {
 
 int main(void) {
     struct parallel *pool = parallel_new(0);
-    photograph_samples = 32;
     test_diffuse(pool);
     if (!IS_BRIEF)
         test_glossy(pool);

@@ -51,7 +51,6 @@ int main(void) {
     struct parallel *pool = parallel_new(0);
     struct scene scene = {0};
     size_t tried = 0;
-    photograph_samples = 32;
     make_speckled_room(&scene.mesh);
     photograph_mesh(&scene, lamp_radiance, NULL, look_anywhere, pool);
     for (size_t f = 0; f < scene.photograph_count && (!IS_BRIEF || tried < 1); f++) {

@@ -129,7 +129,6 @@ static void test_gap(struct parallel *pool) {
 
 int main(void) {
     struct parallel *pool = parallel_new(0);
-    photograph_samples = 32;
     test_hidden(pool);
     if (!IS_BRIEF) {
         test_none_hidden(pool);

@@ -57,7 +57,7 @@ static void test_same_bytes(struct scene *scene, bool solves, int iterations, co
 }
 
 static void test_stop_in_solve(struct scene *scene) {
-    struct settings s = shell_settings("{\"texture_size\":64,\"iterations\":4,\"report_samples\":2}");
+    struct settings s = shell_settings("{\"texture_size\":64,\"iterations\":4,\"gather_samples\":16}");
     struct shell shell = {.polls_until_stop = 3};
     struct reconstruction r;
     CHECK(shell_run(scene, &s, 2, &shell, &r) == STATUS_CANCELLED);
@@ -118,7 +118,7 @@ static void turn_inside_out(struct mesh *mesh, int64_t object) {
 static void test_recovers(struct scene *scene) {
     turn_inside_out(&scene->mesh, INSIDE_OUT);
     struct settings s = shell_settings("{\"texture_size\":64,\"iterations\":400,\"report_samples\":32,"
-                                       "\"texels_per_iteration\":512}");
+                                       "\"gather_samples\":64,\"texels_per_iteration\":512}");
     struct shell shell = {.polls_until_stop = -1};
     struct reconstruction r;
     CHECK(shell_run(scene, &s, 0, &shell, &r) == STATUS_OK);
