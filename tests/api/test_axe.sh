@@ -7,7 +7,7 @@
 mkdir -m 750 "$data"
 UNBAKE_TOKEN=$("$build/unbaked" token add ada --role admin --data "$data" 2>/dev/null)
 export UNBAKE_TOKEN
-daemon_start
+daemon_start --set threads=1 # one job runs all the time
 make_room "$work/room" 12
 run 0 submit "$work/room" --set texture_size=64 --set texels_per_metre=2 --set iterations=20 --set texels_per_iteration=64 --set report_samples=1 --watch
 run 0 submit "$work/room" --set texture_size=64 --set texels_per_metre=2 --set iterations=1000000000 --set texels_per_iteration=64 --name 'one that runs'

@@ -19,7 +19,7 @@ try() {
     local name=$1 psnr=$2 msre=$3 passes=$4
     shift 4
     "$build/unbaked" demo-room "$work/$name" --width 96 --height 72 --frames 24 --test-frames 4 \
-        --spp 24 --test-spp 64 --texture-size 512 "$@" >"$work/$name.log" 2>&1 ||
+        --spp 16 --test-spp 32 --texture-size 512 "$@" >"$work/$name.log" 2>&1 ||
         fail "demo-room: $(tail -n 3 "$work/$name.log")"
     tar -C "$work/$name" --exclude=./truth -cf "$work/$name.tar" .
     "$build/unbake" submit "$work/$name.tar" --watch --set texture_size=256 --set iterations=80 --set gather_samples=64 --set "gloss_passes=$passes" \
