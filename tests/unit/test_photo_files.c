@@ -267,18 +267,11 @@ static void check_names(const char *one, const char *two, const char *three) {
         CHECK_THAT(strcmp(scene.photograph[i].name, wanted[i]) == 0, "%s, not %s", scene.photograph[i].name, wanted[i]);
 }
 
-static void names(void) {
+/* Names that differ from those on the disk in case, in their extension, in folders before them, in the spelling of
+ * letters. */
+static void check_found(const char *mask) {
     struct image black;
-    CHECK(file_remove_tree(work, NULL) == STATUS_OK && mkdir(work, 0700) == 0);
-    put("mesh.ply", MESH, strlen(MESH));
-    make_folder("images");
-    make_folder("masks");
-    put_copy("images/a.jpg", PLAIN, SIZE_MAX);
-    put_copy("images/b.JPG", PLAIN, SIZE_MAX);
-    put_copy("images/c.jpeg", PLAIN, SIZE_MAX);
-    put("images/c.dng", "II*", 4); /* beside the picture, as cameras write them */
     image_init_rgb(&black, 24, 16);
-    char *mask = file_join(work, "masks/a.png");
     CHECK(image_write_png(mask, &black, 1, NULL) == STATUS_OK);
     image_release(&black);
     put_frames("images/A.JPG", "images/b.jpg", "images/c.png", NULL);
@@ -289,21 +282,28 @@ static void names(void) {
     CHECK_THAT(load(work), "%s", told);
     check_names("images/a.jpg", "images/b.JPG", "images/c.jpeg");
     CHECK(scene.photograph[0].mask && scene.photograph[0].mask[0] == 0 && !scene.photograph[1].mask);
-    image_init_rgb(&black, 48, 32); /* of a photograph twice as large; its left half is white */
+}
+
+/* A mask may be of a photograph twice as large; one that is missing is no photograph of its name. */
+static void check_masks(const char *mask) {
+    struct image large;
+    image_init_rgb(&large, 48, 32); /* its left half is white */
     for (size_t i = 0; i < (size_t)48 * 32; i++)
-        black.pixel[3 * i] = black.pixel[3 * i + 1] = black.pixel[3 * i + 2] = i % 48 < 24;
-    CHECK(image_write_png(mask, &black, 1, NULL) == STATUS_OK);
-    image_release(&black);
+        large.pixel[3 * i] = large.pixel[3 * i + 1] = large.pixel[3 * i + 2] = i % 48 < 24;
+    CHECK(image_write_png(mask, &large, 1, NULL) == STATUS_OK);
+    image_release(&large);
     put_frames("images/a.jpg", "images/b.JPG", "images/c.jpeg", "masks/a.png");
     CHECK_THAT(load(work) && scene.photograph[0].mask, "%s", told);
     for (size_t i = 0; i < (size_t)24 * 16 && scene.photograph[0].mask; i++)
         CHECK(scene.photograph[0].mask[i] == (i % 24 < 12 ? 255 : 0));
     put_frames("../in/images/a.jpg", "../in/images/b.jpg", "../in/images/c.jpeg", "masks/a.png");
     CHECK_THAT(load(work) && scene.photograph[0].mask, "%s", told);
-    /* a mask that is missing is no photograph of its name */
     CHECK(unlink(mask) == 0);
     put_frames("images/a.jpg", "images/b.JPG", "images/c.jpeg", "masks/a.jpg");
     CHECK_THAT(!load(work) && strstr(told, "the mask is not in the bundle"), "%s", told);
+}
+
+static void check_spelling(void) {
     /* "a" and a combining diaeresis on the disk, as macOS writes it, one letter in the list; upper case */
     put_copy("images/a\xcc\x88.jpg", PLAIN, SIZE_MAX);
     put_copy("images/a\xcc\x8a.jpg", PLAIN, SIZE_MAX);
@@ -314,14 +314,18 @@ static void names(void) {
     put_copy("images/\xe4.jpg", PLAIN, SIZE_MAX);
     put_frames("images/a.jpg", "images/b.JPG", "images/c.png", NULL);
     CHECK_THAT(load(work), "%s", told);
-    /* a mesh that is a link is not found, and the reason is told */
+}
+
+/* What is not found, and the reason that is told. */
+static void check_reasons(void) {
+    /* a mesh that is a link */
     char *mesh = file_join(work, "mesh.ply"), *other = file_join(work, "mesh");
     CHECK(rename(mesh, other) == 0 && symlink("mesh", mesh) == 0);
     CHECK_THAT(!load(work) && strstr(told, "links are not searched, mesh.ply for one (1 in all)"), "%s", told);
     CHECK(rename(other, mesh) == 0);
     mem_free(other);
     mem_free(mesh);
-    /* a list of frames by another name is told */
+    /* a list of frames by another name */
     char *list = file_join(work, "transforms.json"), *renamed = file_join(work, "frames_b.json");
     CHECK(rename(list, renamed) == 0);
     CHECK_THAT(!load(work) && strstr(told, "frames_b.json has frames") && strstr(told, "transforms=PATH"), "%s", told);
@@ -332,6 +336,22 @@ static void names(void) {
     put_copy("images/c.tif", PLAIN, SIZE_MAX);
     put_frames("images/a.jpg", "images/b.JPG", "images/c.png", NULL);
     CHECK_THAT(!load(work) && strstr(told, "images/c.jpeg or images/c.tif"), "%s", told);
+}
+
+static void names(void) {
+    CHECK(file_remove_tree(work, NULL) == STATUS_OK && mkdir(work, 0700) == 0);
+    put("mesh.ply", MESH, strlen(MESH));
+    make_folder("images");
+    make_folder("masks");
+    put_copy("images/a.jpg", PLAIN, SIZE_MAX);
+    put_copy("images/b.JPG", PLAIN, SIZE_MAX);
+    put_copy("images/c.jpeg", PLAIN, SIZE_MAX);
+    put("images/c.dng", "II*", 4); /* beside the picture, as cameras write them */
+    char *mask = file_join(work, "masks/a.png");
+    check_found(mask);
+    check_masks(mask);
+    check_spelling();
+    check_reasons();
     mem_free(mask);
 }
 

@@ -95,8 +95,48 @@ static int talk(struct progress *p, const char *dir) {
     return 0;
 }
 
+/* An attempt that goes well. */
+static int play_whole(struct progress *p, const char *dir) {
+    progress_stage(p, "prepare");
+    progress_step(p, "refine", 3, 4, 1.5);
+    progress_metric(p, "loss", 3, 0.25);
+    /* As progress_log, and what is for the daemon to say. */
+    static const char hello[] = "{\"type\":\"log\",\"level\":\"info\",\"message\":\"hello\",\"job\":1,\"attempt\":9,"
+                                "\"at\":\"1970-01-01T00:00:00.000Z\",\"snapshot\":true}\n";
+    if (write(PROGRESS_FD, hello, sizeof hello - 1) != sizeof hello - 1)
+        return 92;
+    progress_checkpoint(p, 3, 1000000, 0.1);
+    announce(p, dir, "good.txt", "good.txt", 4);
+    progress_end(p, STATUS_OK, "", "");
+    return 0;
+}
+
+/* Roles that only say how they end. */
+static const struct {
+    const char *role;
+    bool says; /* an end, by these: */
+    enum status status;
+    const char *message, *hint;
+    int code; /* exit status */
+} ends[] = {
+    {"input", true, STATUS_INPUT, "the mesh is empty", "export it again", PROGRESS_EXIT_INPUT},
+    {"full", true, STATUS_NO_SPACE, "checkpoint.db: no space", "", PROGRESS_EXIT_NO_SPACE},
+    {"silent", false, STATUS_OK, "", "", 0},
+    {"two-faced", true, STATUS_IO, "the disk is broken", "", 0},
+    {"broken", true, STATUS_IO, "the disk is broken", "", PROGRESS_EXIT_FAILED},
+    {"late", true, STATUS_OK, "", "", PROGRESS_EXIT_FAILED},
+    {"deserter", false, STATUS_OK, "", "", PROGRESS_EXIT_STOPPED},
+};
+
 static int play(const char *role, const char *dir, int attempt) {
     struct progress p = {.fd = PROGRESS_FD};
+    for (size_t i = 0; i < sizeof ends / sizeof *ends; i++) {
+        if (strcmp(role, ends[i].role) != 0)
+            continue;
+        if (ends[i].says)
+            progress_end(&p, ends[i].status, ends[i].message, ends[i].hint);
+        return ends[i].code;
+    }
     if (strcmp(role, "talker") == 0)
         return talk(&p, dir);
     signal(SIGTERM, on_term);
@@ -118,14 +158,6 @@ static int play(const char *role, const char *dir, int attempt) {
         for (;;)
             usleep(10000);
     }
-    if (strcmp(role, "input") == 0) {
-        progress_end(&p, STATUS_INPUT, "the mesh is empty", "export it again");
-        return PROGRESS_EXIT_INPUT;
-    }
-    if (strcmp(role, "full") == 0) {
-        progress_end(&p, STATUS_NO_SPACE, "checkpoint.db: no space", "");
-        return PROGRESS_EXIT_NO_SPACE;
-    }
     if (strcmp(role, "memory") == 0) {
         fprintf(stderr, "out of memory: could not allocate 12345 bytes\n");
         return PROGRESS_EXIT_MEMORY;
@@ -135,22 +167,6 @@ static int play(const char *role, const char *dir, int attempt) {
         progress_file(&p, "output", "tmp-a1B2c3", 0, SCENE_A, "text/plain");
         kill(getpid(), SIGKILL);
     }
-    if (strcmp(role, "silent") == 0)
-        return 0;
-    if (strcmp(role, "two-faced") == 0) {
-        progress_end(&p, STATUS_IO, "the disk is broken", "");
-        return 0;
-    }
-    if (strcmp(role, "broken") == 0) {
-        progress_end(&p, STATUS_IO, "the disk is broken", "");
-        return PROGRESS_EXIT_FAILED;
-    }
-    if (strcmp(role, "late") == 0) {
-        progress_end(&p, STATUS_OK, "", "");
-        return PROGRESS_EXIT_FAILED;
-    }
-    if (strcmp(role, "deserter") == 0)
-        return PROGRESS_EXIT_STOPPED;
     if (strcmp(role, "surroundings") == 0) {
         int bad = check_surroundings(dir);
         progress_end(&p, bad ? STATUS_INPUT : STATUS_OK, "surroundings", "");
@@ -161,18 +177,7 @@ static int play(const char *role, const char *dir, int attempt) {
         if (bad)
             return bad;
     }
-    progress_stage(&p, "prepare");
-    progress_step(&p, "refine", 3, 4, 1.5);
-    progress_metric(&p, "loss", 3, 0.25);
-    /* As progress_log, and what is for the daemon to say. */
-    static const char hello[] = "{\"type\":\"log\",\"level\":\"info\",\"message\":\"hello\",\"job\":1,\"attempt\":9,"
-                                "\"at\":\"1970-01-01T00:00:00.000Z\",\"snapshot\":true}\n";
-    if (write(PROGRESS_FD, hello, sizeof hello - 1) != sizeof hello - 1)
-        return 92;
-    progress_checkpoint(&p, 3, 1000000, 0.1);
-    announce(&p, dir, "good.txt", "good.txt", 4);
-    progress_end(&p, STATUS_OK, "", "");
-    return 0;
+    return play_whole(&p, dir);
 }
 
 /* "large" fits the disk once there is a file "room" in the data folder. */

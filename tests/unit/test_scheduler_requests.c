@@ -127,27 +127,47 @@ static pid_t worker_pid(const char *dir) {
     return found;
 }
 
+/* A daemon in a process of its own, with one job that hangs, whose number it writes to `to`. */
+static void be_daemon(struct daemon *d, int to) {
+    struct scheduler_config config = {.data_dir = d->dir,
+                                      .executor = process_executor_init(&at_home, "/proc/self/exe", d->dir),
+                                      .max_running = 1,
+                                      .thread_count = 1,
+                                      .stop_grace_sec = 1};
+    if (store_open(&d->store, d->dir, &err) != STATUS_OK ||
+        scheduler_new(&d->scheduler, &config, d->store, &err) != STATUS_OK)
+        _exit(1);
+    add_scene(d, SCENE_A, "good");
+    int64_t id = submit(d, SCENE_A, "hang");
+    if (write(to, &id, sizeof id) != (ssize_t)sizeof id)
+        _exit(1);
+    scheduler_run(d->scheduler, &err);
+    _exit(1);
+}
+
+/* The second attempt has the checkpoint of the first, whose folder is `job_dir`; one that it had lost is not used. */
+static void check_taken_checkpoint(const char *job_dir) {
+    char *former = file_join(job_dir, "checkpoint"), *present = mem_printf("%s/../attempt-2/checkpoint", job_dir);
+    for (int i = 0; i < WAIT_TRIES && access(former, F_OK) == 0; i++)
+        usleep(WAIT_US);
+    CHECK(file_is_in(present, "checkpoint.db"));
+    OK(file_make_dirs(former, &err));
+    char *there = file_join(former, "checkpoint.db");
+    OK(file_replace(there, "", 0, &err));
+    CHECK(is_tidy(job_dir));
+    OK(file_remove_tree(former, &err));
+    mem_free(there);
+    mem_free(present);
+    mem_free(former);
+}
+
 /* The daemon is killed: its worker dies with it, and the next daemon takes up the job. */
 static void test_daemon_killed(struct daemon *d) {
     int ends[2];
     CHECK(pipe(ends) == 0);
     pid_t child = fork();
-    if (child == 0) {
-        struct scheduler_config config = {.data_dir = d->dir,
-                                          .executor = process_executor_init(&at_home, "/proc/self/exe", d->dir),
-                                          .max_running = 1,
-                                          .thread_count = 1,
-                                          .stop_grace_sec = 1};
-        if (store_open(&d->store, d->dir, &err) != STATUS_OK ||
-            scheduler_new(&d->scheduler, &config, d->store, &err) != STATUS_OK)
-            _exit(1);
-        add_scene(d, SCENE_A, "good");
-        int64_t id = submit(d, SCENE_A, "hang");
-        if (write(ends[1], &id, sizeof id) != (ssize_t)sizeof id)
-            _exit(1);
-        scheduler_run(d->scheduler, &err);
-        _exit(1);
-    }
+    if (child == 0)
+        be_daemon(d, ends[1]);
     close(ends[1]);
     int64_t id = 0;
     CHECK(read(ends[0], &id, sizeof id) == (ssize_t)sizeof id);
@@ -177,19 +197,7 @@ static void test_daemon_killed(struct daemon *d) {
         OK(store_job_get(d->store, id, &job, &err));
     }
     CHECK(job.attempt == 2 && job.attempts_left == 2);
-    /* The second attempt has its checkpoint now. */
-    char *former = file_join(job_dir, "checkpoint"), *present = mem_printf("%s/../attempt-2/checkpoint", job_dir);
-    for (int i = 0; i < WAIT_TRIES && access(former, F_OK) == 0; i++)
-        usleep(WAIT_US);
-    CHECK(file_is_in(present, "checkpoint.db"));
-    OK(file_make_dirs(former, &err));
-    char *there = file_join(former, "checkpoint.db");
-    OK(file_replace(there, "", 0, &err));
-    CHECK(is_tidy(job_dir));
-    OK(file_remove_tree(former, &err));
-    mem_free(there);
-    mem_free(present);
-    mem_free(former);
+    check_taken_checkpoint(job_dir);
     job_release(&job);
     OK(store_job_cancel(d->store, id, &err));
     scheduler_wake(d->scheduler);
