@@ -106,6 +106,28 @@ static struct spill *new_spill(const char *out, struct error *err) {
     return spill_new(out, &(struct spill_limits){.memory_bytes = (uint64_t)(atof(mib) * 1048576.0)});
 }
 
+/* As a worker loads it: photographs as far as the settings keep them, cameras by the setting `transforms`. */
+static enum status load(const char *room, const struct settings *settings, struct spill *spill, struct parallel *pool,
+                        struct scene *scene, struct error *err) {
+    double begin = clock_sec();
+    struct bundle_limits limits = bundle_default_limits();
+    if (spill)
+        pixels_use(spill, &limits);
+    limits.later_bytes = PHOTOGRAPH_LATER_BYTES;
+    limits.kept_pixels = kept_pixels(settings, settings_number(settings, "texture_size"));
+    struct reading reading = reading_default();
+    reading.transforms = mem_strdup(settings_text(settings, "transforms"));
+    cJSON *problems = cJSON_CreateArray(); /* err has the first */
+    enum status status = bundle_load(room, &reading, &limits, pool, scene, problems, err);
+    cJSON_Delete(problems);
+    reading_release(&reading);
+    printf("loaded in %.1f s\n", clock_sec() - begin);
+    if (scene->photograph_count > 0)
+        printf("the first photograph has %u x %u pixels\n", scene->photograph[0].camera.width,
+               scene->photograph[0].camera.height);
+    return status;
+}
+
 static enum status run(int argc, char **argv, struct error *err) {
     struct room_clock clock = {.last = clock_sec()};
     double begin = clock.last;
@@ -137,24 +159,9 @@ static enum status run(int argc, char **argv, struct error *err) {
     cores_begin_stage("load");
     struct scene scene = {0};
     struct reconstruction r = {0};
-    struct bundle_limits limits = bundle_default_limits();
     struct spill *spill = new_spill(argv[2], err);
-    if (spill)
-        pixels_use(spill, &limits);
-    limits.later_bytes = PHOTOGRAPH_LATER_BYTES;
     if (status == STATUS_OK)
-        limits.kept_pixels = kept_pixels(&settings, settings_number(&settings, "texture_size"));
-    struct reading reading = reading_default();
-    reading.transforms = mem_strdup(settings_text(&settings, "transforms"));
-    cJSON *problems = cJSON_CreateArray(); /* err has the first */
-    if (status == STATUS_OK)
-        status = bundle_load(argv[1], &reading, &limits, pool, &scene, problems, err);
-    cJSON_Delete(problems);
-    reading_release(&reading);
-    printf("loaded in %.1f s\n", clock_sec() - begin);
-    for (size_t i = 0; i < scene.photograph_count && i < 1; i++)
-        printf("the first photograph has %u x %u pixels\n", scene.photograph[i].camera.width,
-               scene.photograph[i].camera.height);
+        status = load(argv[1], &settings, spill, pool, &scene, err);
     if (status == STATUS_OK)
         status = reconstruct_run(&scene, &settings, pool, &hooks, &r, err);
     cores_begin_stage("export");

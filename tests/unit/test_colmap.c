@@ -110,6 +110,33 @@ static void test_both(void) {
     findings_release(&f);
 }
 
+/* The file is refused, with `part` in the message. */
+static void check_bad_image(const struct colmap_cameras *c, const char *text, const char *part) {
+    struct error err;
+    struct findings f = {.problems = cJSON_CreateArray()};
+    struct frames t;
+    CHECK(colmap_images_parse(text, strlen(text), "images.txt", false, c, "", &t, &f, &err) == STATUS_INPUT);
+    CHECK_THAT(strstr(err.message, part) && t.frame_count == 0, "%s", err.message);
+    frames_release(&t);
+    cJSON_Delete(f.problems);
+    findings_release(&f);
+}
+
+/* The one frame of the file is left out, with `part` in the problem. */
+static void check_problem(const struct colmap_cameras *c, const char *text, const char *part) {
+    struct error err;
+    struct findings f = {.problems = cJSON_CreateArray()};
+    struct frames t;
+    CHECK(colmap_images_parse(text, strlen(text), "images.txt", false, c, "", &t, &f, &err) == STATUS_OK);
+    CHECK(f.problem_count == 1 && t.frame_count == 0 && t.named_count == 1);
+    char *problem = cJSON_PrintUnformatted(f.problems);
+    CHECK_THAT(strstr(problem, part) != NULL, "%s", problem);
+    free(problem);
+    frames_release(&t);
+    cJSON_Delete(f.problems);
+    findings_release(&f);
+}
+
 static void test_refused(void) {
     static const char *const bad_cameras[][2] = {
         {"1 ACME 640 480 500 510 320 240 1\n", "unknown camera model ACME"},
@@ -147,29 +174,10 @@ static void test_refused(void) {
                    err.message);
     }
     c = cameras_of(CAMERAS, &err);
-    for (size_t i = 0; i < sizeof bad_images / sizeof *bad_images; i++) {
-        struct findings f = {.problems = cJSON_CreateArray()};
-        struct frames t;
-        CHECK(colmap_images_parse(bad_images[i][0], strlen(bad_images[i][0]), "images.txt", false, c, "", &t, &f,
-                                  &err) == STATUS_INPUT);
-        CHECK_THAT(strstr(err.message, bad_images[i][1]) && t.frame_count == 0, "%s", err.message);
-        frames_release(&t);
-        cJSON_Delete(f.problems);
-        findings_release(&f);
-    }
-    for (size_t i = 0; i < sizeof problems / sizeof *problems; i++) {
-        struct findings f = {.problems = cJSON_CreateArray()};
-        struct frames t;
-        CHECK(colmap_images_parse(problems[i][0], strlen(problems[i][0]), "images.txt", false, c, "", &t, &f, &err) ==
-              STATUS_OK);
-        CHECK(f.problem_count == 1 && t.frame_count == 0 && t.named_count == 1);
-        char *text = cJSON_PrintUnformatted(f.problems);
-        CHECK_THAT(strstr(text, problems[i][1]) != NULL, "%s", text);
-        free(text);
-        frames_release(&t);
-        cJSON_Delete(f.problems);
-        findings_release(&f);
-    }
+    for (size_t i = 0; i < sizeof bad_images / sizeof *bad_images; i++)
+        check_bad_image(c, bad_images[i][0], bad_images[i][1]);
+    for (size_t i = 0; i < sizeof problems / sizeof *problems; i++)
+        check_problem(c, problems[i][0], problems[i][1]);
     colmap_cameras_free(c);
 }
 

@@ -49,6 +49,49 @@ static void show_from(uint32_t from, uint32_t wall, float value, float mixing) {
 
 static void show(uint32_t wall, float value, float mixing) { show_from(0, wall, value, mixing); }
 
+/* What each wall expects, and the same with three threads. */
+static void check_walls(const struct surface *surface, const bool *is_emitter, struct parallel *pool) {
+    struct color_prior *prior = color_priors(surface, is_emitter, measured, pool);
+    CHECK_THAT(fabsf(prior[WHITE].mean.g - 0.9f) < 0.01f, "%g", (double)prior[WHITE].mean.g);
+    CHECK_THAT(fabsf(prior[BLACK].mean.g - 0.05f) < 0.01f, "%g", (double)prior[BLACK].mean.g);
+    CHECK_THAT(prior[BLACK].variance < 0.01f, "%g", (double)prior[BLACK].variance);
+    CHECK_THAT(prior[HIDDEN].mean.g > 0.75f, "the white wall is beside it: %g", (double)prior[HIDDEN].mean.g);
+    CHECK_THAT(prior[MIXED].mean.g < 1.2f, "%g", (double)prior[MIXED].mean.g);
+    CHECK_THAT(prior[FRAME].mean.g < 0.05f, "%g", (double)prior[FRAME].mean.g);
+    CHECK_THAT(prior[LAMP].mean.g > 0.3f && prior[LAMP].mean.g < 0.7f, "%g", (double)prior[LAMP].mean.g);
+
+    struct parallel *three = parallel_new(3);
+    struct color_prior *again = color_priors(surface, is_emitter, measured, three);
+    CHECK(memcmp(prior, again, WALLS * sizeof *prior) == 0);
+    mem_free(again);
+    parallel_free(three);
+    mem_free(prior);
+}
+
+/* Its own mean counts with the square of the share of its texels that is known: of one black texel among 1024, beside a
+ * white wall, with .325^2 / (1 + .325^2) and not .325 / 1.325. (It is none that the grids take in.) */
+static void check_own_share(const struct surface *surface, const bool *is_emitter, struct parallel *pool) {
+    measured[HIDDEN * SIDE * SIDE + 1] = (struct measured){.weight = 1.0f};
+    CHECK((HIDDEN * SIDE * SIDE + 1) % 3 != 0);
+    double share = 1.0 / 1025.0 / 0.003, part = share * share / (1.0 + share * share);
+    struct color_prior *prior = color_priors(surface, is_emitter, measured, pool);
+    float beside = prior[HIDDEN].mean.g;
+    measured[HIDDEN * SIDE * SIDE + 1] = (struct measured){0};
+    mem_free(prior);
+    prior = color_priors(surface, is_emitter, measured, pool);
+    CHECK_NEAR(beside / prior[HIDDEN].mean.g, 1.0 - part, 0.01);
+    mem_free(prior);
+}
+
+/* Where nothing is known at all, grey; and nothing is known well. */
+static void check_unknown(const struct surface *surface, const bool *is_emitter, struct parallel *pool) {
+    memset(measured, 0, sizeof measured);
+    struct color_prior *prior = color_priors(surface, is_emitter, measured, pool);
+    for (int w = 0; w < WALLS; w++)
+        CHECK_THAT(prior[w].mean.r > 0.3f && prior[w].mean.r < 0.7f && prior[w].variance > 0.1f, "%d", w);
+    mem_free(prior);
+}
+
 int main(void) {
     make_walls();
     bool is_emitter[WALLS] = {[LAMP] = true};
@@ -71,41 +114,9 @@ int main(void) {
     show_from(SIDE * SIDE / 10, FRAME, 0.5f, 0.25f);
 
     const struct surface surface = reconstruction_surface(&r);
-    struct color_prior *prior = color_priors(&surface, is_emitter, measured, r.pool);
-    CHECK_THAT(fabsf(prior[WHITE].mean.g - 0.9f) < 0.01f, "%g", (double)prior[WHITE].mean.g);
-    CHECK_THAT(fabsf(prior[BLACK].mean.g - 0.05f) < 0.01f, "%g", (double)prior[BLACK].mean.g);
-    CHECK_THAT(prior[BLACK].variance < 0.01f, "%g", (double)prior[BLACK].variance);
-    CHECK_THAT(prior[HIDDEN].mean.g > 0.75f, "the white wall is beside it: %g", (double)prior[HIDDEN].mean.g);
-    CHECK_THAT(prior[MIXED].mean.g < 1.2f, "%g", (double)prior[MIXED].mean.g);
-    CHECK_THAT(prior[FRAME].mean.g < 0.05f, "%g", (double)prior[FRAME].mean.g);
-    CHECK_THAT(prior[LAMP].mean.g > 0.3f && prior[LAMP].mean.g < 0.7f, "%g", (double)prior[LAMP].mean.g);
-
-    struct parallel *three = parallel_new(3);
-    struct color_prior *again = color_priors(&surface, is_emitter, measured, three);
-    CHECK(memcmp(prior, again, WALLS * sizeof *prior) == 0);
-    mem_free(again);
-    parallel_free(three);
-
-    /* Its own mean counts with the square of the share of its texels that is known: of one black texel among 1024,
-     * beside a white wall, with .325^2 / (1 + .325^2) and not .325 / 1.325. (It is none that the grids take in.) */
-    mem_free(prior);
-    measured[HIDDEN * SIDE * SIDE + 1] = (struct measured){.weight = 1.0f};
-    CHECK((HIDDEN * SIDE * SIDE + 1) % 3 != 0);
-    double share = 1.0 / 1025.0 / 0.003, part = share * share / (1.0 + share * share);
-    prior = color_priors(&surface, is_emitter, measured, r.pool);
-    float beside = prior[HIDDEN].mean.g;
-    measured[HIDDEN * SIDE * SIDE + 1] = (struct measured){0};
-    mem_free(prior);
-    prior = color_priors(&surface, is_emitter, measured, r.pool);
-    CHECK_NEAR(beside / prior[HIDDEN].mean.g, 1.0 - part, 0.01);
-
-    /* Where nothing is known at all, grey; and nothing is known well. */
-    mem_free(prior);
-    memset(measured, 0, sizeof measured);
-    prior = color_priors(&surface, is_emitter, measured, r.pool);
-    for (int w = 0; w < WALLS; w++)
-        CHECK_THAT(prior[w].mean.r > 0.3f && prior[w].mean.r < 0.7f && prior[w].variance > 0.1f, "%d", w);
-    mem_free(prior);
+    check_walls(&surface, is_emitter, r.pool);
+    check_own_share(&surface, is_emitter, r.pool);
+    check_unknown(&surface, is_emitter, r.pool);
     inverse_uv_release(&r.inverse);
     parallel_free(r.pool);
     return check_result();

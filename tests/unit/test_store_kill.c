@@ -124,64 +124,78 @@ static void check_integrity(const char *dir) {
     mem_free(path);
 }
 
+/* What the killed children have acknowledged. */
+struct history {
+    struct acknowledged *last; /* [KEYS_MAX] by key */
+    int next_key, count;
+};
+
+/* A child works on the store until it is killed, after `sleep_us`; where `is_late`, not before it has done some work,
+ * however slow the machine is. */
+static void kill_once(const char *dir, struct history *h, bool is_late, unsigned sleep_us) {
+    int ends[2];
+    CHECK(pipe(ends) == 0);
+    pid_t pid = fork();
+    if (pid == 0) {
+        close(ends[0]);
+        child(dir, h->next_key, ends[1]);
+    }
+    close(ends[1]);
+    for (int told = 0, i = 0; is_late && told < 3 && i < 60000; i++, poll(NULL, 0, 1)) {
+        int waiting = 0;
+        CHECK(ioctl(ends[0], FIONREAD, &waiting) == 0);
+        told = waiting / (int)sizeof(struct acknowledged);
+    }
+    usleep(sleep_us);
+    kill(pid, SIGKILL);
+    int status;
+    CHECK(waitpid(pid, &status, 0) == pid);
+    CHECK_THAT(WIFSIGNALED(status), "the child ended by itself: %x", (unsigned)status);
+    struct acknowledged a;
+    while (read(ends[0], &a, sizeof a) == (ssize_t)sizeof a && a.key < KEYS_MAX) {
+        h->last[a.key] = a;
+        h->count++;
+        h->next_key = a.key + 1;
+    }
+    close(ends[0]);
+}
+
+/* The next daemon finds all that was acknowledged. */
+static void check_store(const char *dir, const struct history *h) {
+    struct store *store;
+    struct store_counts counts;
+    size_t requeued;
+    OK(store_open(&store, dir, &err));
+    OK(store_reconcile(store, NULL, 0, &requeued, &err));
+    for (int key = 0; key < h->next_key; key++)
+        verify(store, &h->last[key]);
+    /* At most the one job that was written but not acknowledged; its key is used again. */
+    OK(store_count(store, &counts, &err));
+    int64_t jobs = 0;
+    for (int i = 0; i < JOB_STATE_COUNT; i++)
+        jobs += counts.jobs_by_state[i];
+    CHECK_THAT(jobs == h->next_key || jobs == h->next_key + 1, "%lld jobs, %d keys", (long long)jobs, h->next_key);
+    CHECK(counts.jobs_by_state[JOB_RUNNING] == 0);
+    store_close(store);
+    check_integrity(dir);
+}
+
 int main(void) {
     char dir[] = "/tmp/unbake-test-store-kill-XXXXXX";
     if (!mkdtemp(dir))
         return 1;
-    struct acknowledged *last = mem_calloc(KEYS_MAX, sizeof *last); /* by key */
+    struct history h = {.last = mem_calloc(KEYS_MAX, sizeof *h.last)};
     const char *kills = getenv("UNBAKE_KILLS");
     int rounds = kills ? atoi(kills) : 25;
     uint32_t random = 4711;
-    int next_key = 0, acknowledged_count = 0;
     for (int round = 0; round < rounds; round++) {
-        int ends[2];
-        CHECK(pipe(ends) == 0);
-        pid_t pid = fork();
-        if (pid == 0) {
-            close(ends[0]);
-            child(dir, next_key, ends[1]);
-        }
-        close(ends[1]);
-        /* Every other time it has done some work, however slow the machine is. */
-        for (int told = 0, i = 0; round % 2 == 0 && told < 3 && i < 60000; i++, poll(NULL, 0, 1)) {
-            int waiting = 0;
-            CHECK(ioctl(ends[0], FIONREAD, &waiting) == 0);
-            told = waiting / (int)sizeof(struct acknowledged);
-        }
         random = random * 1664525u + 1013904223u;
-        usleep(5000 + (random >> 8) % 35000);
-        kill(pid, SIGKILL);
-        int status;
-        CHECK(waitpid(pid, &status, 0) == pid);
-        CHECK_THAT(WIFSIGNALED(status), "the child ended by itself: %x", (unsigned)status);
-        struct acknowledged a;
-        while (read(ends[0], &a, sizeof a) == (ssize_t)sizeof a && a.key < KEYS_MAX) {
-            last[a.key] = a;
-            acknowledged_count++;
-            next_key = a.key + 1;
-        }
-        close(ends[0]);
-
-        struct store *store;
-        struct store_counts counts;
-        size_t requeued;
-        OK(store_open(&store, dir, &err));
-        OK(store_reconcile(store, NULL, 0, &requeued, &err));
-        for (int key = 0; key < next_key; key++)
-            verify(store, &last[key]);
-        /* At most the one job that was written but not acknowledged; its key is used again. */
-        OK(store_count(store, &counts, &err));
-        int64_t jobs = 0;
-        for (int i = 0; i < JOB_STATE_COUNT; i++)
-            jobs += counts.jobs_by_state[i];
-        CHECK_THAT(jobs == next_key || jobs == next_key + 1, "%lld jobs, %d keys", (long long)jobs, next_key);
-        CHECK(counts.jobs_by_state[JOB_RUNNING] == 0);
-        store_close(store);
-        check_integrity(dir);
+        kill_once(dir, &h, round % 2 == 0, 5000 + (random >> 8) % 35000);
+        check_store(dir, &h);
     }
-    printf("%d kills, %d acknowledged changes, none lost\n", rounds, acknowledged_count);
-    CHECK(acknowledged_count > rounds);
+    printf("%d kills, %d acknowledged changes, none lost\n", rounds, h.count);
+    CHECK(h.count > rounds);
     OK(file_remove_tree(dir, &err));
-    mem_free(last);
+    mem_free(h.last);
     return check_result();
 }
