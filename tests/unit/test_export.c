@@ -334,20 +334,15 @@ static void test_environment(const char *dir, struct export_input *in, struct an
     image_release(&known);
 }
 
-/* Strips of triangles, each a segment of its own: more than a file of objects may have. */
-static void test_left_out(const char *dir, struct parallel *pool) {
-    enum { COUNT = 16385, PER_ROW = 128 };
-    struct mesh mesh = {.vertex_count = 3 * COUNT, .triangle_count = COUNT, .face_count = COUNT};
-    struct segments segments;
-    struct atlas atlas;
-    struct inverse_uv inverse;
-    struct materials materials;
-    struct error err;
-    mesh.position = mem_array(3 * COUNT, sizeof *mesh.position);
-    mesh.index = mem_array(COUNT, sizeof *mesh.index);
-    mesh.face = mem_array(COUNT, sizeof *mesh.face);
-    mesh.object_id = mem_array(COUNT, sizeof *mesh.object_id);
-    for (uint32_t t = 0; t < COUNT; t++) {
+/* Triangles side by side, each an object of its own. */
+static struct mesh make_pieces(uint32_t count) {
+    enum { PER_ROW = 128 };
+    struct mesh mesh = {.vertex_count = 3 * (size_t)count, .triangle_count = count, .face_count = count};
+    mesh.position = mem_array(mesh.vertex_count, sizeof *mesh.position);
+    mesh.index = mem_array(count, sizeof *mesh.index);
+    mesh.face = mem_array(count, sizeof *mesh.face);
+    mesh.object_id = mem_array(count, sizeof *mesh.object_id);
+    for (uint32_t t = 0; t < count; t++) {
         vec3 corner = {(float)(t % PER_ROW), (float)(t / PER_ROW), 0.0f};
         mesh.position[3 * t] = corner;
         mesh.position[3 * t + 1] = vec3_add(corner, (vec3){0.9f, 0.0f, 0.0f});
@@ -357,6 +352,18 @@ static void test_left_out(const char *dir, struct parallel *pool) {
         mesh.face[t] = t;
         mesh.object_id[t] = t;
     }
+    return mesh;
+}
+
+/* More segments than a file of objects may have. */
+static void test_left_out(const char *dir, struct parallel *pool) {
+    enum { COUNT = 16385 };
+    struct mesh mesh = make_pieces(COUNT);
+    struct segments segments;
+    struct atlas atlas;
+    struct inverse_uv inverse;
+    struct materials materials;
+    struct error err;
     segments_from_object_id(&segments, &mesh);
     CHECK(atlas_make(&atlas, &mesh, &segments, 512, 0.0f, ATLAS_PADDING, &err) == STATUS_OK);
     inverse_uv_make(&inverse, &atlas, mesh.triangle_count, pool);
@@ -398,6 +405,46 @@ static void test_left_out(const char *dir, struct parallel *pool) {
     mesh_release(&mesh);
 }
 
+/* Off the axes, with a lens. */
+static struct camera make_camera(void) {
+    struct camera camera = {.width = 16,
+                            .height = 12,
+                            .fx = 20.0f,
+                            .fy = 21.0f,
+                            .cx = 8.0f,
+                            .cy = 6.5f,
+                            .k = {0.1f, -0.02f},
+                            .p = {0.001f, 0.002f}};
+    camera.world_from_camera = (struct rigid){{{0, 0, 1}, {1, 0, 0}, {0, 1, 0}}, {1.0f, 2.0f, 3.0f}};
+    camera.camera_from_world = rigid_inverse(&camera.world_from_camera);
+    return camera;
+}
+
+/* How many photographs show each texel; what none shows is filled in white. The caller's. */
+static float *make_counts(struct room *room) {
+    size_t texels = (size_t)room->atlas.width * room->atlas.height;
+    float *count = mem_calloc(texels, sizeof *count);
+    for (size_t i = 0; i < texels; i++)
+        count[i] = (float)(i % 9);
+    for (size_t i = 0; i < room->inverse.valid_count; i++)
+        for (int c = 0; c < 3 && count[room->inverse.valid[i]] == 0.0f; c++)
+            room->materials.base_color.texel[room->inverse.valid[i]][c] = 1.0f;
+    return count;
+}
+
+/* Previews, as more becomes known: without and with the mesh there, with counts of photographs. */
+static void test_previews(const char *dir, struct export_input *in, const float *count, struct materials *materials) {
+    struct announced heard = {.dir = dir};
+    struct error err;
+    CHECK(export_preview(dir, in, hear, &heard, &err) == STATUS_OK);
+    CHECK(heard.previews == 5 && heard.outputs == 0); /* with the mesh, no confidence yet */
+    heard = (struct announced){.dir = dir};
+    CHECK(export_preview(dir, in, hear, &heard, &err) == STATUS_OK && heard.previews == 4); /* the mesh is there */
+    in->observation_count = count;
+    materials_start_deviation(materials);
+    CHECK(export_preview(dir, in, hear, &heard, &err) == STATUS_OK && heard.previews == 8); /* nothing is known of it */
+}
+
 int main(void) {
     char dir[] = "/tmp/unbake-export-XXXXXX";
     struct parallel *pool = parallel_new(1);
@@ -410,64 +457,34 @@ int main(void) {
     CHECK(room_init(&room, &(struct room_look){256, 15.0f, 15.0f, ROOM_LAMPS_FRAMED}, pool, &err) == STATUS_OK);
     memcpy(room.mesh.offset, (double[3]){500000.0, -4100000.0, 0.0}, sizeof room.mesh.offset);
     size_t texels = (size_t)room.atlas.width * room.atlas.height;
-    float *count = mem_calloc(texels, sizeof *count);
-    for (size_t i = 0; i < texels; i++)
-        count[i] = (float)(i % 9);
-    for (size_t i = 0; i < room.inverse.valid_count; i++) /* what no photograph shows is filled in white */
-        for (int c = 0; c < 3 && count[room.inverse.valid[i]] == 0.0f; c++)
-            room.materials.base_color.texel[room.inverse.valid[i]][c] = 1.0f;
+    float *count = make_counts(&room);
     bool is_emitter[ROOM_OBJECT_COUNT] = {[ROOM_WALL_EMITTER] = true, [ROOM_CEILING_EMITTER] = true};
     struct image photograph;
     image_init_rgb(&photograph, 16, 12);
-    struct camera camera = {.width = 16,
-                            .height = 12,
-                            .fx = 20.0f,
-                            .fy = 21.0f,
-                            .cx = 8.0f,
-                            .cy = 6.5f,
-                            .k = {0.1f, -0.02f},
-                            .p = {0.001f, 0.002f}};
-    camera.world_from_camera = (struct rigid){{{0, 0, 1}, {1, 0, 0}, {0, 1, 0}}, {1.0f, 2.0f, 3.0f}};
-    camera.camera_from_world = rigid_inverse(&camera.world_from_camera);
+    struct camera camera = make_camera();
     struct export_comparison comparison = {"images/003.exr", &photograph, &photograph, &camera};
     cJSON *report = NULL;
     static const char text[] = "{\"seed\":1,\"stages\":[{\"name\":\"refine\",\"seconds\":2.5}],"
                                "\"series\":{\"loss\":[[0,1],[1,0.5],[2,0.02]],\"one\":[[0,1]]},"
                                "\"views\":[{\"name\":\"a\",\"msre\":0.01}],\"settings\":{\"a\":1,\"seed\":7}}";
     CHECK(json_parse(text, strlen(text), "report", &report, &err) == STATUS_OK);
-    struct export_input in = {"room <1> & \"2\"",
-                              &room.mesh,
-                              &room.segments,
-                              &room.atlas,
-                              &room.inverse,
-                              &room.materials,
-                              NULL,
-                              is_emitter,
-                              NULL,
-                              NULL,
-                              1,
-                              &comparison,
-                              report,
-                              {0.0f, 1.0f, 0.0f},
-                              true,
-                              NULL,
-                              {0},
-                              0,
-                              NULL,
-                              .baked = NULL};
+    struct export_input in = {.title = "room <1> & \"2\"",
+                              .mesh = &room.mesh,
+                              .segments = &room.segments,
+                              .atlas = &room.atlas,
+                              .inverse = &room.inverse,
+                              .materials = &room.materials,
+                              .is_emitter = is_emitter,
+                              .comparison_count = 1,
+                              .comparison = &comparison,
+                              .report = report,
+                              .up = {0.0f, 1.0f, 0.0f},
+                              .has_materials = true};
 
-    struct announced heard = {.dir = dir};
-    CHECK(export_preview(dir, &in, hear, &heard, &err) == STATUS_OK);
-    CHECK(heard.previews == 5 && heard.outputs == 0); /* with the mesh, no confidence yet */
-    heard = (struct announced){.dir = dir};
-    CHECK(export_preview(dir, &in, hear, &heard, &err) == STATUS_OK && heard.previews == 4); /* the mesh is there */
-    in.observation_count = count;
-    materials_start_deviation(&room.materials);
-    CHECK(export_preview(dir, &in, hear, &heard, &err) == STATUS_OK &&
-          heard.previews == 8); /* nothing is known of it */
+    test_previews(dir, &in, count, &room.materials);
     for (size_t i = 0; i < texels; i++)
         room.materials.deviation[i] = image_half_from_float(0.1f);
-    heard = (struct announced){.dir = dir};
+    struct announced heard = {.dir = dir};
     enum status status = export_outputs(dir, &in, hear, &heard, &err);
     CHECK_THAT(status == STATUS_OK, "%s", err.message);
     CHECK_THAT(heard.previews == 5 && heard.outputs == 18, "%d, %d", heard.previews, heard.outputs);

@@ -163,16 +163,19 @@ static void test_instances(void) {
     refused(INSTANCES("\"TRANSLATION\":0,\"SCALE\":3"), bin, sizeof bin, "are 3 and 2", "");
 }
 
+enum { PACKED_COUNT = 100 }; /* vertices of a packed strip */
+/* Bytes of each of its three packed views, one after the other. */
+struct packed_sizes {
+    size_t points, normals, indices;
+};
+
 /* As gltfpack writes it: triangles, positions and filtered normals, each in a view that the library unpacks. */
-static void test_meshopt(void) {
-    enum { COUNT = 100 };
-    struct mesh mesh;
+static struct packed_sizes pack_strip(unsigned char bin[8192]) {
+    enum { COUNT = PACKED_COUNT };
     uint16_t points[COUNT][4];
     float normals[COUNT][4];
     uint32_t indices[3 * (COUNT - 2)];
     int8_t packed_normals[COUNT][4];
-    unsigned char bin[8192];
-    char json[2048];
     for (int i = 0; i < COUNT; i++) {
         uint16_t p[4] = {(uint16_t)(10 * i), (uint16_t)(i % 2 * 1000), (uint16_t)(i * i), 0};
         memcpy(points[i], p, sizeof p);
@@ -186,6 +189,16 @@ static void test_meshopt(void) {
     size_t b = meshopt_encodeVertexBuffer(bin + a, 2048, packed_normals, COUNT, 4);
     size_t c = meshopt_encodeIndexBuffer(bin + a + b, 2048, indices, 3 * (COUNT - 2));
     CHECK(a > 0 && b > 0 && c > 0);
+    return (struct packed_sizes){a, b, c};
+}
+
+static void test_meshopt(void) {
+    enum { COUNT = PACKED_COUNT };
+    struct mesh mesh;
+    unsigned char bin[8192];
+    char json[2048];
+    struct packed_sizes size = pack_strip(bin);
+    size_t a = size.points, b = size.normals, c = size.indices;
     static const char form[] =
         "{" ASSET ",\"extensionsRequired\":[\"EXT_meshopt_compression\",\"KHR_mesh_quantization\"],\"buffers\":[{"
         "\"byteLength\":%zu},{\"byteLength\":1788,\"extensions\":{\"EXT_meshopt_compression\":{\"fallback\":true}}}],"
