@@ -23,14 +23,13 @@ setsid bash "$site/\$1.sh" >>"$work/nodes.log" 2>&1 &
 echo \$! >"$site/\$1.pid"
 cat "$site/\$1.pid"
 SH2
-cat >"$site/status" <<SH2
+cat >"$site/status" <<SH2 # without a process for each job: it is asked often, of all jobs that ever were
 #!/bin/bash
 for file in "$site"/*.pid; do
-    [ -e "\$file" ] || continue
-    name=\$(basename "\$file" .pid)
-    state=ended
-    [ "\$(ps -o stat= -p "\$(cat "\$file")" | cut -c1)" = Z ] || kill -0 "\$(cat "\$file")" 2>/dev/null && state=running
-    echo "\$(cat "\$file") \$name \$state -"
+    read -r pid 2>/dev/null <"\$file" || continue
+    name=\${file##*/} state=ended
+    { read -r line <"/proc/\$pid/stat"; } 2>/dev/null && line=\${line##*) } && [ "\${line%% *}" != Z ] && state=running
+    echo "\$pid \${name%.pid} \$state -"
 done
 SH2
 cat >"$site/cancel" <<SH2
