@@ -64,13 +64,14 @@ cJSON *render_settings_describe(void);
  * `problems` (may be NULL); STATUS_INPUT if there is any. */
 enum status render_settings_check(const cJSON *object, enum render_files files, cJSON *problems, struct error *err);
 
-/* Checks settings that render_settings_check found good against the room that they are for: the array "segments" of its
- * report.json and the array "frames" of the file that `cameras` means; an array that is NULL or empty is not known, and
- * what it would tell is not checked. Problems as above. */
-enum status render_settings_check_room(const cJSON *object, const cJSON *segments, const cJSON *frames, cJSON *problems,
+/* Checks settings that render_settings_check found good against the room that they are for: its report.json and the array
+ * "frames" of the file that `cameras` means. Either may be NULL: what it would tell is not checked. Problems as above. */
+enum status render_settings_check_room(const cJSON *object, const cJSON *report, const cJSON *frames, cJSON *problems,
                                        struct error *err);
-/* Whether a setting names segments of the room. */
-bool render_settings_name_segments(const cJSON *object);
+/* Whether a setting is checked against report.json. */
+bool render_settings_need_report(const cJSON *object);
+#define RENDER_UNIT_UNKNOWN "the report of the reconstruction does not say how bright radiance 1 is"
+#define RENDER_UNIT_HINT "its photographs' camera settings are incomplete: tell it as luminance_per_unit"
 
 /* Parses "name=value" of a command line into `object`, with the JSON type of the table (a string where the name is
  * unknown, so that render_settings_check says so). */

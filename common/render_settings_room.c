@@ -1,5 +1,5 @@
 /* render_settings_room.c -- whether good settings of a render fit the room that they are for: the segments and views that
- * they name are there (render_settings.h). */
+ * they name are there, and it is known how bright its radiance is where they need it (render_settings.h). */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -75,9 +75,31 @@ static void check_numbers(struct setting_faults *f, const cJSON *object, const c
     }
 }
 
-enum status render_settings_check_room(const cJSON *object, const cJSON *segments, const cJSON *frames, cJSON *problems,
+/* Whether it is light in lm or cd/m2 that the setting means. */
+static bool is_absolute(const cJSON *setting) {
+    size_t length = strlen(setting->string);
+    bool is_lumen =
+        length > 11 && strncmp(setting->string, "lamp.", 5) == 0 && strcmp(setting->string + length - 6, ".lumen") == 0;
+    return is_lumen || (strcmp(setting->string, "unit") == 0 && cJSON_IsString(setting) &&
+                        strcmp(setting->valuestring, "nits") == 0);
+}
+
+static void check_unit(struct setting_faults *f, const cJSON *object, const cJSON *report) {
+    const cJSON *unit = cJSON_GetObjectItemCaseSensitive(report, "luminance_per_unit");
+    if (render_settings_number(object, "luminance_per_unit") > 0.0 ||
+        cJSON_GetNumberValue(cJSON_GetObjectItemCaseSensitive(unit, "cd_per_m2")) > 0.0)
+        return;
+    for (const cJSON *s = object->child; s; s = s->next)
+        if (is_absolute(s))
+            setting_faults_add(f, s->string, RENDER_UNIT_UNKNOWN, RENDER_UNIT_HINT);
+}
+
+enum status render_settings_check_room(const cJSON *object, const cJSON *report, const cJSON *frames, cJSON *problems,
                                        struct error *err) {
     struct setting_faults faults = {.problems = problems};
+    const cJSON *segments = cJSON_GetObjectItemCaseSensitive(report, "segments");
+    if (report)
+        check_unit(&faults, object, report);
     if (cJSON_GetArraySize(segments) > 0) {
         check_numbers(&faults, object, segments);
         check_words(&faults, object, "remove", segments, is_segment, "segment");
@@ -89,10 +111,10 @@ enum status render_settings_check_room(const cJSON *object, const cJSON *segment
     return setting_faults_status(&faults, err);
 }
 
-bool render_settings_name_segments(const cJSON *object) {
+bool render_settings_need_report(const cJSON *object) {
     for (const cJSON *s = object->child; s; s = s->next)
         if (strncmp(s->string, "light.", 6) == 0 || strncmp(s->string, "segment.", 8) == 0 ||
-            strcmp(s->string, "remove") == 0)
+            strcmp(s->string, "remove") == 0 || is_absolute(s))
             return true;
     return false;
 }

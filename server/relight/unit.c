@@ -57,8 +57,7 @@ enum status unit_resolve(const struct relight_job *job, const struct relight_wat
     }
     if (!name || found > 0.0)
         return STATUS_OK;
-    enum status status = error_set(
-        err, STATUS_INPUT, "setting %s: the report of the reconstruction does not say how bright radiance 1 is", name);
-    error_hint(err, "its photographs' camera settings are incomplete: tell it as luminance_per_unit");
+    enum status status = error_set(err, STATUS_INPUT, "setting %s: " RENDER_UNIT_UNKNOWN, name);
+    error_hint(err, RENDER_UNIT_HINT);
     return status;
 }

@@ -140,27 +140,37 @@ static void test_faults_at_once(void) {
 
 /* Segments and views that the room has not, all of them; where a list is not known nothing is said. */
 static void test_room(void) {
-    cJSON *segments = parse("[{\"segment\":0,\"name\":null},{\"segment\":1,\"name\":\"door\"}]"),
+    cJSON *report = parse("{\"segments\":[{\"segment\":0,\"name\":null},{\"segment\":1,\"name\":\"door\"}]}"),
           *frames = parse("[{\"file_path\":\"images/7.png\"},{\"file_path\":\"a\"}]"), *problems = cJSON_CreateArray();
     static const char bad[] = "{\"light.2\":\"off\",\"segment.1.roughness\":0.5,\"segment.9.emission\":\"1,1,1\","
                               "\"remove\":\"0,door,dor,2\",\"view\":\"0,images/7.png,2,b\"}";
     cJSON *settings = parse(bad);
     struct error err;
-    CHECK(render_settings_check_room(settings, segments, frames, problems, &err) == STATUS_INPUT);
+    CHECK(render_settings_check_room(settings, report, frames, problems, &err) == STATUS_INPUT);
     char *names = names_of(problems);
     CHECK_STRING(names, "light.2 segment.9.emission remove remove view view");
     mem_free(names);
     CHECK(render_settings_check_room(settings, NULL, NULL, NULL, &err) == STATUS_OK);
-    CHECK(render_settings_name_segments(settings));
+    CHECK(render_settings_need_report(settings));
     cJSON_Delete(settings);
     settings = parse("{\"light.1\":\"off\",\"remove\":\"door\",\"path\":\"a,0\"}");
-    CHECK_THAT(render_settings_check_room(settings, segments, frames, NULL, &err) == STATUS_OK, "%s", err.message);
+    CHECK_THAT(render_settings_check_room(settings, report, frames, NULL, &err) == STATUS_OK, "%s", err.message);
+    cJSON_Delete(settings);
+    settings = parse("{\"lamp.1.lumen\":800,\"unit\":\"nits\"}");
+    problems = cJSON_CreateArray();
+    CHECK(render_settings_need_report(settings));
+    CHECK(render_settings_check_room(settings, report, frames, problems, &err) == STATUS_INPUT);
+    names = names_of(problems);
+    CHECK_STRING(names, "lamp.1.lumen unit");
+    mem_free(names);
+    json_add(report, "luminance_per_unit", parse("{\"cd_per_m2\":100}"));
+    CHECK(render_settings_check_room(settings, report, frames, NULL, &err) == STATUS_OK);
     cJSON_Delete(settings);
     settings = parse("{\"view\":\"all\"}");
-    CHECK(render_settings_check_room(settings, segments, frames, NULL, &err) == STATUS_OK);
-    CHECK(!render_settings_name_segments(settings));
+    CHECK(render_settings_check_room(settings, report, frames, NULL, &err) == STATUS_OK);
+    CHECK(!render_settings_need_report(settings));
     cJSON_Delete(settings);
-    cJSON_Delete(segments);
+    cJSON_Delete(report);
     cJSON_Delete(frames);
 }
 

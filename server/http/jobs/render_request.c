@@ -135,12 +135,12 @@ static cJSON *read_cameras(struct api *api, const cJSON *settings, int64_t sourc
 void render_request_look(struct api *api, struct render_request *q, int64_t source, cJSON *params) {
     cJSON *none = cJSON_CreateObject(), *problems = cJSON_CreateArray();
     const cJSON *settings = q->settings ? q->settings : none;
-    bool needs_segments = render_settings_bool(settings, "per_light") || render_settings_name_segments(settings);
+    bool needs_report = render_settings_bool(settings, "per_light") || render_settings_need_report(settings);
     cJSON *views = read_cameras(api, settings, source);
-    cJSON *report = needs_segments ? read_output(api, source, REPORT) : NULL;
+    cJSON *report = needs_report ? read_output(api, source, REPORT) : NULL;
     const cJSON *frames = cJSON_GetObjectItemCaseSensitive(views, "frames"),
                 *segments = cJSON_GetObjectItemCaseSensitive(report, "segments");
-    if (render_settings_check_room(settings, segments, frames, problems, NULL) != STATUS_OK)
+    if (render_settings_check_room(settings, report, frames, problems, NULL) != STATUS_OK)
         job_request_faults(problems, params);
     q->cost = cost_of(settings, frames) * count_pictures(settings, segments);
     cJSON_Delete(report);
