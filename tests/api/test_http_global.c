@@ -150,6 +150,43 @@ static void check_waiting_in_vain(void) {
     mem_free(request);
 }
 
+/* Whoever has seen more than there ever was, before a backup was put back, is told so, too. */
+static void check_ahead(int64_t job) {
+    struct buf reply;
+    int64_t newest;
+    rig_must(store_event_newest(rig.store, &newest, &err), &err, "newest");
+    char *line = mem_printf("id: %lld\nevent: resync", (long long)newest);
+    char *path = mem_printf("/v1/jobs/%lld/events?after=%lld&follow=0", (long long)job, (long long)newest + 1);
+    CHECK(rig_get(&rig, path, "", &reply) == 200);
+    CHECK_THAT(strstr(buf_text(&reply), line), "%s", buf_text(&reply));
+    buf_release(&reply);
+    CHECK(rig_get(&rig, "/v1/events?follow=0", "Last-Event-ID: 123456789012\r\n", &reply) == 200);
+    CHECK_THAT(strstr(buf_text(&reply), line), "%s", buf_text(&reply));
+    buf_release(&reply);
+    mem_free(path);
+    path = mem_printf("/v1/events?after=%lld&follow=0", (long long)newest);
+    CHECK(rig_get(&rig, path, "", &reply) == 200 && count_of(&reply, "resync") == 0);
+    buf_release(&reply);
+    mem_free(path);
+    mem_free(line);
+}
+
+/* Age: the last event of a job that has ended stays. */
+static void check_age(int64_t job, int attempt) {
+    struct buf reply;
+    bool more = true;
+    rig_must(store_job_succeed(rig.store, job, attempt, "", &err), &err, "succeed");
+    for (int i = 0; i < 10 && more; i++)
+        rig_must(store_event_prune(rig.store, INT64_MAX, &more, &err), &err, "prune");
+    CHECK(!more);
+    char *path = mem_printf("/v1/jobs/%lld/events?after=0", (long long)job);
+    CHECK(rig_get(&rig, path, "", &reply) == 200);
+    CHECK(count_of(&reply, "event: ") == 3); /* snapshot, resync, succeeded */
+    CHECK(strstr(buf_text(&reply), "\r\n0\r\n\r\n"));
+    buf_release(&reply);
+    mem_free(path);
+}
+
 /* The oldest events are gone: whoever asks for them is told so, and goes on without a gap. */
 static void check_resync(void) {
     struct buf reply;
@@ -183,37 +220,8 @@ static void check_resync(void) {
     CHECK(rig_get(&rig, "/v1/events?after=1&follow=0", "", &reply) == 200);
     CHECK(count_of(&reply, "event: resync") == 1);
     buf_release(&reply);
-
-    /* Whoever has seen more than there ever was, before a backup was put back, is told so, too. */
-    int64_t newest;
-    rig_must(store_event_newest(rig.store, &newest, &err), &err, "newest");
-    char *line = mem_printf("id: %lld\nevent: resync", (long long)newest);
-    path = mem_printf("/v1/jobs/%lld/events?after=%lld&follow=0", (long long)job, (long long)newest + 1);
-    CHECK(rig_get(&rig, path, "", &reply) == 200);
-    CHECK_THAT(strstr(buf_text(&reply), line), "%s", buf_text(&reply));
-    buf_release(&reply);
-    CHECK(rig_get(&rig, "/v1/events?follow=0", "Last-Event-ID: 123456789012\r\n", &reply) == 200);
-    CHECK_THAT(strstr(buf_text(&reply), line), "%s", buf_text(&reply));
-    buf_release(&reply);
-    mem_free(path);
-    path = mem_printf("/v1/events?after=%lld&follow=0", (long long)newest);
-    CHECK(rig_get(&rig, path, "", &reply) == 200 && count_of(&reply, "resync") == 0);
-    buf_release(&reply);
-    mem_free(path);
-    mem_free(line);
-
-    /* Age: the last event of a job that has ended stays. */
-    bool more = true;
-    rig_must(store_job_succeed(rig.store, job, attempt, "", &err), &err, "succeed");
-    for (int i = 0; i < 10 && more; i++)
-        rig_must(store_event_prune(rig.store, INT64_MAX, &more, &err), &err, "prune");
-    CHECK(!more);
-    path = mem_printf("/v1/jobs/%lld/events?after=0", (long long)job);
-    CHECK(rig_get(&rig, path, "", &reply) == 200);
-    CHECK(count_of(&reply, "event: ") == 3); /* snapshot, resync, succeeded */
-    CHECK(strstr(buf_text(&reply), "\r\n0\r\n\r\n"));
-    buf_release(&reply);
-    mem_free(path);
+    check_ahead(job);
+    check_age(job, attempt);
 }
 
 int main(void) {

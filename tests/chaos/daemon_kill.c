@@ -244,6 +244,17 @@ static void check_whole(void) {
     mem_free(path);
 }
 
+/* Counts what was acknowledged and is not so: the newest changes of each client, or all that are kept. */
+static void check_acknowledged(bool all) {
+    for (int i = 0; i <= SUBMITTERS; i++)
+        for (long k = 0; k < (all ? KEPT : 6); k++) {
+            const struct client *c = &client[i];
+            const struct made *m = &c->made[(c->next + KEPT - 1 - k) % KEPT];
+            if (m->id || m->sha256[0])
+                lost += !is_as_acknowledged(c, m);
+        }
+}
+
 int main(int argc, char **argv) {
     long kills = argc == 4 ? strtol(argv[3], NULL, 10) : 0, acknowledged = 0;
     if (kills <= 0)
@@ -279,14 +290,7 @@ int main(int argc, char **argv) {
             printf("%ld kills\n", kill_count + 1), fflush(stdout);
         check_integrity();
         ready[kill_count] = daemon_start(&daemon_);
-        /* What is newest, each time; all, at times. */
-        for (int i = 0; i <= SUBMITTERS; i++)
-            for (long k = 0; k < (kill_count % 50 ? 6 : KEPT); k++) {
-                const struct client *c = &client[i];
-                const struct made *m = &c->made[(c->next + KEPT - 1 - k) % KEPT];
-                if (m->id || m->sha256[0])
-                    lost += !is_as_acknowledged(c, m);
-            }
+        check_acknowledged(kill_count % 50 == 0);
     }
     pthread_t reader; /* what has not been read yet */
     pthread_create(&reader, NULL, read_events, NULL);

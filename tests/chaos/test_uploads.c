@@ -257,10 +257,33 @@ static double run_round(struct daemon *d, struct proxy *p, const char *build, in
     return took;
 }
 
+/* Rooms of a round that the daemon does not have as they were sent. */
+static int count_wrong(const struct daemon *d, int round, int count) {
+    char path[128];
+    int wrong = 0;
+    for (int i = 0; i < count; i++) {
+        room_path(d, round, i, path);
+        wrong += !is_stored(d, path);
+    }
+    return wrong;
+}
+
+/* Bytes that are sent for the first room of the first round; every room's stream has the same length. */
+static uint64_t measure_room(const struct daemon *d) {
+    struct pack *pack;
+    struct error err;
+    char path[128], sha256[SHA256_HEX_SIZE];
+    uint64_t length = 0;
+    room_path(d, 1, 0, path);
+    CHECK(pack_open(&pack, path, &err) == STATUS_OK &&
+          pack_measure(pack, NULL, NULL, &length, sha256, &err) == STATUS_OK);
+    pack_close(pack);
+    return length;
+}
+
 int main(void) {
     struct daemon d;
     struct proxy p = {0};
-    char path[128];
     const char *build = getenv("UNBAKE_BUILD") ? getenv("UNBAKE_BUILD") : "build";
     int count = (int)figures_count("UNBAKE_CLIENTS", 10, CLIENTS_MAX);
     uint64_t bytes = (uint64_t)figures_count("UNBAKE_MEGABYTES", 2, 100) * 1000000;
@@ -277,21 +300,8 @@ int main(void) {
     proxy_start(&p, &d, 0.75 * (double)bytes);
     make_rooms(&d, 1, count, bytes);
     double took = run_round(&d, &p, build, 1, count, 0);
-    int wrong = 0;
-    uint64_t whole = 0;
-    for (int i = 0; i < count; i++) {
-        room_path(&d, 1, i, path);
-        wrong += !is_stored(&d, path);
-    }
-    /* Every room's stream has the same length. */
-    struct pack *pack;
-    struct error err;
-    char sha256[SHA256_HEX_SIZE];
-    room_path(&d, 1, 0, path);
-    CHECK(pack_open(&pack, path, &err) == STATUS_OK &&
-          pack_measure(pack, NULL, NULL, &whole, sha256, &err) == STATUS_OK);
-    pack_close(pack);
-    whole *= (uint64_t)count;
+    int wrong = count_wrong(&d, 1, count);
+    uint64_t whole = measure_room(&d) * (uint64_t)count;
     unsigned drops = atomic_load(&p.drops);
     uint64_t sent = atomic_load(&p.body_bytes);
     printf("%d uploads of %llu MB at once, %u connections dropped, %.1f s, %.0f MB/s\n", count,
@@ -308,11 +318,7 @@ int main(void) {
     atomic_store(&p.is_rough, true);
     make_rooms(&d, 2, others, bytes);
     took = run_round(&d, &p, build, 2, others, kills);
-    int lost = 0;
-    for (int i = 0; i < others; i++) {
-        room_path(&d, 2, i, path);
-        lost += !is_stored(&d, path);
-    }
+    int lost = count_wrong(&d, 2, others);
     printf("%d more, %u connections reset, the daemon killed %d times, %.1f s\n", others, atomic_load(&p.drops) - drops,
            kills, took);
     figure("uploads over resets and kills of the daemon that differ from what was sent", lost, 0, "lower");
