@@ -79,7 +79,7 @@ void light_places_leave_out_lamps(struct light_places *s) {
         size_t bright = 0;
         end = light_places_end(s, first);
         for (size_t i = first; i < end; i++)
-            bright += log_base(&s->place[i]) > logf(PLACE_WHITE) + PLACE_BRIGHT;
+            bright += log_base(&s->place[i]) > logf((float)ALBEDO_WHITE) + PLACE_BRIGHT;
         for (size_t i = first; i < end && 2 * bright < end - first; i++)
             s->place[kept++] = s->place[i];
     }
@@ -95,7 +95,8 @@ static void find_odd(struct light_places *s) {
         float median = quantile(sorted, end - first, 0.5);
         for (size_t i = first; i < end; i++) {
             float log = log_base(&s->place[i]);
-            s->place[i].residual = clampf(fmaxf(log - median, log - logf(PLACE_WHITE)), -MAX_RESIDUAL, MAX_RESIDUAL);
+            s->place[i].residual =
+                clampf(fmaxf(log - median, log - logf((float)ALBEDO_WHITE)), -MAX_RESIDUAL, MAX_RESIDUAL);
         }
     }
     mem_free(sorted);

@@ -6,11 +6,11 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "server/light/albedo.h"
 #include "server/light/survey.h"
 #include "server/scene/surface.h"
 
-/* White paint; and what is so much brighter than its segment, in the logarithm, is bright. */
-#define PLACE_WHITE 0.9f
+/* What is so much brighter than its segment or white paint, in the logarithm, is bright. */
 #define PLACE_BRIGHT 0.5f
 
 struct light_place {

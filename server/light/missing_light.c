@@ -28,9 +28,8 @@ static void find_segments(struct missing_light *m) {
     m->first[m->segment_count] = m->places->count;
 }
 
-void missing_light_init(struct missing_light *m, const struct light_places *places, float white,
-                        struct parallel *pool) {
-    *m = (struct missing_light){.places = places, .max_albedo = white, .pool = pool};
+void missing_light_init(struct missing_light *m, const struct light_places *places, struct parallel *pool) {
+    *m = (struct missing_light){.places = places, .pool = pool};
     find_segments(m);
     m->base = mem_array(MISSING_STRENGTHS * places->count + 1, sizeof *m->base);
     m->sorted = mem_array(MISSING_STRENGTHS * places->count + 1, sizeof *m->sorted);
@@ -85,7 +84,7 @@ static float spread_about(float median) { return (float)ALBEDO_WITHIN + ALBEDO_H
 /* Misfit of place i, given its base colour's logarithm and the median of its segment's. */
 static double place_misfit(const struct missing_light *m, size_t i, float base, float median, float spread) {
     double within = oddity(base - median, spread);
-    double beyond = oddity(fmaxf(base - logf(m->max_albedo), 0.0f), (float)ALBEDO_PATCH);
+    double beyond = oddity(fmaxf(base - logf((float)ALBEDO_WHITE), 0.0f), (float)ALBEDO_PATCH);
     return (double)(m->weight[i] * m->places->place[i].weight) * (within + beyond);
 }
 

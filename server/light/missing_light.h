@@ -15,7 +15,6 @@
 
 struct missing_light {
     const struct light_places *places; /* borrowed */
-    float max_albedo;                  /* base colours beyond it are odd */
     float *weight;                     /* [places->count] 1, or how far a place is asked; owned */
     struct parallel *pool;             /* borrowed */
     size_t segment_count;              /* of those that any place is of */
@@ -24,9 +23,9 @@ struct missing_light {
     double *misfit;                    /* [MISSING_STRENGTHS][segment_count] scratch */
 };
 
-/* Base colours beyond `white` are odd. The light falls in patches and leaves most of a segment as it is: how dark that
+/* The light falls in patches and leaves most of a segment as it is: how dark that
  * is, and thus how much a highlight may add, is judged with the light that is tried. */
-void missing_light_init(struct missing_light *m, const struct light_places *places, float white, struct parallel *pool);
+void missing_light_init(struct missing_light *m, const struct light_places *places, struct parallel *pool);
 void missing_light_release(struct missing_light *m);
 
 /* Strength of the light with which misfit is least, `lit` times strength being added to a place's light; 0: no strength

@@ -256,7 +256,7 @@ void sun_find(struct reconstruction *r, const struct views *views) {
     light_places_init(&s.places, &survey);
     survey_release(&survey);
     light_places_leave_out_lamps(&s.places);
-    missing_light_init(&s.missing, &s.places, PLACE_WHITE, r->pool);
+    missing_light_init(&s.missing, &s.places, r->pool);
     if (light_places_above(&s.places, PLACE_BRIGHT) >= LEAST_BRIGHT)
         look_for_sun(&s, &explains);
     r->sun = s.sun;

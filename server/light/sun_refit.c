@@ -82,7 +82,7 @@ void sun_refit(struct divide *d, struct sun *sun) {
     if (!sun->is_there || sun->is_measured)
         return;
     find_places(d, &places);
-    missing_light_init(&missing, &places, PLACE_WHITE, d->pool);
+    missing_light_init(&missing, &places, d->pool);
     rgb fitted = rgb_scale(missing_light_color(&missing), BSDF_PI);
     for (int c = 0; c < 3; c++) {
         float *irradiance = &(&sun->irradiance.r)[c], before = *irradiance;

@@ -31,7 +31,7 @@ int main(void) {
     struct parallel *pool = parallel_new(1), *three = parallel_new(3);
     double explained, again;
     place_room(place);
-    missing_light_init(&missing, &places, 1.2f, pool);
+    missing_light_init(&missing, &places, pool);
     float alike = missing_light_strength(&missing, MISSING_MEAN, &explained);
     CHECK_THAT(alike > 1.5f * STRENGTH, "the wall is most alike at %g", (double)alike);
     CHECK(explained > 0.0 && explained < WALL + DESK);
@@ -42,7 +42,7 @@ int main(void) {
     missing_light_strength(&missing, MISSING_MEAN, &again);
     CHECK_THAT(again == explained, "all places count again after it");
     missing_light_release(&missing);
-    missing_light_init(&missing, &places, 1.2f, three);
+    missing_light_init(&missing, &places, three);
     CHECK(missing_light_strength(&missing, MISSING_MEAN, &again) == alike && again == explained);
     missing_light_release(&missing);
     parallel_free(three);
