@@ -111,6 +111,13 @@ void output_close(struct output *o) {
     *o = (struct output){0};
 }
 
+/* Tells the watch of files whose hashes have been found to be those of the record. */
+static void tell_kept(const struct output *o, const cJSON *files) {
+    for (const cJSON *f = files->child; f && o->watch->kept; f = f->next)
+        o->watch->kept(o->watch->user, cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(f, "name")),
+                       cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(f, "sha256")));
+}
+
 bool output_is_done(const struct output *o, uint64_t picture) {
     char key[24];
     key_of(picture, key);
@@ -125,7 +132,10 @@ bool output_is_done(const struct output *o, uint64_t picture) {
         if (!is_there)
             return false;
     }
-    return files && files->child;
+    if (!files || !files->child)
+        return false;
+    tell_kept(o, files);
+    return true;
 }
 
 enum status output_record(struct output *o, uint64_t picture, cJSON *record, struct error *err) {
@@ -179,7 +189,7 @@ enum status output_views(struct output *o, uint64_t pictures, cJSON *head, struc
     if (status == STATUS_OK)
         status = file_replace(path, text, strlen(text), err);
     if (status == STATUS_OK && o->watch->file)
-        o->watch->file(o->watch->user, OUTPUT_VIEWS);
+        o->watch->file(o->watch->user, OUTPUT_VIEWS, NULL);
     mem_free(path);
     mem_free(text);
     cJSON_Delete(head);
@@ -221,7 +231,7 @@ static enum status list(struct output *o, const char *name, const char *pass, cJ
         json_add_string(file, "sha256", hex);
         cJSON_AddItemToArray(files, file);
         if (o->watch->file)
-            o->watch->file(o->watch->user, name);
+            o->watch->file(o->watch->user, name, hex);
     }
     mem_free(path);
     return status;

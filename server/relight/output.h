@@ -36,7 +36,7 @@ void output_close(struct output *o);
 /* How many pictures the job has, for their names; before any of them. */
 void output_count(struct output *o, uint64_t pictures);
 
-/* Whether the picture's files are there as its record says. */
+/* Whether the picture's files are there as its record says; the watch is told of them. */
 bool output_is_done(const struct output *o, uint64_t picture);
 
 /* Writes a pass (or a source's light, `name`) in those formats; data are EXR even where only PNG is asked for. Its

@@ -23,9 +23,12 @@ struct relight_watch {
     void *user;
     bool (*should_stop)(void *user);                         /* then STATUS_CANCELLED */
     void (*progress)(void *user, double done, double total); /* pictures */
-    void (*file)(void *user, const char *name);              /* a file is complete, in `out` */
-    void (*preview)(void *user, const char *name);           /* the same of a PNG that will become better */
-    void (*message)(void *user, const char *text);           /* something that the user should know */
+    /* A file is complete, in `out`; sha256: its hash in hex, NULL where it is not known. */
+    void (*file)(void *user, const char *name, const char *sha256);
+    /* The same of a picture that was there already: the file is as the record says. */
+    void (*kept)(void *user, const char *name, const char *sha256);
+    void (*preview)(void *user, const char *name); /* the same of a PNG that will become better */
+    void (*message)(void *user, const char *text); /* something that the user should know */
 };
 
 #endif

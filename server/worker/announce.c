@@ -11,15 +11,19 @@
 enum status announce_file(struct progress *progress, const char *type, const char *path, const char *name,
                           const char *content_type, uint64_t *bytes, struct error *err) {
     char hex[SHA256_HEX_SIZE];
-    struct stat info;
     enum status status = sha256_of_file(path, hex, err);
-    if (status == STATUS_OK && stat(path, &info) != 0)
-        status = error_set_errno(err, errno, "cannot look at %s", path);
-    if (status == STATUS_OK)
-        progress_file(progress, type, name, (uint64_t)info.st_size, hex, content_type);
-    if (status == STATUS_OK && bytes)
+    return status == STATUS_OK ? announce_known(progress, type, path, name, content_type, hex, bytes, err) : status;
+}
+
+enum status announce_known(struct progress *progress, const char *type, const char *path, const char *name,
+                           const char *content_type, const char *sha256, uint64_t *bytes, struct error *err) {
+    struct stat info;
+    if (stat(path, &info) != 0)
+        return error_set_errno(err, errno, "cannot look at %s", path);
+    progress_file(progress, type, name, (uint64_t)info.st_size, sha256, content_type);
+    if (bytes)
         *bytes = (uint64_t)info.st_size;
-    return status;
+    return STATUS_OK;
 }
 
 const char *announce_content_type(const char *name) {

@@ -11,6 +11,9 @@
  * length. */
 enum status announce_file(struct progress *progress, const char *type, const char *path, const char *name,
                           const char *content_type, uint64_t *bytes, struct error *err);
+/* The same of a file whose hash is known. */
+enum status announce_known(struct progress *progress, const char *type, const char *path, const char *name,
+                           const char *content_type, const char *sha256, uint64_t *bytes, struct error *err);
 /* By the name's ending. */
 const char *announce_content_type(const char *name);
 

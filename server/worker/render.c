@@ -40,6 +40,12 @@
 #define RECORD_INTERVAL_SEC 2.0 /* between two words of the record: a part's has some 100 lines */
 #define MIB 1048576.0
 
+/* A file of an earlier attempt whose hash the engine has just found to be right: it is not read again. */
+struct kept_file {
+    char *name; /* owned */
+    char sha256[SHA256_HEX_SIZE];
+};
+
 struct render_run {
     const struct order *order;
     struct progress *progress;
@@ -47,6 +53,8 @@ struct render_run {
     char *out_dir;
     char **told; /* [told_count] names of the outputs that were announced; owned */
     size_t told_count;
+    struct kept_file *kept; /* [kept_count] those that are announced at the end; owned */
+    size_t kept_count;
     uint64_t bytes;                  /* of them */
     double begun_sec, next_progress; /* as clock_sec */
     double next_record;
@@ -61,11 +69,15 @@ static bool over_share(const struct render_run *run) {
     return run->order->disk_bytes > 0 && run->bytes > run->order->disk_bytes;
 }
 
-static void announce(struct render_run *run, const char *type, const char *name) {
+/* sha256: NULL where it is not known. */
+static void announce(struct render_run *run, const char *type, const char *name, const char *sha256) {
     uint64_t bytes = 0;
+    const char *content = announce_content_type(name);
     char *path = file_join(run->out_dir, name);
-    if (run->status == STATUS_OK)
-        run->status = announce_file(run->progress, type, path, name, announce_content_type(name), &bytes, &run->error);
+    if (run->status == STATUS_OK && sha256)
+        run->status = announce_known(run->progress, type, path, name, content, sha256, &bytes, &run->error);
+    else if (run->status == STATUS_OK)
+        run->status = announce_file(run->progress, type, path, name, content, &bytes, &run->error);
     mem_free(path);
     if (run->status != STATUS_OK || strcmp(type, EVENT_OUTPUT) != 0)
         return;
@@ -104,17 +116,25 @@ static void tell_record(struct render_run *run) {
     mem_free(path);
 }
 
-static void tell_file(void *user, const char *name) {
+static void tell_file(void *user, const char *name, const char *sha256) {
     struct render_run *run = user;
     tell_record(run);
-    announce(run, EVENT_OUTPUT, name);
+    announce(run, EVENT_OUTPUT, name, sha256);
+}
+
+static void note_kept(void *user, const char *name, const char *sha256) {
+    struct render_run *run = user;
+    run->kept = mem_realloc_array(run->kept, run->kept_count + 1, sizeof *run->kept);
+    struct kept_file *file = &run->kept[run->kept_count++];
+    file->name = mem_strdup(name);
+    snprintf(file->sha256, sizeof file->sha256, "%s", sha256);
 }
 
 static void tell_preview(void *user, const char *name) {
     struct render_run *run = user;
     char *from = file_join(run->out_dir, name), *to = file_join(run->out_dir, PREVIEW);
     if (rename(from, to) == 0)
-        announce(run, EVENT_PREVIEW, PREVIEW);
+        announce(run, EVENT_PREVIEW, PREVIEW, NULL);
     mem_free(to);
     mem_free(from);
 }
@@ -127,6 +147,18 @@ static void tell_message(void *user, const char *text) {
 /* --- what was kept --------------------------------------------------------------------------- */
 
 static int by_name(const void *a, const void *b) { return strcmp(*(char *const *)a, *(char *const *)b); }
+
+static int by_kept_name(const void *a, const void *b) {
+    return strcmp(((const struct kept_file *)a)->name, ((const struct kept_file *)b)->name);
+}
+
+/* NULL: it is no kept picture's. kept[] is sorted. */
+static const char *kept_sha256(const struct render_run *run, char *name) {
+    const struct kept_file key = {.name = name}, *found = NULL;
+    if (run->kept_count > 0)
+        found = bsearch(&key, run->kept, run->kept_count, sizeof *run->kept, by_kept_name);
+    return found ? found->sha256 : NULL;
+}
 
 /* Announces the files below `folder` of out/ ("": out/ itself) that are not among told[sorted_count], which is
  * sorted. */
@@ -142,7 +174,7 @@ static enum status tell_kept(struct render_run *run, const char *folder, size_t 
             status = tell_kept(run, name, sorted_count, err);
         else if (is_there && S_ISREG(info.st_mode) &&
                  (sorted_count == 0 || !bsearch(&name, run->told, sorted_count, sizeof *run->told, by_name)))
-            tell_file(run, name);
+            tell_file(run, name, kept_sha256(run, name));
         mem_free(full);
         mem_free(name);
     }
@@ -191,12 +223,15 @@ static enum status render(struct render_run *run, struct parallel *pool, struct 
                                         .should_stop = should_stop,
                                         .progress = tell_progress,
                                         .file = tell_file,
+                                        .kept = note_kept,
                                         .preview = tell_preview,
                                         .message = tell_message};
     enum status status = relight_run(&job, &watch, pool, err);
     size_t sorted_count = run->told_count;
     if (sorted_count > 0)
         qsort(run->told, sorted_count, sizeof *run->told, by_name);
+    if (run->kept_count > 0)
+        qsort(run->kept, run->kept_count, sizeof *run->kept, by_kept_name);
     if (status == STATUS_OK)
         status = tell_kept(run, "", sorted_count, err);
     if (run->status != STATUS_OK) {
@@ -223,6 +258,9 @@ enum status task_render(const struct order *order, struct progress *progress, st
     for (size_t i = 0; i < run.told_count; i++)
         mem_free(run.told[i]);
     mem_free(run.told);
+    for (size_t i = 0; i < run.kept_count; i++)
+        mem_free(run.kept[i].name);
+    mem_free(run.kept);
     mem_free(run.out_dir);
     return status;
 }

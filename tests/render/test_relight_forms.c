@@ -433,6 +433,20 @@ static void paint(const char *dir) {
     mem_free(path);
 }
 
+struct kept {
+    char name[2][64];
+    int count;
+};
+
+/* Of the pictures that were there already, names with hashes of the files. */
+static void note_kept(void *user, const char *name, const char *sha256) {
+    struct kept *kept = user;
+    CHECK(strlen(sha256) == SHA256_HEX_SIZE - 1);
+    if (kept->count < 2)
+        snprintf(kept->name[kept->count], sizeof kept->name[0], "%s", name);
+    kept->count++;
+}
+
 /* A render that was stopped goes on where it was: what is there whole is not rendered again, but where the outputs are
  * others. */
 static void test_resume(void) {
@@ -448,7 +462,12 @@ static void test_resume(void) {
     cJSON *settings = NULL;
     CHECK(json_parse(text, strlen(text), "settings", &settings, &err) == STATUS_OK);
     struct relight_job job = {.outputs = dir, .settings = settings, .out = out};
-    CHECK(relight_run(&job, NULL, pool, &err) == STATUS_OK);
+    struct kept found = {.count = 0};
+    struct relight_watch watch = {.user = &found, .kept = note_kept};
+    CHECK(relight_run(&job, &watch, pool, &err) == STATUS_OK);
+    CHECK(found.count == 2);
+    CHECK_STRING(found.name[0], "00000_radiance.exr");
+    CHECK_STRING(found.name[1], "00002_radiance.exr");
     CHECK(sha256_of_file(path, after, &err) == STATUS_OK && strcmp(before, after) == 0);
     CHECK(stat(other, &now) == 0 && now.st_ino == kept.st_ino);
     paint(dir);
