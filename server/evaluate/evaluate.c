@@ -12,6 +12,7 @@
 #include "server/evaluate/pair_picture.h"
 #include "server/relight/recovered.h"
 #include "server/evaluate/seen.h"
+#include "server/evaluate/stated.h"
 #include "server/ingest/bundle.h"
 #include "server/ingest/pixels.h"
 #include "server/reconstruct/held_render.h"
@@ -189,14 +190,6 @@ static enum status score_photograph(struct evaluator *e, const struct photograph
     return status;
 }
 
-/* The stated deviation of base colour as the camera sees it: that takes the place of base colour for the while. */
-static void render_deviation(struct evaluator *e, const struct camera *camera, struct image *out) {
-    struct texture *shown = &e->recovered.materials.base_color, kept = *shown;
-    *shown = e->deviation;
-    film_render_first_hits(&e->recovered.world, camera, e->settings->samples, e->settings->seed, e->pool, out);
-    *shown = kept;
-}
-
 static enum status score_view(struct evaluator *e, const struct photograph *p, uint32_t view, struct evaluation *v,
                               struct metric *msre, struct error *err) {
     struct image truth = {0}, found = {0}, deviation = {0};
@@ -210,7 +203,8 @@ static enum status score_view(struct evaluator *e, const struct photograph *p, u
     mark_by_truth(&truth, flags);
     score_add(&v->score, &found, &truth, flags);
     if (e->deviation.texel)
-        render_deviation(e, &p->camera, &deviation);
+        stated_render(&e->recovered, &e->deviation, &p->camera, e->settings->samples, e->settings->seed, e->pool,
+                      &deviation);
     trust_add(&v->trust, &found, e->deviation.texel ? &deviation : NULL, &truth, flags);
     if (e->settings->pictures_dir)
         status = write_pair(e, "base_color", stem, &truth, &found, "base_color.", 1.0f, err);
@@ -267,23 +261,6 @@ static enum status load_room(struct evaluator *e, struct error *err) {
     return STATUS_OK;
 }
 
-/* Outputs of before had something else under that name, or nothing. */
-static enum status load_deviation(struct evaluator *e, const char *outputs, struct error *err) {
-    struct image image = {0};
-    char *path = file_join(outputs, "confidence.exr");
-    const struct texture *color = &e->recovered.materials.base_color;
-    enum status status = file_is_in(outputs, "confidence.exr") ? image_read(path, &image, NULL, err) : STATUS_OK;
-    if (status == STATUS_OK && image.pixel && image_channel(&image, "R") == 0 && image.channel_count == 3 &&
-        image.width == color->width && image.height == color->height) {
-        texture_init(&e->deviation, &e->recovered.inverse, rgb_gray(0.0f));
-        for (size_t i = 0; i < (size_t)image.width * image.height; i++)
-            memcpy(e->deviation.texel[i], image.pixel + 3 * i, 3 * sizeof(float));
-    }
-    image_release(&image);
-    mem_free(path);
-    return status;
-}
-
 enum status evaluate_outputs(const char *room, const char *outputs, const struct evaluate_settings *settings,
                              struct parallel *pool, struct evaluation *v, struct error *err) {
     struct evaluator e = {.settings = settings, .pool = pool};
@@ -306,7 +283,7 @@ enum status evaluate_outputs(const char *room, const char *outputs, const struct
         goto out;
     status = settings->pictures_dir ? file_make_dirs(settings->pictures_dir, err) : STATUS_OK;
     if (status == STATUS_OK)
-        status = load_deviation(&e, outputs, err);
+        status = stated_load(outputs, &e.recovered, &e.deviation, err);
     if (status == STATUS_OK)
         status = found_emitters_count(room, &e.scene.mesh, &e.recovered, e.emits, &v->emitters, err);
     if (status == STATUS_OK) {

@@ -130,6 +130,7 @@ measure_scan() { # ROOM KIND
     row "its ceiling" "$(figure "$dir/ceiling" base_color)" - higher
     row "base colour PSNR away from outlines, dB" "$(value base_color_inside)" "$inside" higher
     row "its ceiling away from outlines" "$(figure "$dir/ceiling" base_color_inside)" - higher
+    row "errors within one standard deviation of confidence.exr" "$(value within_one_deviation)" - higher
     row "roughness PSNR, dB" "$(value roughness)" "$roughness" higher
     row "specular PSNR, dB" "$(value specular)" "$specular" higher
     row "emission, intersection over union" "$(value emission_overlap)" "$overlap" higher

@@ -15,6 +15,9 @@
  *                                   whose pixels less than half emit
  *   false_lamps                     recovered segments that emit, of whose pixels less than half show a lamp, or
  *                                   what is less than two pixels from one
+ *   within_one_deviation, within_two_deviations   share of the errors of base colour that are at most so many of the
+ *                                   deviations that confidence.exr states
+ *   plain_specks                    as evaluate's (trust.h)
  *
  * With PICTURES, and unless that is "": of each held-out view base_color_NNN.png (true | recovered). With TRUTH the
  * held-out views of that folder in place of ROOM's (scan_ceiling). */
@@ -31,6 +34,8 @@
 #include "server/evaluate/pair_picture.h"
 #include "server/evaluate/score.h"
 #include "server/evaluate/seen.h"
+#include "server/evaluate/stated.h"
+#include "server/evaluate/trust.h"
 #include "server/ingest/bundle.h"
 #include "server/ingest/mesh/mesh_file.h"
 #include "server/relight/recovered.h"
@@ -54,7 +59,9 @@ struct comparison {
     struct mesh mesh; /* of OUT */
     struct rigid scan_from_room;
     struct recovered recovered;
+    struct texture deviation; /* stated of base colour; texel NULL: none is */
     struct score score;
+    struct trust trust;
     size_t lamps, missed, false_lamps;
     double false_pixels, seen_pixels, hole_pixels;
 };
@@ -96,6 +103,8 @@ static enum status load(struct comparison *c, const char *room, const char *out,
         status = mesh_file_read(path, "scene.ply", MESH_MAX_TRIANGLES, &c->mesh, &report, err);
     if (status == STATUS_OK)
         status = recovered_load(out, &c->mesh, c->pool, &c->recovered, err);
+    if (status == STATUS_OK)
+        status = stated_load(out, &c->recovered, &c->deviation, err);
     mem_free(path);
     return status;
 }
@@ -212,7 +221,7 @@ static void leave_out(struct comparison *c, const struct image *truth, const str
 
 static enum status score_view(struct comparison *c, const struct photograph *p, const char *truths,
                               const char *pictures, struct error *err) {
-    struct image truth = {0}, found = {0};
+    struct image truth = {0}, found = {0}, deviation = {0};
     char stem[4] = "";
     const char *slash = strrchr(p->name, '/');
     snprintf(stem, sizeof stem, "%.3s", slash ? slash + 1 : p->name);
@@ -227,6 +236,9 @@ static enum status score_view(struct comparison *c, const struct photograph *p, 
     seen_flags(&c->seen, &p->camera, c->pool, flags);
     leave_out(c, &truth, &found, flags);
     score_add(&c->score, &found, &truth, flags);
+    if (c->deviation.texel)
+        stated_render(&c->recovered, &c->deviation, &moved, SAMPLES, SEED, c->pool, &deviation);
+    trust_add(&c->trust, &found, c->deviation.texel ? &deviation : NULL, &truth, flags);
     path = pictures ? mem_printf("%s/base_color_%s.png", pictures, stem) : NULL;
     if (path)
         status = pair_picture_write(path, &truth, &found, "base_color.", 1.0f, err);
@@ -234,6 +246,7 @@ static enum status score_view(struct comparison *c, const struct photograph *p, 
 out:
     image_release(&truth);
     image_release(&found);
+    image_release(&deviation);
     mem_free(flags);
     return status;
 }
@@ -343,16 +356,27 @@ static void count_lamps(struct comparison *c) {
 
 /* --- all ----------------------------------------------------------------------------------- */
 
+/* JSON has no NaN. */
+static const char *share_text(char text[16], size_t part, size_t whole) {
+    snprintf(text, 16, whole ? "%.4f" : "null", trust_share(part, whole));
+    return text;
+}
+
 static void print(const struct comparison *c) {
+    char one[16], two[16], specks[16];
+    const struct trust *trust = &c->trust;
     const struct score *s = &c->score;
     printf(
         "{\"turned_degrees\": %.3f, \"moved\": %.4f,\n \"base_color\": %.3f, \"base_color_inside\": %.3f, \"roughness\": %.2f, \"specular\": %.2f,\n"
         " \"emission_overlap\": %.3f, \"emission_log_error\": %.3g, \"base_color_ratio\": %.3f,\n"
-        " \"lamps\": %zu, \"lamps_missed\": %zu, \"false_lamps\": %zu, \"false_pixels\": %.0f, \"holes\": %.4f}\n",
+        " \"lamps\": %zu, \"lamps_missed\": %zu, \"false_lamps\": %zu, \"false_pixels\": %.0f, \"holes\": %.4f,\n"
+        " \"within_one_deviation\": %s, \"within_two_deviations\": %s, \"plain_specks\": %s}\n",
         turned_degrees(&c->scan_from_room), (double)vec3_length(c->scan_from_room.translation),
         score_psnr_db(s->base_color_seen), score_psnr_db(s->base_color_inside), score_psnr_db(s->roughness),
         score_psnr_db(s->specular), score_emission_iou(s), score_mean(s->emission_log), score_base_color_ratio(s),
-        c->lamps, c->missed, c->false_lamps, c->false_pixels, c->hole_pixels / c->seen_pixels);
+        c->lamps, c->missed, c->false_lamps, c->false_pixels, c->hole_pixels / c->seen_pixels,
+        share_text(one, trust->within_one, trust->judged), share_text(two, trust->within_two, trust->judged),
+        share_text(specks, trust->specks, trust->plain_pixels));
 }
 
 static enum status run(int argc, char **argv, struct error *err) {
@@ -373,6 +397,7 @@ static enum status run(int argc, char **argv, struct error *err) {
     if (status == STATUS_OK) {
         count_lamps(&c);
         print(&c);
+        texture_release(&c.deviation);
         recovered_release(&c.recovered);
     }
     mem_free(truths);

@@ -1,0 +1,35 @@
+/* stated.c -- see stated.h. */
+#include "server/evaluate/stated.h"
+
+#include <string.h>
+
+#include "common/file.h"
+#include "common/mem.h"
+#include "server/render/film.h"
+
+enum status stated_load(const char *outputs, const struct recovered *recovered, struct texture *deviation,
+                        struct error *err) {
+    struct image image = {0};
+    char *path = file_join(outputs, "confidence.exr");
+    const struct texture *color = &recovered->materials.base_color;
+    *deviation = (struct texture){0};
+    enum status status = file_is_in(outputs, "confidence.exr") ? image_read(path, &image, NULL, err) : STATUS_OK;
+    if (status == STATUS_OK && image.pixel && image_channel(&image, "R") == 0 && image.channel_count == 3 &&
+        image.width == color->width && image.height == color->height) {
+        texture_init(deviation, &recovered->inverse, rgb_gray(0.0f));
+        for (size_t i = 0; i < (size_t)image.width * image.height; i++)
+            memcpy(deviation->texel[i], image.pixel + 3 * i, 3 * sizeof(float));
+    }
+    image_release(&image);
+    mem_free(path);
+    return status;
+}
+
+/* It takes the place of base colour for the while. */
+void stated_render(struct recovered *recovered, const struct texture *deviation, const struct camera *camera,
+                   uint32_t samples, uint64_t seed, struct parallel *pool, struct image *image) {
+    struct texture *shown = &recovered->materials.base_color, kept = *shown;
+    *shown = *deviation;
+    film_render_first_hits(&recovered->world, camera, samples, seed, pool, image);
+    *shown = kept;
+}
