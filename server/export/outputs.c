@@ -223,10 +223,18 @@ static enum status put_comparisons(struct export *e, struct error *err) {
 
 /* --- the report --------------------------------------------------------------------------- */
 
-/* The previews that put_previews has written; returns their number. Their paths are the caller's. */
+static bool is_black(const struct image *image) {
+    for (size_t i = 0; i < (size_t)image->width * image->height * image->channel_count; i++)
+        if (image->pixel[i] > 0.0f)
+            return false;
+    return true;
+}
+
+/* The previews that put_previews has written, without distant light where none was found; returns their number. Their
+ * paths are the caller's. */
 static size_t list_textures(const struct export *e, struct report_picture texture[TEXTURE_FILES_MAX + 1]) {
     size_t count = texture_files_list(e->files.dir, e->input, texture);
-    if (e->input->environment)
+    if (e->input->environment && !is_black(e->input->environment))
         texture[count++] = (struct report_picture){file_join(e->files.dir, "preview/environment.png"),
                                                    ENVIRONMENT_TITLE, ENVIRONMENT_ABOUT};
     return count;

@@ -6,6 +6,7 @@
 
 #include "server/export/html.h"
 #include "server/export/report_curve.h"
+#include "server/export/report_figures.h"
 #include "server/export/report_verdict.h"
 
 #define SEGMENT_ROWS 60 /* the rest is in report.json */
@@ -33,6 +34,8 @@ static const char style[] =
     ".swatch{display:inline-block;width:2.2em;height:1em;border-radius:3px;vertical-align:-.12em;"
     "border:1px solid var(--line);margin-right:.4em}"
     ".bar{display:block;height:.6em;margin:.4em 0;border-radius:3px;background:var(--accent)}"
+    ".cards{columns:20rem;column-gap:1rem}.cards .card{break-inside:avoid;margin-bottom:1rem}"
+    ".card>b{display:block;margin-bottom:.2rem}.list{margin:1rem 0}.list td,.list th{white-space:nowrap}"
     "svg{display:block;width:100%;height:auto}svg text{fill:var(--soft);font-size:11px}"
     "svg path{fill:none;stroke:var(--accent);stroke-width:1.6;vector-effect:non-scaling-stroke}"
     "svg line{stroke:var(--line)}"
@@ -40,13 +43,6 @@ static const char style[] =
     "@media(max-width:34rem){body{padding:1rem .7rem 3rem}h1{font-size:1.4rem}"
     ".spare{display:none}.tall{max-height:80vh;overflow-y:auto}.tall th,.tall td{padding-right:.4rem}}"
     "@media print{.card,figure{break-inside:avoid}}";
-
-/* A card scrolls where its table is too wide: by keyboard too, and so it has a name. */
-static void begin_card(struct buf *out, const char *classes, const char *name) {
-    buf_printf(out, "<div class=\"card%s\" tabindex=0 role=region aria-label=\"", classes);
-    html_key(out, name);
-    buf_puts(out, "\">");
-}
 
 /* --- sections ----------------------------------------------------------------------------- */
 
@@ -69,48 +65,6 @@ static enum status put_textures(struct buf *out, const struct report_page *page,
     return status;
 }
 
-/* A figure of a held-out view, with its name, its unit and what is good. */
-static void put_figure(struct buf *out, const cJSON *figure) {
-    static const struct {
-        const char *key, *name, *good;
-    } known[] = {
-        {"msre", "mean squared relative error", ", 0 is best"},
-        {"msre_noise_left", "give or take, by noise of the re-render", ""},
-        {"msre_at_outlines", "of that beside outlines", ""},
-        {"outline_share", "share of pixels beside outlines", ""},
-        {"msre_render_noise", "that noise, which is not in the error", ""},
-        {"msre_photograph_noise", "noise of the photograph, which is", ""},
-        {"psnr_db", "PSNR in dB", ", 25 and more is good"},
-        {"psnr_noise_left_db", "give or take", " dB"},
-        {"ssim", "SSIM", ", 1 is best"},
-        {"samples", "samples a pixel", ""},
-    };
-    const char *name = NULL, *good = "";
-    for (size_t i = 0; i < sizeof known / sizeof *known; i++)
-        if (strcmp(known[i].key, figure->string) == 0)
-            name = known[i].name, good = known[i].good;
-    html_key(out, name ? name : figure->string);
-    buf_puts(out, " ");
-    html_number(out, figure->valuedouble);
-    buf_puts(out, good);
-}
-
-/* Those that say most, or the others, in the order of the report. */
-static void put_figures(struct buf *out, const cJSON *view, bool main) {
-    static const char *const chosen[] = {"msre", "psnr_db", "ssim"};
-    const char *between = "";
-    for (const cJSON *m = view ? view->child : NULL; m; m = m->next) {
-        bool is_chosen = false;
-        for (size_t i = 0; i < sizeof chosen / sizeof *chosen; i++)
-            is_chosen = is_chosen || strcmp(chosen[i], m->string) == 0;
-        if (!cJSON_IsNumber(m) || is_chosen != main)
-            continue;
-        buf_puts(out, between);
-        put_figure(out, m);
-        between = ";&ensp;";
-    }
-}
-
 static enum status put_comparisons(struct buf *out, const struct report_page *page, struct error *err) {
     if (page->comparison_count == 0)
         return STATUS_OK;
@@ -128,11 +82,11 @@ static enum status put_comparisons(struct buf *out, const struct report_page *pa
         buf_puts(out, "<figcaption>");
         html_text(out, page->comparison[i].title);
         buf_puts(out, "<span>");
-        put_figures(out, view, true);
+        report_view_figures(out, view, true);
         buf_puts(out, "</span>");
         if (view && view->child) {
             buf_puts(out, "<details><summary>more figures</summary><span>");
-            put_figures(out, view, false);
+            report_view_figures(out, view, false);
             buf_puts(out, "</span></details>");
         }
         buf_puts(out, "</figcaption></figure>");
@@ -143,13 +97,15 @@ static enum status put_comparisons(struct buf *out, const struct report_page *pa
 }
 
 static void put_curves(struct buf *out, const cJSON *series) {
-    if (!cJSON_IsObject(series) || !series->child)
-        return;
-    buf_puts(out, "<h2>Curves</h2><div class=grid>");
-    for (const cJSON *one = series->child; one; one = one->next)
-        if (cJSON_IsArray(one))
-            report_curve(out, one->string, one);
-    buf_puts(out, "</div>");
+    size_t before = 0;
+    for (const cJSON *one = series ? series->child : NULL; one; one = one->next) {
+        if (!cJSON_IsArray(one) || !report_curve_has(one))
+            continue;
+        if (before++ == 0)
+            buf_puts(out, "<h2>Curves</h2><div class=grid>");
+        report_curve(out, one->string, one);
+    }
+    buf_puts(out, before > 0 ? "</div>" : "");
 }
 
 static void put_stages(struct buf *out, const cJSON *stages) {
@@ -162,7 +118,7 @@ static void put_stages(struct buf *out, const cJSON *stages) {
         total += isfinite(seconds) ? seconds : 0.0;
     }
     buf_puts(out, "<h2>Time by stage</h2>");
-    begin_card(out, "", "time by stage");
+    html_card(out, "", "time by stage");
     buf_printf(out, "<p class=soft>%.1f s in all</p><table>", total);
     for (const cJSON *stage = stages->child; stage; stage = stage->next) {
         const char *name = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(stage, "name"));
@@ -230,7 +186,7 @@ static void put_segments(struct buf *out, const cJSON *segments) {
     for (const cJSON *s = segments->child; s; s = s->next)
         emitters += cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(s, "emitter"));
     buf_puts(out, "<h2>Segments</h2>");
-    begin_card(out, " tall", "segments");
+    html_card(out, " tall", "segments");
     buf_printf(out,
                "<p class=soft>%d segments, %d of them "
                "emitters.</p><table><tr><th>object</th><th class=n>area, m²</th><th class=\"n spare\">texels"
@@ -251,38 +207,11 @@ static void put_segments(struct buf *out, const cJSON *segments) {
     buf_puts(out, "</div>");
 }
 
-/* Scalar members form the summary at the top, objects a section each. */
-static void put_others(struct buf *out, const cJSON *report, bool plain) {
-    static const char *const drawn[] = {"title", "series", "stages", "views", "segments", "files"};
-    for (const cJSON *member = report->child; member; member = member->next) {
-        bool skip = (!cJSON_IsObject(member) && !cJSON_IsArray(member)) != plain;
-        skip = skip || (!plain && !member->child); /* nothing in it */
-        for (size_t i = 0; i < sizeof drawn / sizeof *drawn; i++)
-            skip = skip || strcmp(member->string, drawn[i]) == 0;
-        if (skip)
-            continue;
-        if (plain) {
-            buf_puts(out, "<tr><th>");
-            html_key(out, member->string);
-            buf_puts(out, "</th><td>");
-            html_value(out, member);
-            buf_puts(out, "</td></tr>");
-        } else {
-            begin_card(out, "", member->string);
-            buf_puts(out, "<b>");
-            html_key(out, member->string);
-            buf_puts(out, "</b>");
-            html_value(out, member);
-            buf_puts(out, "</div>");
-        }
-    }
-}
-
 static void put_files(struct buf *out, const cJSON *files) {
     if (!cJSON_IsArray(files))
         return;
     buf_puts(out, "<h2>Files</h2>");
-    begin_card(out, " files", "files");
+    html_card(out, " files", "files");
     buf_puts(out, "<table>");
     for (const cJSON *file = files->child; file; file = file->next) {
         const cJSON *name = cJSON_GetObjectItemCaseSensitive(file, "name");
@@ -318,13 +247,7 @@ enum status report_html(const struct report_page *page, struct buf *out, struct 
     put_curves(out, cJSON_GetObjectItemCaseSensitive(report, "series"));
     put_segments(out, cJSON_GetObjectItemCaseSensitive(report, "segments"));
     put_stages(out, cJSON_GetObjectItemCaseSensitive(report, "stages"));
-    buf_puts(out, "<h2>Figures and settings</h2>");
-    begin_card(out, "", "summary");
-    buf_puts(out, "<table>");
-    put_others(out, report, true);
-    buf_puts(out, "</table></div><div class=grid>");
-    put_others(out, report, false);
-    buf_puts(out, "</div>");
+    report_figures(out, report);
     put_files(out, cJSON_GetObjectItemCaseSensitive(report, "files"));
     buf_puts(out, "</main></html>\n");
     if (out->overflowed)
