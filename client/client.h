@@ -27,7 +27,7 @@ enum client_exit {
     CLIENT_INTERRUPTED = 130  /* Ctrl-C; a submitted job goes on */
 };
 
-#define CLIENT_RETRY_SEC 3.0
+#define CLIENT_RETRY_SEC 3.0 /* how long an unreachable server is tried, unless --retry says otherwise */
 
 struct client {
     struct http_request *request;

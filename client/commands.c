@@ -9,7 +9,7 @@
 #include "common/protocol.h"
 #include "common/render_settings.h"
 
-#define ANY_NUMBER ((size_t)-1)
+#define ANY_NUMBER ((size_t)-1) /* of words */
 
 static const struct command_option no_options[] = {{0}};
 

@@ -12,7 +12,7 @@
 #include "common/file.h"
 #include "common/mem.h"
 
-#define FILE_MAX_BYTES ((size_t)1 << 20)
+#define FILE_MAX_BYTES ((size_t)1 << 20) /* of the file of tokens */
 
 char *credentials_folder_file(const char *name) {
     const char *config = getenv("XDG_CONFIG_HOME"), *home = getenv("HOME");

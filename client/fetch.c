@@ -13,8 +13,8 @@
 #include "common/file.h"
 #include "common/mem.h"
 
-#define PATIENCE_SEC 60.0
-#define VERSIONS_MAX 5 /* give up on a file that changes more often during the download */
+#define PATIENCE_SEC 60.0 /* without a byte, after which a download is given up; --retry sets it */
+#define VERSIONS_MAX 5    /* give up on a file that changes more often during the download */
 
 enum status fetch_list(struct fetch *f) {
     char path[64];

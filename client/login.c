@@ -8,7 +8,7 @@
 #include "client/credentials.h"
 #include "common/mem.h"
 
-#define TOKEN_MAX 256
+#define TOKEN_MAX 256 /* bytes */
 
 /* Waits until stdin has a line or ends; false when interrupted. */
 static bool wait_for_line(struct client *c) {

@@ -6,7 +6,7 @@
 
 #include "client/terminal.h"
 
-#define METER_PLAIN_SEC 10.0
+#define METER_PLAIN_SEC 10.0 /* between two lines where none can be redrawn */
 
 struct meter {
     struct terminal *terminal; /* borrowed; NULL: draw nothing */

@@ -18,8 +18,8 @@
 #include "common/file.h"
 #include "common/mem.h"
 
-#define CHUNK 65536
-#define DEEPEST 32 /* nested folders; a deeper path is a loop of links */
+#define CHUNK 65536 /* bytes that are read at once */
+#define DEEPEST 32  /* nested folders; a deeper path is a loop of links */
 
 struct pack_entry {
     char *name; /* inside the archive; owned */

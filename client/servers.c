@@ -15,7 +15,7 @@
 #include "common/nearest.h"
 #include "common/protocol.h"
 
-#define FILE_MAX_BYTES ((size_t)1 << 20)
+#define FILE_MAX_BYTES ((size_t)1 << 20) /* of the configuration file */
 
 /* --- the file ------------------------------------------------------------------------------ */
 

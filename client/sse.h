@@ -10,8 +10,8 @@
 
 #include "common/buf.h"
 
-#define SSE_EVENT_MAX ((size_t)4 << 20)
-#define SSE_ID_MAX 128
+#define SSE_EVENT_MAX ((size_t)4 << 20) /* bytes of an event */
+#define SSE_ID_MAX 128                  /* bytes of an id, with its NUL */
 
 /* Receives each event; type is "message" where the stream names none. Returning false stops the stream. */
 typedef bool sse_each(void *user, const char *type, const char *data, const char *id);

@@ -7,7 +7,7 @@
 
 #include "common/mem.h"
 
-#define CELL_MAX 4096
+#define CELL_MAX 4096  /* bytes of a cell; what is longer is cut off */
 #define LAST_WANTED 16 /* columns: of a name in a list this much tells it from others */
 #define LAST_LEAST 8   /* columns: less is not worth a column */
 

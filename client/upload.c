@@ -14,9 +14,9 @@
 #include "common/mem.h"
 #include "common/protocol.h"
 
-#define PATIENCE_SEC 600.0
-#define READING_MAX 400  /* bytes; what the server takes of Upload-Metadata is 1000, a longer one comes by PATCH */
-#define SILENCE_SEC 60.0 /* the connection is dead after this long without traffic */
+#define PATIENCE_SEC 600.0 /* without a byte, after which an upload is given up; --retry sets it */
+#define READING_MAX 400    /* bytes; what the server takes of Upload-Metadata is 1000, a longer one comes by PATCH */
+#define SILENCE_SEC 60.0   /* the connection is dead after this long without traffic */
 #define VERSION_FIELD "Tus-Resumable: " TUS_VERSION
 
 struct upload_sending {

@@ -8,7 +8,7 @@
 #include "client/terminal.h"
 #include "common/json.h"
 
-#define VIEW_METRICS 3
+#define VIEW_METRICS 3 /* series that are shown side by side */
 
 struct view_metric {
     char series[32];

@@ -19,8 +19,8 @@
 
 #define SILENCE_SEC 45.0 /* three keep-alives */
 #define PATIENCE_SEC 600.0
-#define REDRAW_SEC 0.2
-#define PLAIN_SEC 10.0
+#define REDRAW_SEC 0.2 /* between two drawings of the line */
+#define PLAIN_SEC 10.0 /* between two lines where none can be redrawn */
 
 const struct command_option watch_options[] = {
     {"all", 'a', OPTION_FLAG, NULL, "begin with what happened before, not with the present"},

@@ -9,7 +9,7 @@
 #include "common/buf.h"
 #include "common/file.h"
 
-#define DIGITS 32
+#define DIGITS 32 /* hex digits of a boot id, without hyphens */
 
 void boot_id_normalise(const char *text, char id[BOOT_ID_SIZE]) {
     size_t digits = 0, length = 0;

@@ -2,7 +2,7 @@
 #ifndef UNBAKE_COMMON_BOOT_H
 #define UNBAKE_COMMON_BOOT_H
 
-#define BOOT_ID_SIZE 40
+#define BOOT_ID_SIZE 40 /* 36 characters and the NUL, rounded up */
 
 /* The kernel's boot id, 36 characters. Where it is not to be seen (ProcSubset=pid of a systemd unit), what the
  * environment has as UNBAKED_BOOT_ID, to which the unit gives the same number; else "". */

@@ -10,7 +10,7 @@ double clock_sec(void);
 /* Milliseconds since 1970-01-01 UTC, by the system's clock, which may be set back. */
 int64_t clock_unix_ms(void);
 
-#define CLOCK_TEXT_SIZE 32
+#define CLOCK_TEXT_SIZE 32 /* 24 characters and the NUL, rounded up */
 /* Such a time as 2026-11-21T12:00:00.123Z. */
 void clock_text(int64_t unix_ms, char text[CLOCK_TEXT_SIZE]);
 /* The time, with or without a fraction (which is left out); 0 where it is malformed. */

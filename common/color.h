@@ -10,7 +10,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define COLOR_NAME_SIZE 64
+#define COLOR_NAME_SIZE 64 /* bytes with the NUL, as the next */
 #define COLOR_WARNING_SIZE 160
 
 /* How linear light became the stored value. */

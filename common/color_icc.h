@@ -16,7 +16,7 @@ struct color_inks *color_inks_new(const void *profile, size_t size, char warning
 void color_inks_convert(const struct color_inks *inks, const float *cmyk, float *rgb, size_t count);
 void color_inks_free(struct color_inks *inks);
 
-#define COLOR_VERSION_SIZE 24
+#define COLOR_VERSION_SIZE 24                          /* bytes with the NUL */
 void color_icc_version(char text[COLOR_VERSION_SIZE]); /* of Little CMS: "2.14" */
 
 #endif

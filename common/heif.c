@@ -24,7 +24,7 @@
 #define LIMIT_SIDE 23170
 /* Bytes of the largest ICC profile and EXIF block that are looked at. */
 #define PROFILE_MAX ((size_t)16 << 20)
-#define EXIF_MAX ((size_t)1 << 20)
+#define EXIF_MAX ((size_t)1 << 20) /* bytes of a block of EXIF */
 
 struct heif_picture {
     struct image_source *source;

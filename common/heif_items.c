@@ -11,8 +11,8 @@
 #define MAX_DEPTH 8
 /* Tiles of 256 x 256 of the largest picture are 8192. */
 #define MAX_DECODED 20000.0
-#define MAX_REFERENCES 65536
-#define META_MAX ((uint64_t)64 << 20)
+#define MAX_REFERENCES 65536          /* between items; a picture of tiles has some hundred */
+#define META_MAX ((uint64_t)64 << 20) /* bytes of the box that lists the items */
 
 /* To decode `user`, `used` is decoded. */
 struct reference {

@@ -16,9 +16,9 @@
 #include "common/error.h"
 #include "common/parallel.h"
 
-#define IMAGE_MAX_SIDE 65536
-#define IMAGE_MAX_PIXELS ((size_t)1 << 29)
-#define IMAGE_MAX_CHANNELS 64
+#define IMAGE_MAX_SIDE 65536               /* pixels, along either side */
+#define IMAGE_MAX_PIXELS ((size_t)1 << 29) /* 8 GiB as floats of four channels */
+#define IMAGE_MAX_CHANNELS 64 /* of a picture in memory; layers of an EXR that are not wanted do not count */
 
 /* What image_read reads, for messages. */
 #define IMAGE_FORMATS "EXR, PNG, JPEG, TIFF, HEIC, AVIF, WebP or Radiance HDR"

@@ -11,7 +11,7 @@ struct codec {
     size_t length;
     enum status (*read)(struct image_source *, bool, struct image *, struct image_info *, struct error *);
 };
-#define START_BYTES 32
+#define START_BYTES 32 /* of a file, by which its format is recognised */
 
 static const struct codec codecs[] = {
     {0, "\x76\x2f\x31\x01", 4, image_read_exr},

@@ -11,7 +11,7 @@
 #include "common/mem.h"
 #include "common/utf8.h"
 
-#define MAX_DEPTH 64
+#define MAX_DEPTH 64 /* of objects and arrays in each other */
 #define NUMBER(macro) NUMBER_(macro)
 #define NUMBER_(digits) #digits
 #define WHOLE_MAX 9007199254740992.0 /* 2^53: every whole number up to it is a double */

@@ -13,8 +13,8 @@
 
 /* Message and values are truncated before quoting, so that a line is always complete. */
 #define MESSAGE_BYTES 1500
-#define VALUE_BYTES 256
-#define CLEAN_FACTOR 4 /* utf8_show */
+#define VALUE_BYTES 256 /* of the value of a field; what is longer is cut off */
+#define CLEAN_FACTOR 4  /* utf8_show */
 #define LINE_BYTES (CLEAN_FACTOR * MESSAGE_BYTES + LOG_FIELDS_MAX * (CLEAN_FACTOR * VALUE_BYTES + 40) + 200)
 
 static atomic_int current_level = LOG_INFO, current_format = LOG_TEXT;

@@ -28,7 +28,7 @@ void log_warning(const char *format, ...) __attribute__((format(printf, 1, 2)));
 void log_info(const char *format, ...) __attribute__((format(printf, 1, 2)));
 void log_debug(const char *format, ...) __attribute__((format(printf, 1, 2)));
 
-#define LOG_FIELDS_MAX 10
+#define LOG_FIELDS_MAX 10 /* of one line */
 /* A figure or name to search for, in addition to the message. Fields without a value are left out. */
 struct log_field {
     const char *key;   /* letters and _, at most 30 */

@@ -4,7 +4,7 @@
 #include <stdbool.h>
 #include <string.h>
 
-#define LENGTH_MAX 63
+#define LENGTH_MAX 63 /* bytes of a name that is compared */
 
 static size_t least(size_t a, size_t b, size_t c) {
     size_t least_two = a < b ? a : b;

@@ -2,7 +2,7 @@
 #ifndef UNBAKE_COMMON_PROTOCOL_H
 #define UNBAKE_COMMON_PROTOCOL_H
 
-#define PROTOCOL_DEFAULT_SERVER "http://127.0.0.1:7117"
+#define PROTOCOL_DEFAULT_SERVER "http://127.0.0.1:7117" /* where the daemon listens unless it is told otherwise */
 
 #define UNBAKE_VERSION "0.1.0"
 #define PROTOCOL_API "v1" /* the first part of every path; names and meanings in it only grow */
@@ -10,7 +10,7 @@
 /* A webhook's secret as standardwebhooks.com writes it: this and the base64 of a key of so many bytes. The text of any
  * other secret is the key itself. */
 #define WEBHOOK_SECRET_PREFIX "whsec_"
-#define WEBHOOK_KEY_LEAST 24
+#define WEBHOOK_KEY_LEAST 24 /* bytes, both */
 #define WEBHOOK_KEY_MOST 64
 
 /* Event types of GET /v1/jobs/{id}/events. */

@@ -10,9 +10,9 @@
 #include "common/mem.h"
 #include "common/utf8.h"
 
-#define MIN_SCALE 1e-6
+#define MIN_SCALE 1e-6 /* from micrometres to metres, and back */
 #define MAX_SCALE 1e6
-#define MIN_LENS 0.01
+#define MIN_LENS 0.01 /* a hundredth of the stated size of the picture, and a hundred times it */
 #define MAX_LENS 100.0
 
 static const char *const axes_name[] = {

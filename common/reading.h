@@ -29,7 +29,7 @@
 #include "common/json.h"
 #include "common/vec.h"
 
-#define READING_MAX_SHIFT 10
+#define READING_MAX_SHIFT 10  /* frames, either way */
 #define READING_MAX_PATH 1000 /* bytes */
 
 /* What a file's pose matrices mean: camera-to-world, or world-to-camera (inverse); with camera axes x right, y down,

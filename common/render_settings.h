@@ -40,7 +40,7 @@ struct render_setting {
     const char *help;         /* one sentence */
 };
 
-#define RENDER_MAX_NUMBERS 3
+#define RENDER_MAX_NUMBERS 3  /* of one setting: a point or a colour */
 #define RENDER_LAMPS_MAX 1000 /* lamp.1 to lamp.1000, insert.1 to insert.1000 */
 #define RENDER_MAX_SIDE 16384 /* pixels of a picture */
 

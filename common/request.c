@@ -14,11 +14,11 @@
 #include "common/mem.h"
 #include "common/protocol.h"
 
-#define CONNECT_SEC 10L
-#define SILENCE_SEC 300.0
-#define TICK_MS 200
-#define PAUSE_FIRST_SEC 0.1
-#define PAUSE_MAX_SEC 5.0
+#define CONNECT_SEC 10L     /* to connect */
+#define SILENCE_SEC 300.0   /* without traffic, unless the call says otherwise */
+#define TICK_MS 200         /* between two calls of tick and go_on */
+#define PAUSE_FIRST_SEC 0.1 /* between two tries; doubled each time */
+#define PAUSE_MAX_SEC 5.0   /* up to this */
 #define UNIX_PREFIX "unix:"
 
 struct http_request {

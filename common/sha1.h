@@ -6,7 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define SHA1_BYTES 20
+#define SHA1_BYTES 20 /* of a digest */
 
 struct sha1 {
     uint32_t state[5];

@@ -57,7 +57,7 @@
 
 enum { ABSENT, MAPPED, USED };
 
-#define MIB 1048576.0
+#define MIB 1048576.0 /* bytes */
 
 struct array {
     char *base;

@@ -6,7 +6,7 @@
 
 #include "common/error.h"
 
-#define URL_MAX_BYTES 1000
+#define URL_MAX_BYTES 1000 /* of a whole URL */
 
 struct url {
     bool is_tls;

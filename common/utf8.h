@@ -32,7 +32,7 @@ enum utf8_kind utf8_kind(uint32_t character); /* by Unicode 15.1's general categ
 /* True when `text` is UTF-8 without a UTF8_CONTROL character: fit for a name. */
 bool utf8_is_name(const char *text);
 
-#define UTF8_SHOWN_SIZE 12
+#define UTF8_SHOWN_SIZE 12 /* "<U+10FFFF>" and the NUL, rounded up */
 /* Printable form of the first character of text[length > 0], for terminals and logs: itself if visible, '?' for
  * invalid UTF-8, C0 and DEL, "<U+202E>" for the others, as in `less`. Returns the number of bytes consumed; shown[]
  * has at most 4 times as many. */

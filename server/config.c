@@ -14,8 +14,8 @@
 #include "server/executor/sites.h"
 #include "server/net/address.h"
 
-#define FILE_MAX_BYTES ((size_t)1 << 20)
-#define DEFAULT "default" /* where an option is from that was not set */
+#define FILE_MAX_BYTES ((size_t)1 << 20) /* of a configuration file */
+#define DEFAULT "default"                /* where an option is from that was not set */
 
 #define TEXT(name, value, help)                                                                                        \
     { #name, CONFIG_TEXT, "", 0, 0, value, help, offsetof(struct config, name) }

@@ -24,7 +24,7 @@ struct config_option {
     size_t offset;    /* of the member in struct config */
 };
 
-#define CONFIG_OPTIONS_MAX 128
+#define CONFIG_OPTIONS_MAX 128 /* rows of the table, at most */
 
 struct config {
     char *where[CONFIG_OPTIONS_MAX]; /* by the table: where it was set, "unbaked.conf:12"; owned; NULL: default */
@@ -62,7 +62,7 @@ enum status config_read(struct config *c, const char *path, struct buf *problems
  * the option was set. */
 void config_check(const struct config *c, struct buf *problems);
 
-#define CONFIG_ADDRESS_SIZE 64
+#define CONFIG_ADDRESS_SIZE 64 /* bytes of the address without its port, with the NUL */
 /* Takes `listen` apart: "127.0.0.1:7117", "[::1]:0", "localhost:7117", "0.0.0.0:443". STATUS_INPUT
  * when it is no such thing. */
 enum status config_address(const char *listen, char address[CONFIG_ADDRESS_SIZE], uint16_t *port, bool *is_loopback,

@@ -2,8 +2,8 @@
 #ifndef UNBAKE_SERVER_LIBRARIES_H
 #define UNBAKE_SERVER_LIBRARIES_H
 
-#define LIBRARY_COUNT 19
-#define LIBRARY_VERSION_SIZE 24
+#define LIBRARY_COUNT 19        /* that the Makefile links */
+#define LIBRARY_VERSION_SIZE 24 /* bytes with the NUL */
 
 struct library {
     const char *name; /* static storage */

@@ -26,7 +26,7 @@
 #include "server/data/layout.h"
 #include "server/store/contents.h"
 
-#define ROUNDS_MAX 5
+#define ROUNDS_MAX 5 /* copies of the database and the files until both fit together; what does not then is left out */
 
 const struct command_option backup_flags[] = {
     {"with-outputs", 0, OPTION_FLAG, NULL, "the files of scenes and jobs too; FILE is a folder then"},

@@ -14,7 +14,7 @@
 #include "common/mem.h"
 #include "common/utf8.h"
 
-#define CHUNK_BYTES ((size_t)1 << 20)
+#define CHUNK_BYTES ((size_t)1 << 20) /* copied at once */
 
 bool copy_path_is_plain(const char *path) { return utf8_is_name(path) && file_path_is_plain(path); }
 

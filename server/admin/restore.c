@@ -17,7 +17,7 @@
 #include "server/data/layout.h"
 #include "server/store/contents.h"
 
-#define SUMS_MAX_BYTES ((size_t)1 << 30)
+#define SUMS_MAX_BYTES ((size_t)1 << 30) /* of SHA256SUMS: ten million files */
 
 const struct command_option restore_flags[] = {
     {"skip-damaged", 0, OPTION_FLAG, NULL, "leave out files that are missing or damaged; ends with 1 then"},

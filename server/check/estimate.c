@@ -7,7 +7,7 @@
 #include "server/scene/photograph_reduce.h"
 #include "server/state/pace.h"
 
-#define MIB 1048576.0
+#define MIB 1048576.0           /* bytes */
 #define BASE_BYTES (40.0 * MIB) /* program and libraries */
 #define TRIANGLE_BYTES 200.0    /* mesh, acceleration structure, adjacency, charts */
 #define UV_BYTES 24.0           /* of a triangle of a mesh with texture coordinates */

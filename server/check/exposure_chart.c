@@ -6,7 +6,7 @@
 #include "common/mem.h"
 #include "common/quantile.h"
 
-#define WIDTH 800
+#define WIDTH 800 /* pixels, as the next two */
 #define HEIGHT 240
 #define MARGIN 20.0f
 #define STOPS_LEAST 2.0 /* shown above and below the middle */

@@ -18,7 +18,7 @@
 
 enum fit_verdict { FIT_YES, FIT_DOUBTFUL, FIT_NO };
 
-#define FIT_EVIDENCE_MAX 6
+#define FIT_EVIDENCE_MAX 6 /* sentences */
 
 struct fit_result {
     enum fit_verdict verdict;

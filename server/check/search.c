@@ -9,6 +9,7 @@
 #define FULL_POINTS 7680 /* +25 %: no verdict */
 static const struct consistency_effort screening = {16, 48, 0}, refining = {24, 96, 0};
 
+/* Of the points: those by which hypotheses are chosen are not those by which they are judged. */
 #define SCREENING_SEED 1
 #define REFINING_SEED 2
 #define FULL_SEED 3

@@ -11,7 +11,7 @@
 #include "server/data/layout.h"
 #include "server/data/trash.h"
 
-#define ROUND_MAX 500
+#define ROUND_MAX 500 /* things that are listed at once */
 
 struct collector {
     const struct collector_config *config;

@@ -36,7 +36,7 @@ void folder_close(struct folder *f) {
     pthread_mutex_destroy(&f->scene_mutex);
 }
 
-#define MIB ((uint64_t)1 << 20)
+#define MIB ((uint64_t)1 << 20) /* bytes */
 
 enum status folder_check_room(const struct folder *f, uint64_t keep, uint64_t bytes, struct error *err) {
     uint64_t room;

@@ -11,7 +11,7 @@
 #include "common/sha256.h"
 #include "server/data/layout.h"
 
-#define KEPT_MAX ((size_t)64 << 20)
+#define KEPT_MAX ((size_t)64 << 20) /* bytes of a kept list */
 
 struct walk {
     const cJSON *kept; /* the list as it was kept; an object by name; NULL: none */

@@ -8,8 +8,8 @@
 #include "common/file.h"
 #include "common/mem.h"
 
-#define PLY_LIMIT ((size_t)1 << 28)
-#define TURN 6.28318530717958648f
+#define PLY_LIMIT ((size_t)1 << 28) /* bytes of the file */
+#define TURN 6.28318530717958648f   /* 2 pi */
 
 void shapes_init(struct shapes *s) { memset(s, 0, sizeof *s); }
 

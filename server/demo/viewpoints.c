@@ -9,7 +9,7 @@
 #include "common/mem.h"
 #include "common/rng.h"
 
-#define CANDIDATES 480
+#define CANDIDATES 480             /* cameras that are chosen from */
 #define POINTS 3000                /* surface points for measuring coverage */
 #define CLEARANCE_M 0.3f           /* to walls and furniture */
 #define NEAREST_M 0.7f             /* minimum distance of most of what a camera sees */

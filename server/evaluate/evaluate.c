@@ -19,7 +19,7 @@
 #include "server/render/film.h"
 #include "server/scene/scene.h"
 
-#define ROULETTE_DEPTH 5
+#define ROULETTE_DEPTH 5   /* see struct path_settings */
 #define DISPLAY_MEDIAN 0.2 /* of the median radiance in pictures, white is 1; as reconstruct/report.c has it */
 
 /* State shared by all views. */

@@ -13,7 +13,7 @@ struct seen_corner {
     float distance_m;
     int64_t object; /* NOTHING: a miss */
 };
-#define NOTHING INT64_MIN
+#define NOTHING INT64_MIN /* in place of an object */
 
 /* Distance of one corner's point from the plane of another beyond which there is a depth discontinuity: in pixel
  * sizes at that distance, plus a share of the distance for rounding. */

@@ -9,7 +9,7 @@
 #include "server/events/event_text.h"
 #include "server/events/hub.h"
 
-#define BATCH_EVENTS 64
+#define BATCH_EVENTS 64                /* read from the database at once */
 #define BATCH_BYTES ((size_t)64 << 10) /* of events' data; a single event may have more */
 #define TEXT_BYTES ((size_t)1 << 20)   /* of a batch as text; far above what BATCH_BYTES can become */
 

@@ -14,8 +14,8 @@
 #include "common/mem.h"
 #include "common/nearest.h"
 
-#define FILE_MAX_BYTES ((size_t)1 << 20)
-#define PLACEHOLDER_COUNT 20
+#define FILE_MAX_BYTES ((size_t)1 << 20) /* of an executor's file */
+#define PLACEHOLDER_COUNT 20             /* of the table of placeholders */
 
 enum key_type { KEY_WORDS, KEY_TEXT, KEY_NUMBER };
 

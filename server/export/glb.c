@@ -20,10 +20,10 @@
 #define MAGIC 0x46546c67 /* "glTF" */
 #define CHUNK_JSON 0x4e4f534a
 #define CHUNK_BIN 0x004e4942
-#define HEAD_BYTES 12
+#define HEAD_BYTES 12 /* of the file, and of each chunk */
 #define CHUNK_HEAD_BYTES 8
 
-#define TYPE_FLOAT 5126
+#define TYPE_FLOAT 5126 /* component types, buffer targets, filters and wraps as glTF 2.0 numbers them */
 #define TYPE_UINT 5125
 #define TARGET_VERTICES 34962
 #define TARGET_INDICES 34963

@@ -11,9 +11,9 @@
 #include "server/export/emission_texture.h"
 #include "server/export/sink.h"
 
-#define SENSORS_MAX 100
-#define SPP 64
-#define MAX_DEPTH 16
+#define SENSORS_MAX 100 /* held-out views in scene.xml */
+#define SPP 64          /* samples a pixel that scene.xml asks for */
+#define MAX_DEPTH 16    /* segments of a path, likewise */
 
 /* --- scene.xml ------------------------------------------------------------------------------ */
 
@@ -123,9 +123,9 @@ enum status mitsuba_xml_write(const char *path, const struct export_input *in, c
 
 /* --- scene.serialized ----------------------------------------------------------------------- */
 
-#define FORMAT 0x041c
+#define FORMAT 0x041c /* of the header, as the next */
 #define VERSION 4
-#define HAS_NORMALS 0x0001
+#define HAS_NORMALS 0x0001 /* flags of a mesh */
 #define HAS_TEXCOORDS 0x0002
 #define SINGLE_PRECISION 0x1000
 #define LEVEL 4 /* half the time of level 6 for a few percent more bytes */

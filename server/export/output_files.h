@@ -17,7 +17,7 @@
 typedef enum status export_announce(void *user, const char *type, const char *name, const char *content_type,
                                     struct error *err);
 
-#define OUTPUT_NOTES_MAX 3
+#define OUTPUT_NOTES_MAX 3 /* lines of text in the header of an EXR */
 struct output_files {
     const char *dir;       /* borrowed */
     struct parallel *pool; /* NULL: the caller's thread alone; borrowed */

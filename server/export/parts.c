@@ -9,7 +9,7 @@
 #include "common/rng.h"
 #include "common/utf8.h"
 
-#define NONE UINT32_MAX
+#define NONE UINT32_MAX /* no vertex */
 
 /* The bits of the input's texture coordinates at a corner; 0: none. */
 static uint64_t uv_key(const struct mesh *mesh, uint32_t corner) {

@@ -44,7 +44,7 @@ enum status parts_make(struct parts *parts, const struct mesh *mesh, const struc
                        const struct atlas *atlas, struct error *err);
 void parts_release(struct parts *parts);
 
-#define PARTS_LABEL_BYTES 96
+#define PARTS_LABEL_BYTES 96 /* of a label with its NUL */
 
 /* A name for files that take few characters: "segment_3", or "segment_3_wall_paint" where the input calls it
  * "wall/paint". Unique, of letters, digits, -, _ and visible characters beyond ASCII, in UTF-8. */

@@ -235,7 +235,7 @@ void picture_radiance(const struct export_input *input, struct image *image) {
     shrink(inverse, radiance_value, radiance_look, &radiance, image);
 }
 
-#define ENVIRONMENT_GRAY 0.2f
+#define ENVIRONMENT_GRAY 0.2f /* linear value of the typical luminance */
 
 void picture_environment(const struct export_input *input, struct image *image) {
     const struct image *map = input->environment, *known = input->environment_confidence;

@@ -7,7 +7,7 @@
 #include "server/export/output_files.h"
 #include "server/export/report_html.h"
 
-#define TEXTURE_FILES_MAX 5
+#define TEXTURE_FILES_MAX 5 /* one for each enum picture_kind */
 #define RADIANCE_UNIT "radiance of which a photograph of exposure 1 shows 1 as pixel value 1"
 
 /* Writes them at full size, in the layout of in->atlas; `prefix` begins their names. */

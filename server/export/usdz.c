@@ -12,11 +12,11 @@
 #include "common/mem.h"
 #include "server/export/sink.h"
 
-#define LOCAL_MAGIC 0x04034b50
+#define LOCAL_MAGIC 0x04034b50 /* of a file's header, of its entry in the directory, of the end (APPNOTE.TXT, 4.3) */
 #define CENTRAL_MAGIC 0x02014b50
 #define END_MAGIC 0x06054b50
-#define LOCAL_BYTES 30
-#define ALIGNMENT 64
+#define LOCAL_BYTES 30  /* of a file's header without name and extra field */
+#define ALIGNMENT 64    /* bytes, of each file's contents, as the specification of usdz asks for */
 #define EXTRA_ID 0x1986 /* of padding, as Pixar's writer has it */
 #define EXTRA_HEAD 4    /* bytes: its id and length */
 #define VERSION 10      /* 1.0: stored files */

@@ -12,7 +12,7 @@
 
 #include "server/transport/message.h"
 
-#define AUTH_THROTTLE_BURST 20.0
+#define AUTH_THROTTLE_BURST 20.0  /* failures */
 #define AUTH_THROTTLE_PER_SEC 0.5 /* a page left open with an old token retries every 3 s */
 
 struct auth_throttle; /* opaque */

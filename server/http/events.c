@@ -10,7 +10,7 @@
 #include "server/net/field.h"
 #include "server/transport/problem.h"
 
-#define WAIT_MAX_SEC 300
+#define WAIT_MAX_SEC 300 /* of ?wait= */
 
 /* Fills *what from the query and the header fields. The stream starts after Last-Event-ID, else ?after=, else the
  * newest event; *is_resumed when the client named a start. An EventSource reconnects with its original URL and adds

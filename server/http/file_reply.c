@@ -8,7 +8,7 @@
 #include "server/net/field.h"
 #include "server/transport/problem.h"
 
-#define ETAG_SIZE 80
+#define ETAG_SIZE 80 /* "sha256-..." and the NUL, rounded up */
 
 /* A strong ETag for the file: from its content where the digest is known, else from its version. */
 static void make_etag(const struct digests_file *file, bool by_content, char etag[ETAG_SIZE]) {

@@ -7,7 +7,7 @@
 #include "server/http/views.h"
 #include "server/transport/problem.h"
 
-#define COOKIE_AGE_SEC (30 * 24 * 3600)
+#define COOKIE_AGE_SEC (30 * 24 * 3600) /* 30 days */
 
 static struct response *describe(const struct api *api, const struct request *r, const struct caller *caller) {
     uint64_t kept, limit = api->config.user_max_bytes;

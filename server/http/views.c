@@ -9,8 +9,8 @@
 #include "server/net/field.h"
 #include "server/transport/problem.h"
 
-#define LIMIT_DEFAULT 50
-#define LIMIT_MAX 200
+#define LIMIT_DEFAULT 50 /* items of a page, without ?limit= */
+#define LIMIT_MAX 200    /* with it */
 
 void view_add_time(cJSON *object, const char *key, int64_t unix_ms) {
     char text[CLOCK_TEXT_SIZE];

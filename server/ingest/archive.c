@@ -25,7 +25,7 @@
 #include "common/mem.h"
 #include "server/ingest/path.h"
 
-#define BLOCK_BYTES ((size_t)256 << 10)
+#define BLOCK_BYTES ((size_t)256 << 10) /* read at once */
 /* What may follow the end of a tar in the gzip stream: padding, at most one large record. */
 #define COUNT_BYTES ((uint64_t)64 << 20) /* of content; larger archives are not counted beforehand */
 #define GZIP_TAIL_BYTES ((size_t)16 << 20)

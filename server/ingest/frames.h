@@ -14,7 +14,7 @@
 #include "server/scene/coordinates.h"
 #include "server/scene/mesh.h"
 
-#define FRAMES_MAX 20000
+#define FRAMES_MAX 20000 /* of a bundle */
 
 struct lens {
     enum camera_model model;

@@ -9,7 +9,7 @@
 #include "common/mem.h"
 #include "common/utf8.h"
 
-#define SHOWN_MAX 150
+#define SHOWN_MAX 150 /* bytes of a name that messages show */
 
 /* The name as utf8_show has it, cut. */
 static void printable(const char *name, char out[SHOWN_MAX + UTF8_SHOWN_SIZE + 3]) {

@@ -6,8 +6,8 @@
 
 #include "common/error.h"
 
-#define PATH_MAX_BYTES 1024
-#define PATH_FOLDERS_MAX 32
+#define PATH_MAX_BYTES 1024 /* of a whole name */
+#define PATH_FOLDERS_MAX 32 /* folders in each other */
 
 /* Normalises a name to "a/b/c" without "." or empty components; the caller's (mem_free), NULL on error. It may be ""
  * (the bundle's root). STATUS_INPUT for absolute names ("C:/x" too, but not "a:b"), "..", backslashes, names that

@@ -9,7 +9,7 @@
 /* Share of pixels outside of Rec. 709 above which there is a warning. */
 #define OUTSIDE_SHARE 1e-3
 
-#define FACT_MAX ((size_t)1000)
+#define FACT_MAX ((size_t)1000) /* bytes */
 
 void photo_color_note(struct photo_color *color, const char *file, const struct image *image,
                       const struct image_info *info) {

@@ -8,7 +8,7 @@
 #include "common/file.h"
 #include "common/mem.h"
 
-#define HALF_LARGEST 65504.0f
+#define HALF_LARGEST 65504.0f /* finite number in half precision */
 
 /* --- pixels ------------------------------------------------------------------------------ */
 

@@ -18,7 +18,7 @@
 #include "server/ingest/findings.h"
 #include "server/ingest/frames.h"
 
-#define TRANSFORMS_MAX_BYTES (256 << 20)
+#define TRANSFORMS_MAX_BYTES (256 << 20) /* of the file */
 
 /* Reads the parsed file; `name` is for messages. Problems and warnings go to *f. The result is the caller's
  * (frames_release) in any case. */

@@ -9,7 +9,7 @@
 
 #include "server/job/attempt.h"
 
-#define CHECKS_AT_ONCE 2
+#define CHECKS_AT_ONCE 2 /* unless the configuration says otherwise */
 #define CHECKS_USERS 256 /* users whose last turn is remembered, and who are considered */
 
 struct checks {

@@ -7,7 +7,7 @@
 
 #include "server/job/delivery.h"
 
-#define DELIVERIES_AT_ONCE 8
+#define DELIVERIES_AT_ONCE 8 /* messages on their way */
 
 struct deliveries {
     struct delivery slot[DELIVERIES_AT_ONCE];

@@ -8,7 +8,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define DISK_LOOK_SEC 2.0
+#define DISK_LOOK_SEC 2.0 /* between two measurements */
 
 struct disk_watch {
     uint64_t low_bytes; /* 0: never low */

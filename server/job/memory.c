@@ -5,8 +5,8 @@
 
 #include "common/settings.h"
 
-#define TEXELS_LEAST 64
-#define SIDE_LEAST 64
+#define TEXELS_LEAST 64 /* texels_per_iteration is not reduced below this */
+#define SIDE_LEAST 64   /* nor texture_size below this */
 
 static double halved(double value, int times, double least) {
     for (; times > 0 && value / 2.0 >= least; times--)

@@ -56,7 +56,7 @@ struct run_work {
 
 typedef void run_line_fn(void *user, const char *line, size_t length); /* without the newline */
 
-#define RUN_FDS 2
+#define RUN_FDS 2 /* descriptors of a run, at most */
 
 struct run; /* the executor's */
 

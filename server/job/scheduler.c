@@ -31,8 +31,8 @@
 #include "server/job/resume.h"
 #include "server/job/worker_messages.h"
 
-#define HOUSEKEEPING_SEC 600.0
-#define RETRY_SEC 5.0 /* after a failure of the store or of a start */
+#define HOUSEKEEPING_SEC 600.0 /* between two calls of housekeeping_run */
+#define RETRY_SEC 5.0          /* after a failure of the store or of a start */
 
 struct scheduler {
     struct scheduler_config config;

@@ -20,7 +20,7 @@
 #include "server/data/layout.h"
 #include "server/job/measure.h"
 
-#define THINNED_SEC 1.0
+#define THINNED_SEC 1.0   /* between two reports that are entered, once they are thinned */
 #define UNTAKEN_MAX 2000  /* files; a normal job has a few hundred */
 #define PROBLEMS_MAX 1000 /* of one scene */
 

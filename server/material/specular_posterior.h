@@ -17,7 +17,7 @@
 
 /* Candidate 0 is diffuse; the others are all pairs of specular_levels. */
 #define SPECULAR_CANDIDATES (1 + HIGHLIGHT_ROUGHNESSES * HIGHLIGHT_SPECULARS)
-#define SPECULAR_DIFFUSE 0
+#define SPECULAR_DIFFUSE 0 /* its index */
 
 /* Index of the candidate with levels k of roughness and m of specular. */
 static inline size_t specular_candidate(size_t k, size_t m) { return 1 + k * HIGHLIGHT_SPECULARS + m; }

@@ -14,8 +14,8 @@
 #include "common/error.h"
 #include "server/net/field.h"
 
-#define ADDRESS_PROXIES_MAX 64
-#define ADDRESS_TEXT_SIZE 46 /* INET6_ADDRSTRLEN */
+#define ADDRESS_PROXIES_MAX 64 /* entries of trusted_proxies */
+#define ADDRESS_TEXT_SIZE 46   /* INET6_ADDRSTRLEN */
 
 /* In IPv6 form (IPv4 as ::ffff:a.b.c.d), network byte order; all 0 if unknown. */
 struct address {

@@ -8,7 +8,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#define BACKLOG 512
+#define BACKLOG 512 /* connections that wait in the kernel to be accepted */
 
 enum status bind_listen(int *fd, const char *address, uint16_t *port, struct error *err) {
     struct addrinfo hints = {

@@ -12,8 +12,8 @@
 
 #include "common/error.h"
 
-#define TARGET_SEGMENTS_MAX 16
-#define TARGET_QUERY_MAX 16
+#define TARGET_SEGMENTS_MAX 16 /* of a path */
+#define TARGET_QUERY_MAX 16    /* parameters of a query */
 
 struct target {
     char *authority; /* of an absolute form, "host:port", unchecked; overrides Host; owned; or NULL */

@@ -10,8 +10,8 @@
 #include "common/file.h"
 #include "common/mem.h"
 
-#define CHAIN_MAX 16
-#define FILE_MAX_BYTES ((size_t)1 << 20)
+#define CHAIN_MAX 16                     /* certificates */
+#define FILE_MAX_BYTES ((size_t)1 << 20) /* of a PEM file */
 
 /* A certificate and key as read once. Handshakes may still use an older pair, so all are kept until the end; each
  * SIGHUP adds one. */

@@ -6,8 +6,8 @@
 
 #include "common/mem.h"
 
-#define READ_BYTES ((size_t)1 << 20)
-#define HASH_STEP ((off_t)64 << 20) /* a second, from a slow network's file system */
+#define READ_BYTES ((size_t)1 << 20) /* read at once */
+#define HASH_STEP ((off_t)64 << 20)  /* a second, from a slow network's file system */
 
 enum status hash_file(int fd, bool (*go_on)(void *user, struct error *err), void *user, char hex[SHA256_HEX_SIZE],
                       struct error *err) {

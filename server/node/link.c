@@ -24,9 +24,9 @@
 #define REPORTS_A_LEASE 10.0
 #define REPORT_BYTES ((size_t)256 << 10) /* of lines; JSON may double them, and a body has at most 1 MiB */
 #define SILENCE_SEC 10.0                 /* a report without an answer for so long, or half a lease, is sent again */
-#define PAUSE_FIRST_SEC 0.5
-#define PAUSE_MAX_SEC 5.0
-#define BEAT_SEC 0.2
+#define PAUSE_FIRST_SEC 0.5              /* before a request is repeated; doubled each time */
+#define PAUSE_MAX_SEC 5.0                /* up to this */
+#define BEAT_SEC 0.2                     /* between two beats during a pause */
 
 static void draw_claimant(char field[128]) {
     unsigned char random[32];

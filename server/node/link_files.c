@@ -19,7 +19,7 @@
 /* A daemon looks at its disk every 2 s and then asks attempts to stop; a node hears of it with its next report. */
 #define FULL_SEC 15.0
 
-#define HTTP_NO_SPACE 507
+#define HTTP_NO_SPACE 507 /* Insufficient Storage (RFC 4918) */
 
 struct transfer {
     struct attempt_link *link;

@@ -20,7 +20,7 @@
 #include "server/worker/progress.h"
 
 #define TOKEN_VARIABLE "UNBAKE_NODE_TOKEN"
-#define TOKEN_MAX 4096
+#define TOKEN_MAX 4096      /* bytes of the file */
 #define CACHE_GB_DEFAULT 50 /* some hundred rooms */
 #define WORDS_MAX_BYTES 400 /* of the last that the worker printed, as at home */
 

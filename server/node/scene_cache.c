@@ -15,7 +15,7 @@
 #include "server/node/cache_room.h"
 #include "server/node/hash.h"
 
-#define WAIT_MS 200
+#define WAIT_MS 200  /* between two tries to take a lock */
 #define TRIES_MAX 20 /* of a file whose transfers are cut off without an error */
 
 /* --- one file --------------------------------------------------------------------------------- */

@@ -10,7 +10,7 @@
 #include "common/vec.h"
 #include "server/scene/mesh.h"
 
-#define ACCEL_NONE UINT32_MAX
+#define ACCEL_NONE UINT32_MAX /* no triangle */
 
 struct accel; /* opaque */
 

@@ -20,7 +20,7 @@
 #include "common/vec.h"
 
 #define BSDF_PI 3.14159265358979f
-#define BSDF_MIN_ALPHA 1e-3f
+#define BSDF_MIN_ALPHA 1e-3f /* GGX width of the smoothest lobe, as Mitsuba 3 has it */
 
 struct bsdf {
     rgb base_color;

@@ -9,7 +9,7 @@
 #include "server/render/sampler.h"
 #include "server/scene/surface.h"
 
-#define BATCH 1024
+#define BATCH 1024            /* paths that a thread traces at once */
 #define PASSED_SHARE 0x1p-16f /* of a distance: more than its rounding, as in accel_offset */
 
 /* Channels of the picture. */

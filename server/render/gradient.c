@@ -15,9 +15,9 @@
 
 #include "common/mem.h"
 
-#define MIN_TILE_SHIFT 6
-#define MAX_TILES_ACROSS 32
-#define AHEAD 3 /* logs that are prefetched ahead */
+#define MIN_TILE_SHIFT 6    /* tiles of 64 texels a side at least */
+#define MAX_TILES_ACROSS 32 /* larger textures have larger tiles */
+#define AHEAD 3             /* logs that are prefetched ahead */
 
 typedef float float4 __attribute__((vector_size(16)));
 

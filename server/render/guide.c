@@ -8,13 +8,13 @@
 #include "common/mem.h"
 #include "common/rng.h"
 
-#define CELLS_ACROSS 16 /* along the longest side */
-#define SURFACE_POINTS 32768
-#define POINTS_A_ROW 8
-#define PATCHES_MAX 256
-#define ROWS_MAX UINT16_MAX
-#define POWER_SHARE 0.1f   /* of the samples */
-#define HIDDEN_SHARE 0.01f /* of the squared unoccluded light is assumed to arrive, since a few rays miss gaps */
+#define CELLS_ACROSS 16      /* along the longest side */
+#define SURFACE_POINTS 32768 /* by which cells that contain surface are found */
+#define POINTS_A_ROW 8       /* from which a row's light is estimated */
+#define PATCHES_MAX 256      /* of the emitters; with more there is no guide */
+#define ROWS_MAX UINT16_MAX  /* row numbers have 16 bits */
+#define POWER_SHARE 0.1f     /* of the samples */
+#define HIDDEN_SHARE 0.01f   /* of the squared unoccluded light is assumed to arrive, since a few rays miss gaps */
 #define SEED UINT64_C(0x6775696465)
 
 struct guide_point {

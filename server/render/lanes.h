@@ -10,7 +10,7 @@
 
 #include "common/vec.h"
 
-#define LANES 64
+#define LANES 64 /* vertices of a block: a few vectors of any instruction set */
 
 struct lanes3 {
     float x[LANES], y[LANES], z[LANES];

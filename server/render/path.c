@@ -29,10 +29,10 @@
 #include "server/render/sampler.h"
 #include "server/render/shade.h"
 
-#define MIN_CHANCE 0.05f
+#define MIN_CHANCE 0.05f /* bounds of the probability with which roulette lets a path go on */
 #define MAX_CHANCE 0.95f
-#define MIN_LIGHT_CHANCE 0.1f
-#define EARLY_RR_SCALE 4.0f /* before roulette_depth, paths of throughput below 1 / this may end */
+#define MIN_LIGHT_CHANCE 0.1f /* least probability of tracing a shadow ray */
+#define EARLY_RR_SCALE 4.0f   /* before roulette_depth, paths of throughput below 1 / this may end */
 /* The same from roulette_depth on, when derivatives are wanted. A value of 2 reduces the variance of the gradient at
  * equal time by 8 %, and the paths per second by a sixth. */
 #define DERIVATIVE_RR_SCALE 1.25f

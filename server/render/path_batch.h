@@ -10,7 +10,7 @@
 #include "server/render/accel.h"
 #include "server/render/lanes.h"
 
-#define PATH_MAX_DEPTH 32
+#define PATH_MAX_DEPTH 32 /* segments of a path whose vertices are kept */
 
 /* A path under way to its next surface. */
 struct path_state {

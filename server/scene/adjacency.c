@@ -6,8 +6,8 @@
 
 #include "common/mem.h"
 
-#define SMOOTH_ROUNDS 8
-#define CREASE 0.7f /* 1 - cosine of the angle from which on smoothing stops: 73 degrees */
+#define SMOOTH_ROUNDS 8 /* rings of neighbours that are averaged */
+#define CREASE 0.7f     /* 1 - cosine of the angle from which on smoothing stops: 73 degrees */
 
 struct half_edge {
     uint32_t upper;  /* the end with the greater welded number */

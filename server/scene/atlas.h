@@ -17,8 +17,8 @@
 #include "server/scene/mesh.h"
 #include "server/scene/segment.h"
 
-#define ATLAS_MAX_SIZE 16384
-#define ATLAS_PADDING 2 /* minimum number of free texels between the covered texels of two charts */
+#define ATLAS_MAX_SIZE 16384 /* texels a side: coverage.h is exact up to it */
+#define ATLAS_PADDING 2      /* minimum number of free texels between the covered texels of two charts */
 /* ATLAS_WIDE_PADDING, which keeps mip level 2 clean, or ATLAS_PADDING where the former would cost more than a tenth of
  * the density: of rooms of objects it costs 5 to 8 %, of a scan in 13,000 charts (redkitchen) 28 %. */
 #define ATLAS_AUTOMATIC_PADDING 0

@@ -20,13 +20,13 @@
 #include "server/scene/atlas_overlap.h"
 #include "server/scene/atlas_rectangle.h"
 
-#define NONE UINT32_MAX
-#define LITTLE_LEAN_DEG 45.0
-#define SMALL_TEXELS 100.0  /* area in texels below which a region is dissolved */
-#define REFINE_ROUNDS 2     /* growths, each with the mean normal of the one before */
-#define SAME_COSINE 0.9999f /* between mean normals of two growths that would give the same region: 0.8 degrees */
-#define LEAN_STEPS 16       /* quantisation of lean in the priority queue */
-#define OVERLAP_TEXELS 0.01 /* depth of overlap that rounding produces between touching triangles */
+#define NONE UINT32_MAX      /* no chart */
+#define LITTLE_LEAN_DEG 45.0 /* that a triangle may lean away while charts grow first */
+#define SMALL_TEXELS 100.0   /* area in texels below which a region is dissolved */
+#define REFINE_ROUNDS 2      /* growths, each with the mean normal of the one before */
+#define SAME_COSINE 0.9999f  /* between mean normals of two growths that would give the same region: 0.8 degrees */
+#define LEAN_STEPS 16        /* quantisation of lean in the priority queue */
+#define OVERLAP_TEXELS 0.01  /* depth of overlap that rounding produces between touching triangles */
 
 struct builder {
     const struct mesh *mesh;

@@ -8,7 +8,7 @@
 
 #include "common/mem.h"
 
-#define NONE UINT32_MAX
+#define NONE UINT32_MAX /* the end of a list */
 
 struct overlap_entry {
     uint32_t triangle, next;

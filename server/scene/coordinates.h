@@ -5,7 +5,7 @@
 
 #include <stdbool.h>
 
-#define COORDINATES_MAX 4
+#define COORDINATES_MAX 4 /* that a capture's files know, besides those of its poses */
 
 struct coordinates {
     const char *name;        /* as a reading says it: "capture"; static */

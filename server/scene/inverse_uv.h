@@ -14,7 +14,7 @@
 #include "common/parallel.h"
 #include "server/scene/atlas.h"
 
-#define INVERSE_UV_NONE UINT32_MAX
+#define INVERSE_UV_NONE UINT32_MAX /* in place of a triangle */
 
 struct inverse_uv {
     uint32_t width, height;

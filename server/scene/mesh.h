@@ -10,8 +10,8 @@
 #include "common/error.h"
 #include "common/vec.h"
 
-#define MESH_MAX_TRIANGLES ((size_t)1 << 28)
-#define MESH_MAX_COORDINATE_M 1e6f /* beyond it single precision resolves no room */
+#define MESH_MAX_TRIANGLES ((size_t)1 << 28) /* that indices of corners, 3 t + c, have room for */
+#define MESH_MAX_COORDINATE_M 1e6f           /* beyond it single precision resolves no room */
 
 #define MESH_NO_FACE UINT32_MAX /* -1 in scene.ply */
 

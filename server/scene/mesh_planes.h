@@ -11,7 +11,7 @@
 #include "server/scene/height_fit.h"
 #include "server/scene/mesh.h"
 
-#define MESH_PLANES_NONE UINT32_MAX
+#define MESH_PLANES_NONE UINT32_MAX /* in place of a plane */
 
 struct mesh_plane {
     struct height_frame frame; /* the plane is height 0 over this frame */

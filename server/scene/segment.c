@@ -32,7 +32,7 @@
     16.0 /* mean square of triangle areas over their squared mean: 1 to 3 for fused depth maps,
                                * hundreds for modelled rooms */
 
-#define NONE UINT32_MAX
+#define NONE UINT32_MAX /* no triangle, no number */
 
 static int ascending(const void *left, const void *right) {
     int64_t a = *(const int64_t *)left, b = *(const int64_t *)right;

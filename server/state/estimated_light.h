@@ -11,7 +11,7 @@
 
 /* Sources, at most. */
 #define ESTIMATED_MOST 288
-#define ESTIMATED_FACTORS 4
+#define ESTIMATED_FACTORS 4 /* times that saturated sky may be brightened */
 
 enum estimated_kind {
     ESTIMATED_HIDDEN,          /* a segment that no photograph shows */

@@ -8,7 +8,7 @@
 #include "server/store/internal.h"
 #include "server/store/store.h"
 
-#define PAGES_AT_ONCE 1024
+#define PAGES_AT_ONCE 1024 /* that are copied without letting other threads in */
 
 /* `number` is the errno of the failed call. */
 static enum status failed(sqlite3 *to, int code, int number, const char *path, struct error *err) {

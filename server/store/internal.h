@@ -54,7 +54,7 @@ struct store {
     } remote;
 };
 
-#define STORE_NOTHING_CHANGED (-1)
+#define STORE_NOTHING_CHANGED (-1) /* in place of a job's id */
 
 /* Schema migrations: step i takes a database from version i to version i + 1. A released step is never edited; every
  * change is a new step. */

@@ -30,7 +30,7 @@
 
 struct store; /* store.h */
 
-#define REMOTE_NAME_SIZE 64
+#define REMOTE_NAME_SIZE 64        /* bytes with the NUL */
 #define REMOTE_CLAIMANT_SIZE 65    /* hex digits that a node draws at random when it starts, and the NUL */
 #define REMOTE_LINES_MAX (1 << 20) /* bytes of one report */
 #define REMOTE_REPORTS_MAX 256     /* of an attempt that are not read yet */

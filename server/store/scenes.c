@@ -35,7 +35,7 @@
 #define IS_READABLE                                                                                                    \
     "(?1 OR EXISTS (SELECT 1 FROM scene_owners WHERE scene_id = scenes.id AND user_id = ?2)"                           \
     " OR EXISTS (SELECT 1 FROM jobs WHERE scene_id = scenes.id AND shared = 1 AND kind = 0))"
-#define NOT_A_USER ((int64_t)-1)
+#define NOT_A_USER ((int64_t)-1) /* no row has this owner */
 
 static void fill(struct scene_row *row, sqlite3_stmt *stmt) {
     *row = (struct scene_row){

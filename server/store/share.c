@@ -6,7 +6,7 @@
 #include "server/store/internal.h"
 #include "server/store/store.h"
 
-#define MIB 1048576.0
+#define MIB 1048576.0 /* bytes */
 
 /* The sum of what a user keeps (an SQL expression of his id), without scene ?1 and job ?2. State 1: running. */
 #define KEPT_BY(user)                                                                                                  \

@@ -17,7 +17,7 @@
 
 #include "common/error.h"
 
-#define SQL_STATEMENT_MAX 192
+#define SQL_STATEMENT_MAX 192 /* prepared statements that are kept */
 
 struct sql {
     sqlite3 *db;

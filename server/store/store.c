@@ -8,8 +8,8 @@
 #include "server/data/layout.h"
 #include "server/store/internal.h"
 
-#define EVENTS_PER_JOB 20000
-#define TABLES_MAX 32 /* more than there are */
+#define EVENTS_PER_JOB 20000 /* that are kept, unless the configuration says otherwise */
+#define TABLES_MAX 32        /* more than there are */
 
 /* Each step and its version number are one transaction: a crash leaves a complete version. */
 static enum status migrate(struct store *store, struct error *err) {

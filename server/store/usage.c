@@ -15,7 +15,7 @@
 #include "common/mem.h"
 #include "server/store/internal.h"
 
-#define HALF_LIFE_SEC 86400.0
+#define HALF_LIFE_SEC 86400.0 /* a day: what was used yesterday counts half */
 
 _Static_assert(sizeof((struct unpaid *)0)->month == USAGE_MONTH_SIZE, "a month");
 

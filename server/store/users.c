@@ -14,7 +14,7 @@
 #include "server/store/internal.h"
 
 #define TOKEN_PREFIX "unbake_"
-#define SECRET_BYTES 24
+#define SECRET_BYTES 24 /* random ones of a token: 192 bits */
 #define SECRET_DIGITS (2 * SECRET_BYTES)
 
 static const char *const role_names[] = {"viewer", "user", "admin"};

@@ -28,8 +28,8 @@ enum role { ROLE_VIEWER, ROLE_USER, ROLE_ADMIN }; /* stored as numbers, each may
 const char *role_name(enum role role);
 bool role_parse(const char *name, enum role *role);
 
-#define USER_NAME_SIZE 65
-#define TOKEN_SIZE 80
+#define USER_NAME_SIZE 65 /* 64 characters and the NUL */
+#define TOKEN_SIZE 80     /* "unbake_ID_" with 48 hex digits and the NUL, rounded up */
 
 /* The caller of a request. */
 struct caller {

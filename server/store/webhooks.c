@@ -10,9 +10,9 @@
 #include "server/store/internal.h"
 #include "server/store/store.h"
 
-#define RETRY_FIRST_MS 2000.0
-#define RETRY_MOST_MS 600000.0
-#define TRIES 30 /* spread over four hours */
+#define RETRY_FIRST_MS 2000.0  /* before a message is sent again; doubled each time */
+#define RETRY_MOST_MS 600000.0 /* up to this */
+#define TRIES 30               /* spread over four hours */
 
 enum status store_webhook_set(struct store *store, int64_t job_id, const char *url, const char *secret,
                               struct error *err) {

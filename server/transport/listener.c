@@ -19,9 +19,9 @@
 #include "server/transport/callbacks.h"
 #include "server/transport/reply.h"
 
-#define LIBRARY_THREADS 4
-#define QUICK_THREADS 4
-#define SLOW_THREADS 8 /* they spend more time waiting for the disk than computing */
+#define LIBRARY_THREADS 4 /* of libmicrohttpd */
+#define QUICK_THREADS 4   /* for handlers that are PACE_QUICK */
+#define SLOW_THREADS 8    /* they spend more time waiting for the disk than computing */
 /* The acceptor enforces the limit. The library divides its own among its threads; it is set so high that it is never
  * reached. */
 #define LIBRARY_LIMIT_FACTOR (2 * LIBRARY_THREADS)

@@ -28,8 +28,8 @@ enum request_pace {
     PACE_SLOW     /* syncs, hashes, or reads files whose size users choose */
 };
 
-#define REQUEST_ID_SIZE 65
-#define RESPONSE_FIELDS_MAX 12
+#define REQUEST_ID_SIZE 65     /* 64 characters and the NUL */
+#define RESPONSE_FIELDS_MAX 12 /* header fields that a handler may add */
 
 struct route;
 struct upload;

@@ -14,8 +14,8 @@
 #include "common/mem.h"
 #include "server/data/work_file.h"
 
-#define CHUNK_BYTES ((size_t)256 << 10)
-#define RETRY_SEC 10 /* after the store could not be read or written */
+#define CHUNK_BYTES ((size_t)256 << 10) /* read at once */
+#define RETRY_SEC 10                    /* after the store could not be read or written */
 
 struct digests {
     struct store *store;

@@ -14,7 +14,7 @@
 #include "common/mem.h"
 #include "server/data/layout.h"
 
-#define CHUNK_BYTES ((size_t)256 << 10)
+#define CHUNK_BYTES ((size_t)256 << 10) /* read at once */
 
 char *upload_session_path(const struct resumables *r, const char *id) {
     return layout_upload(r->config.folder->dir, id);

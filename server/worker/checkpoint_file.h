@@ -17,7 +17,7 @@
 #include "common/error.h"
 #include "server/store/sql.h"
 
-#define CHECKPOINT_TILE_BYTES ((size_t)1 << 20)
+#define CHECKPOINT_TILE_BYTES ((size_t)1 << 20) /* of an array; what changed is written tile by tile */
 
 struct checkpoint_tile {
     int64_t row; /* 0: none */

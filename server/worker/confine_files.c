@@ -24,7 +24,7 @@
 #define BIND_TCP (1ULL << 0)
 #define SCOPE_ABSTRACT_SOCKET (1ULL << 0)
 #define SCOPE_SIGNAL (1ULL << 1)
-#define RULE_NET_PORT 2
+#define RULE_NET_PORT 2 /* LANDLOCK_RULE_NET_PORT */
 
 #define READ_ACCESS (LANDLOCK_ACCESS_FS_READ_FILE | LANDLOCK_ACCESS_FS_READ_DIR)
 #define WRITE_ACCESS                                                                                                   \

@@ -8,7 +8,7 @@
 #define LEAST_BYTES ((uint64_t)64 << 20)
 /* Where the system does not tell what it has. */
 #define UNKNOWN_BYTES ((uint64_t)2 << 30)
-#define STEPS_MAX 16
+#define STEPS_MAX 16 /* halvings of the share */
 
 uint64_t pixel_memory_bytes(const struct order *order) {
     uint64_t bytes = order->photograph_memory_bytes;

@@ -25,8 +25,8 @@
 #include "common/error.h"
 #include "common/json.h"
 
-#define PROGRESS_LINE_MAX 65536
-#define PROGRESS_FD 3 /* the worker's end of the pipe */
+#define PROGRESS_LINE_MAX 65536 /* bytes of a line */
+#define PROGRESS_FD 3           /* the worker's end of the pipe */
 
 /* Exit statuses of a worker. */
 enum progress_exit {

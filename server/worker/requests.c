@@ -7,7 +7,7 @@
 
 #include "common/clock.h"
 
-#define HANG_UP_INTERVAL_SEC 1.0
+#define HANG_UP_INTERVAL_SEC 1.0 /* between two looks at whether the daemon is still there */
 
 static void signals_of_ours(sigset_t *set) {
     sigemptyset(set);

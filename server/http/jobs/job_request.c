@@ -16,9 +16,9 @@
 #include "server/transport/body.h"
 #include "server/transport/problem.h"
 
-#define PRIORITY_MAX 100
-#define LABELS_MAX 32
-#define WEBHOOK_SECRET_LEAST 16
+#define PRIORITY_MAX 100        /* either way */
+#define LABELS_MAX 32           /* of a job */
+#define WEBHOOK_SECRET_LEAST 16 /* bytes, both */
 #define WEBHOOK_SECRET_MOST 200
 
 void job_request_release(struct job_request *w) {

@@ -21,8 +21,8 @@
 #include "server/transport/problem.h"
 #include "server/uploads/digests.h"
 
-#define LOG_BYTES_DEFAULT 65536
-#define LOG_BYTES_MAX (1 << 20)
+#define LOG_BYTES_DEFAULT 65536 /* of the end of a log, without ?bytes= */
+#define LOG_BYTES_MAX (1 << 20) /* with it */
 
 struct response *outputs_list(struct api *api, struct request *r) {
     struct response *refusal = NULL;

@@ -10,8 +10,8 @@
 #include "server/ingest/mesh/polygon.h"
 #include "server/scene/mesh.h"
 
-#define FACES_MAX_NOTES 6
-#define FACES_NOTE_BYTES 200
+#define FACES_MAX_NOTES 6    /* of a mesh; more are dropped */
+#define FACES_NOTE_BYTES 200 /* with the NUL */
 
 struct faces_report {
     size_t polygon_count; /* faces with more than four corners, cut into triangles */

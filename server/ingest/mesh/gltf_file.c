@@ -12,8 +12,8 @@
 
 #define MAX_JSON_BYTES ((size_t)64 << 20) /* the parsed tree takes about ten times as much */
 #define MAGIC 0x46546c67
-#define CHUNK_JSON 0x4e4f534a
-#define CHUNK_BIN 0x004e4942
+#define CHUNK_JSON 0x4e4f534a /* "JSON" */
+#define CHUNK_BIN 0x004e4942  /* "BIN" */
 
 static uint32_t word_at(const uint8_t *at) {
     return (uint32_t)at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16 | (uint32_t)at[3] << 24;

@@ -9,7 +9,7 @@
 
 #include "common/mem.h"
 
-#define MAX_STRIDE 256
+#define MAX_STRIDE 256 /* bytes, of the extension */
 /* Unpacked bytes per compressed one, at most: a group of 16 equal bytes takes 2 bits, a triangle of 12 bytes one. */
 #define MAX_RATIO 64
 #define SLACK_BYTES 65536 /* of unpacked bytes, for files with few */

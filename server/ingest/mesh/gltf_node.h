@@ -18,7 +18,7 @@ void affine_cofactors(const struct affine *a, double c[3][3]);
 /* From the node's frame to its parent's, by its matrix or its translation, rotation and scale. */
 enum status gltf_node_transform(const struct gltf_file *g, size_t node, struct affine *t, struct error *err);
 
-#define GLTF_MAX_INSTANCES ((size_t)1 << 20)
+#define GLTF_MAX_INSTANCES ((size_t)1 << 20) /* of one node */
 
 /* From each instance's frame to the node's: instance[count], the caller's (mem_free). `extension` is the node's
  * member. */

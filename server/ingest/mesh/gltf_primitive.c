@@ -9,7 +9,7 @@
 #include "server/ingest/mesh/gltf_accessor.h"
 #include "server/ingest/mesh/gltf_uv.h"
 
-#define NONE UINT32_MAX
+#define NONE UINT32_MAX /* no vertex */
 
 static enum status open_attribute(struct gltf_surface *r, const cJSON *primitive, const char *key, const char *where,
                                   bool *found, struct gltf_span *span) {

@@ -6,7 +6,7 @@
 #include "common/mem.h"
 #include "common/rng.h"
 
-#define NONE UINT32_MAX
+#define NONE UINT32_MAX /* an empty place of the table */
 
 struct intern_entry {
     uint64_t hash;

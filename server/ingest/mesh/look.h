@@ -43,7 +43,7 @@ struct look_unread {
     size_t count; /* materials */
 };
 
-#define LOOK_UNREAD_MAX 32
+#define LOOK_UNREAD_MAX 32 /* kinds of things */
 
 struct mesh_look {
     size_t material_count;

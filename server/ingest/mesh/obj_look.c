@@ -9,7 +9,7 @@
 #include "server/ingest/mesh/mtl.h"
 #include "server/ingest/path.h"
 
-#define MAX_LIBRARY_BYTES ((size_t)16 << 20)
+#define MAX_LIBRARY_BYTES ((size_t)16 << 20) /* of an MTL file */
 
 /* Gives each name of a material that a face has a material of the look. */
 static void number_materials(const struct obj_objects *o, struct mesh *mesh, struct mesh_look *look) {

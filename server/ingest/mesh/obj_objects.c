@@ -9,7 +9,7 @@
 #include "server/ingest/path.h"
 #include "server/ingest/mesh/texture_pages.h"
 
-#define MAX_LIBRARY_BYTES ((size_t)16 << 20)
+#define MAX_LIBRARY_BYTES ((size_t)16 << 20) /* of an MTL file */
 
 void obj_objects_init(struct obj_objects *o) {
     *o = (struct obj_objects){0};

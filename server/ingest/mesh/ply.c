@@ -17,7 +17,7 @@
 #include "server/ingest/mesh/ply_values.h"
 #include "server/ingest/mesh/ply_vertices.h"
 
-#define PLY_TEXCOORD_MAX (2 * POLYGON_MAX_CORNERS)
+#define PLY_TEXCOORD_MAX (2 * POLYGON_MAX_CORNERS) /* numbers of a face's list */
 
 struct ply_reader {
     struct ply_values in;

@@ -9,7 +9,7 @@
 
 #include "server/ingest/mesh/positions.h"
 
-#define MAX_HEADER ((size_t)1 << 20)
+#define MAX_HEADER ((size_t)1 << 20) /* bytes */
 
 static const struct {
     const char *name, *alias;

@@ -8,9 +8,9 @@
 
 #include "common/error.h"
 
-#define PLY_MAX_ELEMENTS 32
+#define PLY_MAX_ELEMENTS 32    /* that a header may have */
 #define PLY_MAX_PROPERTIES 256 /* of all elements together */
-#define PLY_MAX_NAME 64
+#define PLY_MAX_NAME 64        /* bytes with the NUL */
 
 /* Integer types first, so that `type >= PLY_FLOAT32` means floating point. */
 enum ply_type { PLY_INT8, PLY_UINT8, PLY_INT16, PLY_UINT16, PLY_INT32, PLY_UINT32, PLY_FLOAT32, PLY_FLOAT64 };

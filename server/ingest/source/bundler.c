@@ -13,8 +13,8 @@
 #include "server/ingest/source/photo_folder.h"
 #include "server/ingest/source/values.h"
 
-#define MAX_LIST_BYTES ((size_t)16 << 20)
-#define MAX_OUT_BYTES ((size_t)1 << 30) /* with its points */
+#define MAX_LIST_BYTES ((size_t)16 << 20) /* of the list of photographs */
+#define MAX_OUT_BYTES ((size_t)1 << 30)   /* with its points */
 
 static char *recognise(const struct listing *l, const char *base) {
     static const char *const names[] = {"bundle.out", "bundle/bundle.out", "bundle.rd.out"};

@@ -10,7 +10,7 @@
 #include "common/mem.h"
 #include "server/ingest/source/colmap_cursor.h"
 
-#define MAX_PARAMETERS 12
+#define MAX_PARAMETERS 12 /* of a camera model: FULL_OPENCV and THIN_PRISM_FISHEYE */
 
 /* Parameters of each model, in order: f both focal lengths, F G one each, x y the principal point, 1 to 6 radial, p q
  * tangential, s t thin prism. */

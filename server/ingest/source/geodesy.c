@@ -8,11 +8,11 @@
 
 #define EQUATOR_M 6378137.0 /* WGS 84 */
 #define FLATTENING (1.0 / 298.257223563)
-#define ECCENTRICITY2 (FLATTENING * (2.0 - FLATTENING))
-#define UTM_SCALE 0.9996
-#define UTM_EASTING_M 500000.0
-#define UTM_SOUTH_M 10000000.0
-#define STEP_M 100.0 /* over which convergence and scale are measured */
+#define ECCENTRICITY2 (FLATTENING * (2.0 - FLATTENING)) /* squared */
+#define UTM_SCALE 0.9996                                /* on the central meridian */
+#define UTM_EASTING_M 500000.0                          /* of the central meridian */
+#define UTM_SOUTH_M 10000000.0                          /* northing of the equator in the south */
+#define STEP_M 100.0                                    /* over which convergence and scale are measured */
 
 /* Latitude, longitude and height: the iteration converges to less than a nanometre in six steps on the ground. */
 static void to_geodetic(const double at[3], double *latitude, double *longitude, double *height_m) {

@@ -12,7 +12,7 @@
 
 #define TRAJECTORY "traj.txt"
 #define PARAMETERS "cam_params.json"
-#define MAX_PARAMETERS_BYTES ((size_t)1 << 16)
+#define MAX_PARAMETERS_BYTES ((size_t)1 << 16) /* of its file of camera parameters */
 
 /* cam_params.json beside the trajectory or, as in the archive of all rooms, in the folder above; the caller's, NULL:
  * neither. */

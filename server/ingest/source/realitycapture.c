@@ -22,9 +22,9 @@
 #include "server/ingest/source/values.h"
 #include "server/ingest/source/xml.h"
 
-#define FILM_WIDTH_MM 36.0
-#define MAX_COLUMNS 64
-#define MAX_CSV_BYTES ((size_t)64 << 20)
+#define FILM_WIDTH_MM 36.0               /* focal lengths are stated for 35 mm film */
+#define MAX_COLUMNS 64                   /* of its CSV */
+#define MAX_CSV_BYTES ((size_t)64 << 20) /* of the file */
 
 /* Focal length and principal point (from the centre) as shares of the picture's longer side, whose size is known only
  * when the picture is read; distortion k1 k2 k3 k4 t1 t2. */

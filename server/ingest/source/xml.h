@@ -7,7 +7,7 @@
 
 #include "common/error.h"
 
-#define XML_MAX_DEPTH 64
+#define XML_MAX_DEPTH 64         /* of elements in each other */
 #define XML_MAX_BYTES (64 << 20) /* thousands of cameras take a few */
 
 struct xml_node {
