@@ -69,6 +69,21 @@ static void put_found(struct buf *out, const cJSON *report) {
     buf_puts(out, ".</p>");
 }
 
+/* Lamps that stand for what lies behind gaps of the mesh. */
+static void put_light_of_openings(struct buf *out, const cJSON *report) {
+    const cJSON *light;
+    int count = 0;
+    cJSON_ArrayForEach(light, cJSON_GetObjectItemCaseSensitive(report, "lights")) {
+        const char *kind = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(light, "kind"));
+        count += kind && strcmp(kind, "opening") == 0;
+    }
+    if (count > 0)
+        buf_printf(out,
+                   "<p>Light comes in from %d place%s where nothing was scanned: the lamps that are named “opening” "
+                   "stand outside the mesh, as bright as what they light tells.</p>",
+                   count, count == 1 ? "" : "s");
+}
+
 /* What was done about the holes of the mesh. */
 static void put_holes(struct buf *out, const cJSON *report) {
     double filled = number_at(report, "holes", "filled"), kept = number_at(report, "holes", "openings_kept");
@@ -80,6 +95,7 @@ static void put_holes(struct buf *out, const cJSON *report) {
         buf_printf(out,
                    "<p>%.0f opening%s of the mesh, %.2g m², %s taken for a way out of the room: a window, a door.</p>",
                    kept, kept == 1.0 ? "" : "s", number_at(report, "holes", "openings_m2"), kept == 1.0 ? "is" : "are");
+    put_light_of_openings(out, report);
 }
 
 static void put_views(struct buf *out, const cJSON *report) {

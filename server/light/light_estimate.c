@@ -26,7 +26,9 @@ static void hand_over_segment(struct reconstruction *r, const struct light_lamp 
     for (int c = 0; c < 3; c++)
         (&radiance.r)[c] = lamp->is_measured[c] ? (&e->observed.r)[c] : (&radiance.r)[c];
     evidence_set_radiance(e, radiance);
-    keep_source(r, lamp->kind, segment, radiance, lamp->deviation);
+    /* Of openings that others make superfluous no more is known than before: they are no sources any more. */
+    if (lamp->kind != ESTIMATED_OPENING || (double)lamp->deviation < LIGHT_UNKNOWN_DEVIATION)
+        keep_source(r, lamp->kind, segment, radiance, lamp->deviation);
 }
 
 /* Takes the factors of sky and ground over, and what they come to. */
@@ -106,7 +108,7 @@ float light_deviation(const struct reconstruction *r) {
         power[segment] += emitted;
         all += emitted;
     }
-    if (r->environment.map.pixel || r->sun.is_there)
+    if (r->environment.map.pixel || r->sun.is_there || r->opening_count > 0)
         all = 0.0;
     for (uint32_t i = 0; i < r->light.source_count && all > 0.0; i++) {
         const struct estimated_source *s = &r->light.source[i];
@@ -132,12 +134,30 @@ void light_restore(struct reconstruction *r) {
 
 /* --- report ------------------------------------------------------------------------------------------------ */
 
+/* Middle and area of the triangles of a segment. */
+static void report_place(const struct reconstruction *r, cJSON *entry, uint32_t segment) {
+    const struct mesh *mesh = &r->scene->mesh;
+    double middle[3] = {0.0}, area = 0.0;
+    for (size_t t = 0; t < mesh->triangle_count; t++) {
+        if (r->segments.of_triangle[t] != segment)
+            continue;
+        vec3 at = mesh_point(mesh, t, 1.0f / 3.0f, 1.0f / 3.0f);
+        double own = (double)mesh_triangle_area(mesh, t);
+        area += own;
+        middle[0] += own * (double)at.x, middle[1] += own * (double)at.y, middle[2] += own * (double)at.z;
+    }
+    for (int k = 0; k < 3; k++)
+        middle[k] = middle[k] / area + mesh->offset[k];
+    json_add(entry, "place", cJSON_CreateDoubleArray(middle, 3));
+    json_add_number(entry, "m2", area);
+}
+
 void light_report(const struct reconstruction *r) {
-    static const char *const names[] = {"hidden", "saturated", "saturated_sky", "seen", "saturated_ground"};
+    static const char *const names[] = {"hidden", "saturated", "saturated_sky", "seen", "saturated_ground", "opening"};
     cJSON *list = cJSON_AddArrayToObject(r->report, "lights");
     for (uint32_t i = 0; i < r->light.source_count; i++) {
         const struct estimated_source *s = &r->light.source[i];
-        bool is_segment = s->kind == ESTIMATED_HIDDEN || s->kind == ESTIMATED_SATURATED;
+        bool is_segment = s->kind == ESTIMATED_HIDDEN || s->kind == ESTIMATED_SATURATED || s->kind == ESTIMATED_OPENING;
         if (is_segment && !r->is_emitter[s->segment])
             continue;
         cJSON *entry = cJSON_CreateObject();
@@ -148,6 +168,8 @@ void light_report(const struct reconstruction *r) {
             const char *name = segments_name(&r->segments, &r->scene->mesh, s->segment);
             if (name)
                 json_add_string(entry, "name", name);
+            if (s->kind == ESTIMATED_OPENING)
+                report_place(r, entry, s->segment);
         }
         const double radiance[3] = {(double)s->radiance.r, (double)s->radiance.g, (double)s->radiance.b};
         json_add(entry, "radiance", cJSON_CreateDoubleArray(radiance, 3));

@@ -24,7 +24,7 @@ bool light_is_estimated(const struct reconstruction *r);
 
 /* Standard deviation of the logarithm of all light by those of the lamps whose radiance was estimated: each one's by its
  * share of the power of all emitting segments, as if their errors were independent. An error that all base colours share.
- * Which lamp lights what is left out. 0 where sky or sun light the room as well: what comes in of theirs, of which a lamp's
+ * Which lamp lights what is left out. 0 where sky, sun or openings light the room as well: what comes in of theirs, of which a lamp's
  * power would be a part, is not known as one figure. */
 float light_deviation(const struct reconstruction *r);
 

@@ -20,7 +20,7 @@ static void fit_channel(struct light_model *m, int channel) {
     for (size_t i = 0; i < m->points.count; i++) {
         const struct light_point *p = &m->points.point[i];
         float known = (&p->known.r)[channel];
-        for (size_t k = 0; k < SKY_CELLS && m->has_sky && p->sky; k++)
+        for (size_t k = 0; k < light_sky_cells(&m->sky) && m->has_sky && p->sky; k++)
             known += p->sky[k] * (float)exp(m->fit.source[m->first_cell + k].value);
         for (size_t k = 0; k < LIGHT_REGIONS && p->guessed; k++)
             known += p->guessed[3 * k + (size_t)channel] * (float)exp(m->fit.source[m->first_guess + k].value);
@@ -31,7 +31,7 @@ static void fit_channel(struct light_model *m, int channel) {
         const struct light_lamp *lamp = &m->lamps.lamp[i];
         double least = log(fmax((double)(&lamp->least.r)[channel], 1e-30)), mean = m->fit.source[lamp->source].value;
         struct joint_source source = {.mean = mean, .deviation = COLOR_DEVIATION, .least = least, .value = mean};
-        if (lamp->kind == ESTIMATED_HIDDEN) {
+        if (lamp->kind == ESTIMATED_HIDDEN || lamp->kind == ESTIMATED_OPENING) {
             source.least = -INFINITY;
         } else if (lamp->kind == ESTIMATED_SEEN) {
             double off = m->fit.source[lamp->source].value - m->fit.source[lamp->source].mean;

@@ -13,6 +13,8 @@
  * Luminous panels and shades have 30 to 1,000 times the luminance of walls. */
 #define LAMP_OVER_ROOM 100.0
 #define LAMP_DEVIATION 1.5
+/* Of an opening: most of what lies behind gaps of a scan is dark, or a surface no brighter than the room, some are lamps. */
+#define OPENING_OVER_ROOM 0.1
 /* Lamps that photographs measure: in pixels of their own, and in pixels that mix them with what is beside. */
 #define SEEN_DEVIATION 0.1
 #define MIXED_DEVIATION 0.3
@@ -134,7 +136,7 @@ static size_t sort_bright(const struct light_lamps *l, bool saturated, struct br
 static void choose_saturated(struct light_lamps *l) {
     struct bright *found;
     size_t count = sort_bright(l, true, &found);
-    for (size_t i = 0; i < count && l->count <= LIGHT_MOST; i++)
+    for (size_t i = 0; i < count && l->count <= LIGHT_MOST + l->r->opening_count; i++)
         add_saturated(l, found[i].segment);
     mem_free(found);
 }
@@ -153,9 +155,22 @@ static void choose_seen(struct light_lamps *l) {
     mem_free(found);
 }
 
+/* Adds the openings, of the radiances that were estimated so far. */
+static void choose_openings(struct light_lamps *l) {
+    const struct estimated_light *light = &l->r->light;
+    for (uint32_t i = 0; i < light->source_count; i++) {
+        const struct estimated_source *s = &light->source[i];
+        if (s->kind != ESTIMATED_OPENING)
+            continue;
+        l->is_lamp[s->segment] = true;
+        l->lamp[l->count++] =
+            (struct light_lamp){ESTIMATED_OPENING, 1, {s->segment}, .radiance = s->radiance, .deviation = s->deviation};
+    }
+}
+
 static void choose_again(struct light_lamps *l) {
     const struct reconstruction *r = l->r;
-    for (size_t i = 0; i < r->segments.count && l->count < LIGHT_LAMPS_MOST; i++) {
+    for (size_t i = 0; i < r->segments.count - r->opening_count && l->count < LIGHT_LAMPS_MOST; i++) {
         if (r->evidence[i].is_unbounded)
             add_saturated(l, (uint32_t)i);
         else if (r->evidence[i].is_hidden)
@@ -164,6 +179,7 @@ static void choose_again(struct light_lamps *l) {
 }
 
 void light_lamps_choose(struct light_lamps *l, bool again) {
+    choose_openings(l);
     if (again)
         choose_again(l);
     else
@@ -185,10 +201,17 @@ struct joint_source light_lamps_hidden_prior(const struct light_lamps *l) {
     return (struct joint_source){.mean = mean, .deviation = LAMP_DEVIATION, .least = -INFINITY, .value = mean};
 }
 
+struct joint_source light_lamps_opening_prior(const struct light_lamps *l) {
+    double mean = log(OPENING_OVER_ROOM * fmax((double)l->median_radiance, 1e-20));
+    return (struct joint_source){.mean = mean, .deviation = LIGHT_UNKNOWN_DEVIATION, .least = -INFINITY, .value = mean};
+}
+
 struct joint_source light_lamps_prior(const struct light_lamps *l, const struct light_lamp *lamp) {
     struct joint_source source = light_lamps_hidden_prior(l);
     double least = fmax((double)rgb_mean(lamp->least), 1e-30);
-    if (lamp->kind != ESTIMATED_HIDDEN)
+    if (lamp->kind == ESTIMATED_OPENING)
+        source = light_lamps_opening_prior(l);
+    else if (lamp->kind != ESTIMATED_HIDDEN)
         source = (struct joint_source){.mean = log(least), .deviation = LIGHT_UNKNOWN_DEVIATION, .least = log(least)};
     if (lamp->kind == ESTIMATED_SEEN) {
         bool is_mixed = l->r->evidence[lamp->segment[0]].only_mixed;

@@ -9,8 +9,9 @@
 
 #define LIGHT_MOST 16      /* saturated lamps; hidden ones; segments that are one lamp */
 #define LIGHT_SEEN_MOST 24 /* lamps that are seen */
-#define LIGHT_LAMPS_MOST (2 * LIGHT_MOST + LIGHT_SEEN_MOST + ENVIRONMENT_HALVES)
-_Static_assert(LIGHT_MOST *LIGHT_MOST + LIGHT_MOST + ENVIRONMENT_HALVES <= ESTIMATED_MOST,
+#define LIGHT_OPENINGS_MOST 14
+#define LIGHT_LAMPS_MOST (2 * LIGHT_MOST + LIGHT_SEEN_MOST + LIGHT_OPENINGS_MOST + ENVIRONMENT_HALVES)
+_Static_assert(LIGHT_MOST *LIGHT_MOST + LIGHT_MOST + LIGHT_OPENINGS_MOST + ENVIRONMENT_HALVES <= ESTIMATED_MOST,
                "all lamps and the sky are reported");
 
 /* Standard deviation of the logarithm of a radiance of which photographs tell no more than where to begin: a lower bound,
@@ -23,7 +24,7 @@ struct light_lamp {
     enum estimated_kind kind;
     size_t segment_count;
     uint32_t segment[LIGHT_MOST];
-    rgb least;           /* observed radiance, a lower bound; 0 for hidden lamps */
+    rgb least;           /* observed radiance, a lower bound; 0 for hidden lamps and openings */
     bool is_measured[3]; /* by channel: not saturated, so that `least` is the radiance */
     rgb radiance;        /* the estimate */
     float deviation;     /* standard deviation of its logarithm */
@@ -62,6 +63,8 @@ bool light_lamps_has_unknown(const struct light_lamps *l);
 /* What is known of a lamp; of a hidden one. */
 struct joint_source light_lamps_prior(const struct light_lamps *l, const struct light_lamp *lamp);
 struct joint_source light_lamps_hidden_prior(const struct light_lamps *l);
+/* Of light that comes in where a scan lacks surface, by a cell of the surround or an opening. */
+struct joint_source light_lamps_opening_prior(const struct light_lamps *l);
 
 /* Makes a lamp's column of the response. */
 void light_lamps_respond(const struct light_lamps *l, struct light_lamp *lamp, const struct light_points *points);

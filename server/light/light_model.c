@@ -32,6 +32,7 @@ void light_model_init(struct light_model *m, struct reconstruction *r, const str
                 light_lamps_add_half(&m->lamps, half);
         }
     }
+    m->sky.is_dark = r->is_surrounded;
     light_lamps_choose(&m->lamps, again);
 }
 
@@ -82,20 +83,27 @@ static void tie_ground(struct light_model *m) {
 
 static void add_cells(struct light_model *m) {
     float *lit = mem_calloc(m->points.count + 1, sizeof *lit);
+    const struct joint_source around = light_lamps_opening_prior(&m->lamps);
     m->first_cell = m->fit.source_count;
     m->has_sky = true;
-    for (size_t k = 0; k < SKY_CELLS; k++) {
+    for (size_t k = 0; k < light_sky_cells(&m->sky); k++) {
         for (size_t i = 0; i < m->points.count; i++)
             lit[i] = m->points.point[i].sky ? m->points.point[i].sky[k] : 0.0f;
-        add_cell(m, k, lit);
+        if (m->sky.surround)
+            joint_fit_add(&m->fit, &around, lit);
+        else
+            add_cell(m, k, lit);
     }
+    mem_free(lit);
+}
+
+static void tie_cells(struct light_model *m) {
     for (size_t k = 0; k < SKY_CELLS; k++) {
         size_t below = sky_cells_below(k);
         tie(m, m->first_cell + k, m->first_cell + sky_cells_right(k), 0.0, SKY_SMOOTHNESS);
         if (below < SKY_CELLS && sky_cells_half(below) == sky_cells_half(k))
             tie(m, m->first_cell + k, m->first_cell + below, 0.0, SKY_SMOOTHNESS);
     }
-    mem_free(lit);
 }
 
 static float guess_mean(const struct light_point *p, size_t region) {
@@ -221,12 +229,14 @@ static void make_fit(struct light_model *m) {
             (struct joint_point){p->segment, p->patch, rgb_mean(p->observed), rgb_mean(p->known), p->deviation};
         any_escapes = any_escapes || p->escaping > 0.0f;
     }
-    joint_fit_init(&m->fit, m->joint, m->points.count, 1 + LIGHT_LAMPS_MOST + SKY_CELLS + LIGHT_REGIONS, m->r->pool);
+    joint_fit_init(&m->fit, m->joint, m->points.count, 1 + LIGHT_LAMPS_MOST + LIGHT_CELLS + LIGHT_REGIONS, m->r->pool);
     add_lamps(m, false);
     m->fit.tie = m->tie;
     tie_ground(m);
     if (any_escapes)
         add_cells(m);
+    if (any_escapes && !m->sky.surround)
+        tie_cells(m);
     add_guesses(m);
     allow_for_highlights(m);
     add_lamps(m, true);

@@ -15,8 +15,8 @@ struct light_model {
     float *albedo;             /* [segment_count] of what points show of a segment, at the priors; owned */
     struct joint_fit fit;
     double patches_alike;                    /* so many patches are worth one (joint_alike.h) */
-    bool has_sky;                            /* unseen sky lights the points: */
-    size_t first_cell;                       /* its sources in the fit, SKY_CELLS of them */
+    bool has_sky;                            /* unseen sky, or what surrounds a scan, lights the points: */
+    size_t first_cell;                       /* its sources in the fit, of each cell */
     size_t first_guess;                      /* unseen surfaces: LIGHT_REGIONS factors of their fill */
     struct joint_tie tie[3 * SKY_CELLS + 1]; /* between them, with saturated sky and ground, and of these */
 };

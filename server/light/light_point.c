@@ -91,7 +91,7 @@ static void set_guesses_apart(const struct gathering *g, struct incident *in, st
 /* The part of the sky that is seen from a point: where a ray of the last gathering escaped many more are traced. */
 static void look_at_sky(const struct gathering *g, struct incident *in, struct light_point *p, uint32_t key) {
     const struct accel *accel = g->survey->r->world.accel;
-    float cell[SKY_CELLS] = {0};
+    float cell[LIGHT_CELLS] = {0};
     bool escapes = false;
     for (size_t i = 0; i < SURVEY_RAYS; i++)
         escapes = escapes || in->escapes[i];
@@ -101,12 +101,12 @@ static void look_at_sky(const struct gathering *g, struct incident *in, struct l
     accel_occluded_many(accel, SKY_RAYS, in->shadow, in->occluded);
     for (size_t i = 0; i < SKY_RAYS; i++) {
         if (!in->occluded[i] && vec3_dot(in->shadow[i].direction, p->at.normal) > 0.0f)
-            light_sky_add_ray(g->sky, in->shadow[i].direction, 1.0f / SKY_RAYS, cell, p->saturated);
+            light_sky_add_ray(g->sky, p->at.position, in->shadow[i].direction, 1.0f / SKY_RAYS, cell, p->saturated);
     }
-    for (size_t k = 0; k < SKY_CELLS; k++)
+    for (size_t k = 0; k < LIGHT_CELLS; k++)
         p->escaping += cell[k];
     if (p->escaping > 0.0f) {
-        p->sky = mem_array(SKY_CELLS, sizeof *p->sky);
+        p->sky = mem_array(LIGHT_CELLS, sizeof *p->sky);
         memcpy(p->sky, cell, sizeof cell);
     }
 }
@@ -186,7 +186,7 @@ static void average_patch(struct light_point *p, size_t count) {
         for (size_t half = 0; half < ENVIRONMENT_HALVES; half++)
             p[i].saturated[half] = (float)saturated[half];
     }
-    average_arrays(p, count, SKY_CELLS, sky_of);
+    average_arrays(p, count, LIGHT_CELLS, sky_of);
     average_arrays(p, count, 3 * LIGHT_REGIONS, guessed_of);
 }
 

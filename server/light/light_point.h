@@ -18,7 +18,7 @@ struct light_point {
     float escaping;      /* part of its cosine-distributed rays that leave the room in unseen directions */
     float *guessed;      /* [LIGHT_REGIONS][3] the same by surfaces of each region that no photograph shows, which
                                  * `known` goes without; NULL: none; owned, as the next */
-    float *sky;          /* [SKY_CELLS] parts of these rays that go to each cell; NULL: none do */
+    float *sky;          /* [LIGHT_CELLS] parts of these rays that go to each cell; NULL: none do */
     float saturated[ENVIRONMENT_HALVES]; /* radiance of a surface of albedo 1 by saturated directions */
 };
 

@@ -85,18 +85,19 @@ bool light_sky_known(const struct light_sky *s, struct image *map) {
         return false;
     image_init_rgb(map, e->map.width, e->map.height);
     memcpy(map->pixel, e->map.pixel, 3 * environment_pixel_count(e) * sizeof *map->pixel);
+    bool is_whole = s->is_dark && !s->surround; /* openings_find has left what is kept */
     for (size_t i = 0; i < environment_pixel_count(e); i++) {
         size_t half = environment_half(environment_pixel_direction(e, i));
         float kept = s->estimates_bounds && e->is_bound[i] ? 0.0f : 1.0f;
         if (!environment_pixel_is_seen(e, i))
-            kept = light_sky_kept(s, i) * (1.0f - follows_bounds(s, half));
+            kept = (is_whole ? 1.0f : light_sky_kept(s, i)) * (1.0f - follows_bounds(s, half));
         for (size_t c = 0; c < 3; c++)
             map->pixel[3 * i + c] *= kept;
     }
     return true;
 }
 
-void light_sky_add_ray(const struct light_sky *s, vec3 direction, float share, float cell[SKY_CELLS],
+void light_sky_add_ray(const struct light_sky *s, vec3 origin, vec3 direction, float share, float cell[LIGHT_CELLS],
                        float saturated[ENVIRONMENT_HALVES]) {
     const struct environment *e = s->environment;
     if (e->map.pixel) {
@@ -110,6 +111,10 @@ void light_sky_add_ray(const struct light_sky *s, vec3 direction, float share, f
             return;
         share *= 1.0f - kept;
     }
+    if (s->surround)
+        cell[surround_cell(s->surround, origin, direction)] += share;
+    if (s->surround || s->is_dark)
+        return;
     struct sky_corners c = corners_of(direction);
     for (int k = 0; k < 4; k++)
         cell[c.cell[k]] += share * c.weight[k];

@@ -11,13 +11,21 @@
 #include <stddef.h>
 
 #include "server/light/sky_cells.h"
+#include "server/light/surround.h"
 #include "server/state/reconstruction.h"
+
+/* Cells of the unseen light: of the sky, or around a scan. */
+#define LIGHT_CELLS SURROUND_CELLS
+_Static_assert(SKY_CELLS <= LIGHT_CELLS, "either fits");
 
 struct light_sky {
     const struct environment *environment; /* borrowed */
     float *angle;                          /* [map height][map width] to what is seen; NULL: nothing is; owned */
-    double fill[SKY_CELLS];                /* mean radiance of the fill about each cell; 0: there is none */
-    bool estimates_bounds;                 /* saturated directions are sources; else their bounds are known light */
+    const struct surround *surround; /* in place of unseen sky beyond what lies beside seen directions; NULL: none;
+                                            * borrowed */
+    bool is_dark;                    /* there is no unseen light but what the map has */
+    double fill[SKY_CELLS];          /* mean radiance of the fill about each cell; 0: there is none */
+    bool estimates_bounds;           /* saturated directions are sources; else their bounds are known light */
     /* Of each half (environment.h): the part of the seen directions that saturates, -1: none is seen; and their mean. */
     double bound_share[ENVIRONMENT_HALVES], bound_radiance[ENVIRONMENT_HALVES];
 };
@@ -29,9 +37,12 @@ void light_sky_release(struct light_sky *s);
  * no environment. */
 bool light_sky_known(const struct light_sky *s, struct image *map);
 
-/* Shares of rays: what a ray of weight `share` that escapes in a unit direction adds to each cell, and to the saturated
- * directions of its half, times their radiance. */
-void light_sky_add_ray(const struct light_sky *s, vec3 direction, float share, float cell[SKY_CELLS],
+/* How many cells there are. */
+static inline size_t light_sky_cells(const struct light_sky *s) { return s->surround ? SURROUND_CELLS : SKY_CELLS; }
+
+/* Shares of rays: what a ray of weight `share` that escapes from a point in a unit direction adds to each cell, and to the
+ * saturated directions of its half, times their radiance. */
+void light_sky_add_ray(const struct light_sky *s, vec3 origin, vec3 direction, float share, float cell[LIGHT_CELLS],
                        float saturated[ENVIRONMENT_HALVES]);
 
 /* Part of the fill that is kept at an unseen pixel of the map; 0 where nothing is seen. */

@@ -130,8 +130,8 @@ void unseen_light_estimate(struct reconstruction *r, const struct views *views) 
     r->unseen_share = unseen_share(u.point, u.count);
     u.count = unseen_keep_telling(u.point, u.count);
     double base_color = unseen_base_color(u.point, u.count, NOT_IMPOSSIBLE, NULL);
-    bool matters =
-        u.count >= UNSEEN_LEAST_POINTS && (base_color > IMPOSSIBLE_BASE_COLOR || r->unseen_share > MOSTLY_UNSEEN);
+    bool matters = !r->is_surrounded && u.count >= UNSEEN_LEAST_POINTS &&
+                   (base_color > IMPOSSIBLE_BASE_COLOR || r->unseen_share > MOSTLY_UNSEEN);
     if (matters)
         relight(&u);
     r->sky_is_fitted = matters;

@@ -22,6 +22,9 @@
 #define NEUTRAL_ROUGHNESS 0.5f
 #define NEUTRAL_SPECULAR 0.5f
 
+/* White paint over the room's median radiance: .85 and .4 (server/light/albedo.h). */
+#define SKY_OVER_ROOM 2.1
+
 #define MIN_TRAINING 16 /* training photographs that must remain for any to be held out */
 
 /* Parts of the time of prepare, measured on staircase2 at 2048 x 2048: atlas; visibility; calibration. The rest is the
@@ -38,6 +41,7 @@ struct prepare {
     const char *normals; /* their source: given, estimated, none */
     float mesh_noise_m;  /* standard deviation of the vertices' noise; 0: not denoised */
     float roughness;     /* of a mesh whose normals are estimated */
+    bool has_filled;     /* holes of the scan */
 };
 
 void prepare_environment(struct reconstruction *r) {
@@ -300,7 +304,15 @@ static enum status fill_holes(struct prepare *p, struct error *err) {
     holes_fill(r->scene, &r->segments, p->views, settings_is(r->settings, "holes", "fill"), is_cropped ? box : NULL,
                r->pool, &found);
     report_holes(p, &found);
+    p->has_filled = found.triangles > 0;
     return found.triangles > 0 ? remake_surface(p, NULL, err) : STATUS_OK;
+}
+
+/* Whether what photographs show through the mesh may be a sky that lights the room: it is brighter than white
+ * paint would be in the room. */
+static bool shows_sky(const struct prepare *p) {
+    const struct environment *e = &p->r->environment;
+    return e->map.pixel && e->seen_luminance > SKY_OVER_ROOM * (double)p->views->median_radiance;
 }
 
 /* Calibrates the photographs, fills the holes that they show, and finds what of them is to be trusted and the distant
@@ -316,6 +328,7 @@ static enum status measure_photographs(struct prepare *p, struct error *err) {
     clip_mark(r->scene, p->views, &r->noise, r->pool);
     fireflies_mark(r->scene, p->views, &r->noise, r->pool);
     environment_gather(&r->environment, p->views, r->pool);
+    r->is_surrounded = p->has_filled && !shows_sky(p);
     sun_seen_take(&r->environment, &r->sun);
     prepare_environment(r);
     advance(p, CALIBRATE_SHARE);
@@ -347,5 +360,13 @@ enum status prepare_run(struct reconstruction *r, struct views *views, const str
     advance(p, 1.0 - MAP_SHARE - VIEWS_SHARE - CALIBRATE_SHARE);
     if (status == STATUS_OK)
         status = check_segment_settings(r, err);
+    return status == STATUS_OK ? find_grey_card(r, err) : status;
+}
+
+enum status prepare_again(struct reconstruction *r, struct views *views, struct error *err) {
+    struct prepare prepare = {.r = r, .views = views};
+    enum status status = remake_surface(&prepare, NULL, err);
+    if (status == STATUS_OK)
+        status = remap_surface(&prepare, false, err);
     return status == STATUS_OK ? find_grey_card(r, err) : status;
 }

@@ -10,6 +10,7 @@
 #include "server/capture/views.h"
 #include "server/light/emitters.h"
 #include "server/light/light_estimate.h"
+#include "server/light/openings.h"
 #include "server/light/sun_find.h"
 #include "server/light/unseen_light.h"
 #include "server/material/emission_pattern.h"
@@ -58,10 +59,13 @@ static void log_hidden_lights(const struct stage_run *run) {
     const struct reconstruction *r = run->r;
     size_t lamps = 0;
     char line[128];
-    for (size_t i = 0; i < r->segments.count; i++)
+    for (size_t i = 0; i < r->segments.count - r->opening_count; i++)
         lamps += r->evidence[i].is_hidden;
     snprintf(line, sizeof line, "light: %zu lamps that no photograph shows were found by what they light", lamps);
     if (lamps > 0)
+        run->hooks->log(run->hooks->user, line);
+    snprintf(line, sizeof line, "light: it comes in at %zu places where nothing was scanned", r->opening_count);
+    if (r->opening_count > 0)
         run->hooks->log(run->hooks->user, line);
     if (r->sun.is_there && !r->sun.is_measured)
         run->hooks->log(run->hooks->user, "light: a sun that no photograph shows was found by what it lights");
@@ -71,8 +75,23 @@ static enum status prepare(struct stage_run *run, struct error *err) {
     return prepare_run(run->r, &run->views, &run->pace, err);
 }
 
+/* Adds the surfaces by which light comes in, and fuses again what photographs show. */
+static enum status find_openings(struct stage_run *run, struct error *err) {
+    struct reconstruction *r = run->r;
+    if (openings_find(r, &run->views) == 0)
+        return STATUS_OK;
+    fused_release(&r->fused);
+    enum status status = prepare_again(r, &run->views, err);
+    if (status == STATUS_OK)
+        fuse(&r->fused, &run->views, &r->noise, &r->atlas, &r->inverse, r->pool);
+    return status;
+}
+
 static enum status fuse_photographs(struct stage_run *run, struct error *err) {
     fuse(&run->r->fused, &run->views, &run->r->noise, &run->r->atlas, &run->r->inverse, run->r->pool);
+    enum status status = find_openings(run, err);
+    if (status != STATUS_OK)
+        return status;
     light_estimate(run->r, &run->views);
     unseen_light_estimate(run->r, &run->views);
     sun_find(run->r, &run->views);

@@ -14,15 +14,16 @@
 #define ESTIMATED_FACTORS 4 /* times that saturated sky may be brightened */
 
 enum estimated_kind {
-    ESTIMATED_HIDDEN,          /* a segment that no photograph shows */
-    ESTIMATED_SATURATED,       /* a segment at which every photograph saturates */
-    ESTIMATED_SATURATED_SKY,   /* the directions above the horizon at which they do */
-    ESTIMATED_SEEN,            /* a segment whose radiance is measured, but for its error */
-    ESTIMATED_SATURATED_GROUND /* the directions below the horizon at which they do */
+    ESTIMATED_HIDDEN,           /* a segment that no photograph shows */
+    ESTIMATED_SATURATED,        /* a segment at which every photograph saturates */
+    ESTIMATED_SATURATED_SKY,    /* the directions above the horizon at which they do */
+    ESTIMATED_SEEN,             /* a segment whose radiance is measured, but for its error */
+    ESTIMATED_SATURATED_GROUND, /* the directions below the horizon at which they do */
+    ESTIMATED_OPENING           /* a segment around a scan, from where light comes in (openings.h) */
 };
 
 struct estimated_source {
-    uint32_t kind, segment; /* segment: of the first two kinds */
+    uint32_t kind, segment; /* segment: of hidden, saturated and opening */
     rgb radiance;           /* of sky and ground: the mean */
     float deviation;        /* standard deviation of its logarithm */
 };

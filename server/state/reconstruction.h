@@ -54,6 +54,8 @@ struct reconstruction {
     struct sun sun;                 /* a sun that no photograph shows */
     double unseen_share;            /* part of the rays from surfaces that meet nothing observed */
     bool exposures_drift, colors_drift; /* given exposures, white balance (calibrate.h) */
+    bool is_surrounded;                 /* holes of the scan were filled, and what is left open shows no sky */
+    size_t opening_count;               /* the last segments of so many are openings (openings.h) */
     bool sky_is_fitted;                 /* unobserved sky was fitted to surfaces (unseen_light.h), not filled in */
     struct grey_card grey_card;         /* a point of known reflectance */
     double luminance_per_unit;          /* cd/m2 of radiance 1, once reported; 0: unknown */

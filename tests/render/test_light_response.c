@@ -1,7 +1,8 @@
 /* segment_light.h, bounced_light.h, light_point.h: what sources send to points, against closed forms. A sphere over a
  * floor; a lamp that shines at an unseen ceiling only; one in an unseen box with a hole; a sky through a hole in the
- * ceiling, all of it and by cell; nothing behind a wall; and the joint fit finds the sky's radiance from these
- * responses, which noise would make too small. sky_doubt.h: half of that sky, of bright texels alone. */
+ * ceiling, all of it and by cell, of the sky and of a box around the room; nothing behind a wall; and the joint fit
+ * finds the sky's radiance from these responses, which noise would make too small. sky_doubt.h: half of that sky, of
+ * bright texels alone. */
 #include "server/light/bounced_light.h"
 #include "server/light/joint_fit.h"
 #include "server/light/sky_doubt.h"
@@ -292,6 +293,20 @@ static double hole_factors(vec3 p, double cell[SKY_CELLS]) {
     return sum;
 }
 
+/* The same for the cells of a box. */
+static double hole_parts(vec3 p, const struct surround *surround, double cell[SURROUND_CELLS]) {
+    double sum = 0.0, area = (double)(HOLE * HOLE) / (PARTS * PARTS);
+    for (int i = 0; i < PARTS * PARTS; i++) {
+        vec3 at = {0.5f + HOLE * ((float)(i % PARTS) + 0.5f) / PARTS, 3.0f,
+                   1.0f + HOLE * ((float)(i / PARTS) + 0.5f) / PARTS};
+        vec3 way = vec3_sub(at, p);
+        double square = (double)vec3_dot(way, way), factor = area * (double)(way.y * way.y) / (PI * square * square);
+        cell[surround_cell(surround, p, vec3_normalize(way))] += factor;
+        sum += factor;
+    }
+    return sum;
+}
+
 /* The sky's radiance, from what a floor of albedo .5 shows under the closed form's light. */
 static double fit_sky(const struct rig *g, const struct light_points *points) {
     struct joint_point *joint = mem_array(points->count, sizeof *joint);
@@ -421,11 +436,49 @@ static void test_doubt(void) {
     rig_release(&g);
 }
 
+/* --- a box around the room with the hole ---------------------------------------------------------------------- */
+
+/* A cell of the box's upper side, just above the ceiling, sends through its part of the hole. */
+static void test_surround(void) {
+    struct rig g = {0};
+    struct survey survey;
+    struct light_sky sky;
+    struct light_points points;
+    struct surround surround;
+    struct views views = {.scene = &g.scene};
+    make_room_with_hole(&g.scene.mesh);
+    for (size_t i = 0; i < 4; i++) /* the lamp, which lies below the room */
+        g.scene.mesh.position[g.scene.mesh.vertex_count - 1 - i].y = 0.0f;
+    rig_init(&g);
+    surround_init(&surround, &views);
+    light_sky_init(&sky, &g.r.environment);
+    sky.surround = &surround;
+    survey_init(&survey, &g.r, NULL, NULL, NULL, 1600);
+    light_points_init(&points, &survey, &sky, NULL, 0.1f);
+    survey_release(&survey);
+    double found[SURROUND_CELLS] = {0}, wanted[SURROUND_CELLS] = {0}, sum = 0.0;
+    for (size_t i = 0; i < points.count; i++) {
+        const struct light_point *p = &points.point[i];
+        if (p->at.position.x > WALL_AT)
+            continue;
+        for (size_t k = 0; k < SURROUND_CELLS && p->sky; k++)
+            found[k] += (double)p->sky[k];
+        sum += hole_parts(p->at.position, &surround, wanted);
+    }
+    for (size_t k = 0; k < SURROUND_CELLS; k++)
+        CHECK_THAT(fabs(found[k] - wanted[k]) < 0.03 * wanted[k] + 0.003 * sum, "cell %zu: %g, %g", k, found[k],
+                   wanted[k]);
+    light_points_release(&points);
+    light_sky_release(&sky);
+    rig_release(&g);
+}
+
 int main(void) {
     test_sphere();
     test_ceiling();
     test_box();
     test_sky();
     test_doubt();
+    test_surround();
     return check_result();
 }
