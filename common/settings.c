@@ -79,7 +79,7 @@ static const struct setting table[] = {
      "free texels between two charts of the textures: 2 keep mip level 1 clean, 7 level 2, 16 level 3; 0: 7, or 2 where 7 would cost more "
      "than a tenth of texels_per_metre"},
     {"photograph_megapixels", SETTING_REAL, "megapixels", 0, 100000, NULL, "3.2", NULL,
-     "larger photographs are reduced to a half, a third ... of their sides, by means of their pixels; told for a texture_size of 2048: "
+     "larger photographs are reduced to a half, a third ... of their sides, by means of their pixels; stated for a texture_size of 2048: "
      "larger ones keep as many times more pixels as they have more texels; 0: photographs are kept whole, which takes many times the "
      "memory and time"},
     {"preview_interval_sec", SETTING_REAL, "s", 1, 86400, NULL, "15", NULL,
