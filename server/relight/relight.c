@@ -8,6 +8,7 @@
 #include "common/clock.h"
 #include "common/file.h"
 #include "common/mem.h"
+#include "common/protocol.h"
 #include "server/export/pictures.h"
 #include "server/export/views_json.h"
 #include "server/ingest/mesh/mesh_file.h"
@@ -345,7 +346,9 @@ static enum status finish(struct relight_state *r, uint64_t pictures, struct err
     }
     cJSON *head = cJSON_CreateObject();
     double unit = render_settings_number(r->job->settings, "luminance_per_unit");
+    json_add_string(head, "unbake_version", UNBAKE_VERSION);
     json_add(head, "settings", cJSON_Duplicate(r->job->settings, true));
+    json_add_number(head, "seed", render_settings_number(r->job->settings, "seed")); /* also where none was given */
     json_add_number(head, "exposure", (double)r->output.look.exposure);
     json_add_string(head, "unit", render_settings_text(r->job->settings, "unit"));
     if (unit > 0.0)

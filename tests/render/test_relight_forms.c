@@ -52,9 +52,7 @@ static void test_furnace(void) {
     relit_remove(dir);
 }
 
-/* --- lamps over a plane
- * ------------------------------------------------------------------------------------------
- */
+/* --- lamps over a plane ------------------------------------------------------------------------------------------ */
 
 static const vec3 eye = {0.0f, 1.0f, 1.0f};
 
@@ -169,9 +167,7 @@ static void test_lamps(void) {
     relit_remove(dir);
 }
 
-/* --- cameras, sources, parts of light
- * ----------------------------------------------------------------------------
- */
+/* --- cameras, sources, parts of light ---------------------------------------------------------------------------- */
 
 /* A room of coloured walls with two lamps: its ceiling, and a wall. */
 static char *lit_room(const char *views) {
@@ -473,6 +469,12 @@ static void test_resume(void) {
     paint(dir);
     CHECK(relight_run(&job, NULL, pool, &err) == STATUS_OK);
     CHECK(sha256_of_file(path, after, &err) == STATUS_OK && strcmp(before, after) != 0);
+    cJSON_Delete(settings);
+    mem_free(path);
+    path = file_join(out, "views.json");
+    CHECK(json_read(path, 1 << 20, &settings, &err) == STATUS_OK);
+    CHECK(cJSON_GetNumberValue(cJSON_GetObjectItem(settings, "seed")) == 7.0 && /* though none was given */
+          cJSON_IsString(cJSON_GetObjectItem(settings, "unbake_version")));
     cJSON_Delete(settings);
     mem_free(path);
     mem_free(other);
