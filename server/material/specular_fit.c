@@ -29,7 +29,7 @@ static const struct specular_candidate_levels diffuse_candidate = {ROUGHNESSES -
 /* A sample to be fitted. */
 struct fitted_sample {
     uint32_t sample;
-    size_t first_left; /* of its observations */
+    size_t first_residual; /* of its observations */
 };
 
 struct specular_job {
@@ -40,7 +40,7 @@ struct specular_job {
     struct specular_sample *sample; /* of all segments; owned */
     struct fitted_sample *used;     /* [used_count] in the order of the segments; owned */
     size_t used_count;
-    specular_leavings *left;            /* of all observations of these; owned */
+    specular_residuals *residual;       /* of all observations of these; owned */
     struct specular_evidence *evidence; /* [segment_count]; owned */
 };
 
@@ -53,7 +53,7 @@ static void find_misfits(void *user, size_t index, int thread) {
     struct specular_prediction prediction[SPECULAR_VIEWS];
     specular_predict(&job->observer, s, thread, prediction);
     specular_misfit_find(s, prediction, job->observer.in.views->median_radiance,
-                         &job->left[job->used[index].first_left]);
+                         &job->residual[job->used[index].first_residual]);
 }
 
 /* The candidate of the least misfit. */
@@ -199,9 +199,10 @@ static void list_used(struct specular_job *job, size_t segments) {
             observations += e->sample[k].count;
         }
     }
-    job->left = mem_array(observations + 1, sizeof *job->left);
+    job->residual = mem_array(observations + 1, sizeof *job->residual);
     for (size_t i = 0, at = 0; i < segments; at += job->points[i++].points.count)
-        job->points[i].points.left = &job->left[at < job->used_count ? job->used[at].first_left : observations];
+        job->points[i].points.residual =
+            &job->residual[at < job->used_count ? job->used[at].first_residual : observations];
 }
 
 void specular_fit(const struct specular_input *input, const bool *is_emitter, struct materials *materials,
@@ -217,7 +218,7 @@ void specular_fit(const struct specular_input *input, const bool *is_emitter, st
     parallel_for(pool, segments, measure_segment, &job);
     parallel_for(pool, segments, fit_segment, &job);
     mem_free(job.used);
-    mem_free(job.left);
+    mem_free(job.residual);
     mem_free(job.sample);
     mem_free(job.points);
     mem_free(job.evidence);

@@ -62,39 +62,39 @@ static void add_channel(const struct specular_sample *s, const struct specular_p
 }
 
 void specular_misfit_find(const struct specular_sample *sample, const struct specular_prediction *prediction,
-                          float median, specular_leavings *left) {
+                          float median, specular_residuals *residual) {
     for (size_t k = 0; k < HIGHLIGHT_ROUGHNESSES; k++) {
         for (size_t m = 0; m < SPECULAR_LEVELS; m++) {
             struct channel_sums sums = {{0.0f}, {0.0f}};
             for (int c = 0; c < CHANNELS; c++)
                 add_channel(sample, prediction, k, m, c, median, &sums);
             for (size_t i = 0; i < sample->count; i++)
-                left[i][k][m] = (struct specular_left){image_half_from_float(sums.misfit[i]),
-                                                       image_half_from_float(sums.residual[i] / CHANNELS)};
+                residual[i][k][m] = (struct specular_residual){image_half_from_float(sums.misfit[i]),
+                                                               image_half_from_float(sums.residual[i] / CHANNELS)};
         }
     }
 }
 
 /* --- a segment ---------------------------------------------------------------------------------- */
 
-static const struct specular_left *left_at(const struct specular_points *points, size_t observation,
-                                           struct specular_candidate_levels c) {
-    return &points->left[observation][c.k][c.m];
+static const struct specular_residual *residual_at(const struct specular_points *points, size_t observation,
+                                                   struct specular_candidate_levels c) {
+    return &points->residual[observation][c.k][c.m];
 }
 
 double specular_misfit_sum(const struct specular_points *points, struct specular_candidate_levels c) {
     double sum = 0.0;
     for (size_t i = 0, at = 0; i < points->count; i++)
         for (size_t v = 0; v < points->sample[i].count; v++)
-            sum += (double)image_float_from_half(left_at(points, at++, c)->misfit);
+            sum += (double)image_float_from_half(residual_at(points, at++, c)->misfit);
     return sum;
 }
 
 static double rho(double e) { return e * e / (1.0 + e * e); }
 
 /* By how much the error of an observation raises the gain of b over a. */
-static double error_effect(const struct specular_left *a, const struct specular_left *b) {
-    double ea = (double)image_float_from_half(a->residual), eb = (double)image_float_from_half(b->residual);
+static double error_effect(const struct specular_residual *a, const struct specular_residual *b) {
+    double ea = (double)image_float_from_half(a->mean), eb = (double)image_float_from_half(b->mean);
     double without = fabs(eb) < fabs(ea) ? rho(ea - eb) : -rho(ea - eb);
     return CHANNELS * (rho(ea) - rho(eb) - without);
 }
@@ -162,9 +162,11 @@ static void add_point(const struct specular_points *points, size_t i, size_t fir
                       struct specular_candidate_levels a, struct specular_candidate_levels b, struct gain_sums *sums) {
     double gain = 0.0, count = (double)points->sample[i].count;
     for (size_t v = 0; v < points->sample[i].count; v++) {
-        const struct specular_left *left_a = left_at(points, first + v, a), *left_b = left_at(points, first + v, b);
-        double without = (double)image_float_from_half(left_a->misfit), effect = error_effect(left_a, left_b);
-        gain += without - (double)image_float_from_half(left_b->misfit);
+        const struct specular_residual *residual_a = residual_at(points, first + v, a),
+                                       *residual_b = residual_at(points, first + v, b);
+        double without = (double)image_float_from_half(residual_a->misfit),
+               effect = error_effect(residual_a, residual_b);
+        gain += without - (double)image_float_from_half(residual_b->misfit);
         cluster_add(&sums->point[i], effect, 1.0);
         cluster_add(&sums->photograph[points->sample[i].view[v].train], effect, 1.0);
         sums->total += without;

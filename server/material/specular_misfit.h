@@ -1,5 +1,5 @@
-/* specular_misfit.h -- what candidate materials leave unexplained at the points of a segment, and how sure the
- * difference of two of them is.
+/* specular_misfit.h -- residuals of candidate materials at the points of a segment, and how significant the
+ * difference of two candidates is.
  *
  * Errors are shared: by all observations of a point (its normal), by all of a photograph (its pose, exposure, white
  * balance, vignette), and by all of a region (the light that arrives there, the mesh). The variance of the difference
@@ -25,25 +25,25 @@ struct specular_candidate_levels {
     size_t k, m;
 };
 
-/* What a candidate leaves of one observation, half precision. */
-struct specular_left {
-    uint16_t misfit;   /* sum of rho(e) over the channels; rho(e) = e^2 / (1 + e^2) */
-    uint16_t residual; /* mean of e over the channels, signed */
+/* Residual e of one observation under a candidate, half precision. */
+struct specular_residual {
+    uint16_t misfit; /* sum of rho(e) over the channels; rho(e) = e^2 / (1 + e^2) */
+    uint16_t mean;   /* of e over the channels, signed */
 };
-typedef struct specular_left specular_leavings[HIGHLIGHT_ROUGHNESSES][SPECULAR_LEVELS];
+typedef struct specular_residual specular_residuals[HIGHLIGHT_ROUGHNESSES][SPECULAR_LEVELS];
 
 /* Points of one segment. All borrowed. */
 struct specular_points {
     size_t count;
     double floor; /* standard error, as a part of the misfit, of what all points of the segment share */
     struct specular_sample *sample; /* [count] */
-    specular_leavings *left;        /* of the observations of sample 0, of sample 1, ... */
+    specular_residuals *residual;   /* of the observations of sample 0, of sample 1, ... */
 };
 
-/* Fills left[sample->count]: of each observation under every candidate, with the one base colour that fits all of them
- * best. `median`: radiance of the photographs. */
+/* Fills residual[sample->count], of each observation under every candidate, with the one base colour that fits all of
+ * them best. `median`: radiance of the photographs. */
 void specular_misfit_find(const struct specular_sample *sample, const struct specular_prediction *prediction,
-                          float median, specular_leavings *left);
+                          float median, specular_residuals *residual);
 
 /* Sum of a candidate's misfits. */
 double specular_misfit_sum(const struct specular_points *points, struct specular_candidate_levels c);

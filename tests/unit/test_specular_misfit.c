@@ -30,15 +30,15 @@ struct errors {
     double photograph, region, own;
 };
 
-static struct specular_left left_of(double e) {
-    return (struct specular_left){image_half_from_float((float)(3.0 * e * e / (1.0 + e * e))),
-                                  image_half_from_float((float)e)};
+static struct specular_residual residual_of(double e) {
+    return (struct specular_residual){image_half_from_float((float)(3.0 * e * e / (1.0 + e * e))),
+                                      image_half_from_float((float)e)};
 }
 
 /* Standard errors of the gain of b over a: nothing but errors, or a highlight that b explains. */
 static double gain_of(uint32_t key, const struct errors *errors, bool has_highlight) {
     struct specular_sample *sample = mem_calloc(POINTS, sizeof *sample);
-    specular_leavings *left = mem_calloc(POINTS * VIEWS, sizeof *left);
+    specular_residuals *residual = mem_calloc(POINTS * VIEWS, sizeof *residual);
     for (uint32_t i = 0; i < POINTS; i++) {
         uint32_t x = i % COLUMNS, y = i / COLUMNS, region = y / 3 * 8 + x / 3;
         sample[i].count = VIEWS;
@@ -49,15 +49,15 @@ static double gain_of(uint32_t key, const struct errors *errors, bool has_highli
                        errors->own * draw(key, at, 3);
             double half = 0.5 * DIFFERENCE * ((errors->region > 0.0 ? region : photograph) % 2 ? 1.0 : -1.0);
             sample[i].view[v].train = photograph;
-            left[at][a.k][a.m] = left_of(has_highlight ? e + (photograph < 3 ? HIGHLIGHT : 0.0) : e + half);
-            left[at][b.k][b.m] = left_of(has_highlight ? e : e - half);
+            residual[at][a.k][a.m] = residual_of(has_highlight ? e + (photograph < 3 ? HIGHLIGHT : 0.0) : e + half);
+            residual[at][b.k][b.m] = residual_of(has_highlight ? e : e - half);
         }
     }
-    struct specular_points points = {POINTS, 0.0, sample, left};
+    struct specular_points points = {POINTS, 0.0, sample, residual};
     struct specular_gain gain = specular_misfit_gain(&points, a, b);
     double sum = specular_misfit_sum(&points, a);
     CHECK_NEAR(gain.part * sum, sum - specular_misfit_sum(&points, b), 1e-6 * sum);
-    mem_free(left);
+    mem_free(residual);
     mem_free(sample);
     return gain.errors;
 }
