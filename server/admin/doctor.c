@@ -96,7 +96,7 @@ static void check_sandbox(struct doctor *d) {
     struct sandbox_result result = {.text = ""};
     int channel[2];
     if (!c->sandbox) {
-        tell(d, WARN, "sandbox", "sandbox = no: jobs read strangers' files with all the daemon's rights");
+        tell(d, WARN, "sandbox", "sandbox = no: jobs parse untrusted uploads with all the daemon's rights");
         return;
     }
     pid_t child = pipe2(channel, O_CLOEXEC) == 0 ? fork() : -1;

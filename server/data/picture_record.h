@@ -4,7 +4,7 @@
  *
  *   {"picture":17,"digest":"…","files":[{"name":"00017_radiance.exr","bytes":…,"sha256":"…"},…],…}
  *
- * A worker has written them after it has read a stranger's files: no member is taken for granted. */
+ * A worker has written them after it has parsed untrusted files: no member is taken for granted. */
 #ifndef UNBAKE_DATA_PICTURE_RECORD_H
 #define UNBAKE_DATA_PICTURE_RECORD_H
 

@@ -49,7 +49,7 @@ static struct response *send_bytes(const struct request *r, int fd, const struct
     reply->fd = fd;
     reply->length = file->bytes;
     response_field(reply, "Content-Type", "%s", content_type);
-    /* A worker wrote the file from a stranger's upload: in a browser it must not act with its reader's rights. */
+    /* A worker wrote the file from an untrusted upload: in a browser it must not act with its reader's rights. */
     response_field(reply, "Content-Security-Policy", "sandbox allow-same-origin; script-src 'none'");
     if (*file->hex) {
         field_digest_format(file->hex, digest);

@@ -1,7 +1,7 @@
 /* previews.c -- the pictures that the check of a scene has drawn: who may read the scene may see them.
  *
- * A picture's name is one that the scene's facts list, and is held against what a name may be: a worker that had read a
- * stranger's files wrote both. */
+ * A picture's name is one that the scene's facts list, and is checked again: a worker that had parsed untrusted files
+ * wrote both. */
 #include <string.h>
 #include <unistd.h>
 

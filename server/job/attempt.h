@@ -6,7 +6,7 @@
  *
  * 1. A job's attempt is in the store (store/attempts.h) before its run begins, and its outcome is entered after the run
  *    has ended: of one job, or of each part of one that is split (store/parts.h), there is never more than one run.
- * 2. What a worker says is checked where it can be: it has read a stranger's files.
+ * 2. What a worker says is checked where it can be: it has parsed untrusted files.
  * 3. settle can fail (the disk of state.db is full): the attempt stays ended and is settled
  *    again later; nothing of the outcome is lost. */
 #ifndef UNBAKE_JOB_ATTEMPT_H

@@ -1,4 +1,4 @@
-/* fit.c -- see fit.h. The facts come from a worker that has read a stranger's files: no member is taken for granted. */
+/* fit.c -- see fit.h. The facts come from a worker that has parsed untrusted files: no member is taken for granted. */
 #include "server/job/fit.h"
 
 #include <string.h>

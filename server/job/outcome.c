@@ -138,7 +138,7 @@ static enum status settle_memory(const struct attempt *a, struct store *store, c
     return status;
 }
 
-/* What the worker has planned, it may have planned wrongly: it has read a stranger's files. */
+/* What the worker has planned, it may have planned wrongly: it has parsed untrusted files. */
 static enum status settle_split(const struct attempt *a, struct store *store, struct error *err) {
     double pictures, parts;
     const char *digest;

@@ -36,7 +36,7 @@ static void complain(struct attempt *a, const char *type, const struct error *er
     a->complained = true;
 }
 
-/* `data` is as the worker sent it. Members that only the daemon sets are removed: the worker has read a stranger's
+/* `data` is as the worker sent it. Members that only the daemon sets are removed: the worker has parsed untrusted
  * files and may name another job. */
 static void put_event(struct attempt *a, struct store *store, const char *type, cJSON *data) {
     static const char *const daemons[] = {"job", "attempt", "at", "snapshot"};

@@ -1,5 +1,5 @@
 /* worker_messages.h -- turns a worker's lines into events, outputs and counters, and notes in the attempt what it
- * says of its own end. The worker has read a stranger's files: what can be checked is checked. */
+ * says of its own end. The worker has parsed untrusted files: what can be checked is checked. */
 #ifndef UNBAKE_JOB_WORKER_MESSAGES_H
 #define UNBAKE_JOB_WORKER_MESSAGES_H
 

@@ -159,7 +159,7 @@ static enum status send_open(struct relay *r, int fd, const char *what, const ch
 }
 
 /* The file that a line announces; *is_sent is false where it is not there any more as it was announced. The worker has
- * read a stranger's files: no name leads out of its folder. */
+ * parsed untrusted files: no name leads out of its folder. */
 static enum status send_output(struct relay *r, const cJSON *line, bool *is_sent, struct error *err) {
     const char *name, *wanted;
     int fd;

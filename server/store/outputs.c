@@ -1,7 +1,7 @@
 /* outputs.c -- the files that jobs have finished writing; see store.h.
  *
- * Names come from a worker, which has read what a stranger uploaded, and end in paths: only plain
- * relative ones are taken. */
+ * Names come from a worker, which has parsed an untrusted upload, and become parts of paths: only plain
+ * relative ones are accepted. */
 #include "server/store/outputs.h"
 
 #include <ctype.h>

@@ -1,6 +1,6 @@
 /* digests.h -- the SHA-256 of outputs, as the daemon finds it.
  *
- * A worker's word for what a file holds is not taken: it has read what a stranger uploaded. And a running worker
+ * A worker's own digest of a file is not trusted: it has parsed an untrusted upload. And a running worker
  * replaces an output by rename and announces it a little later, often with the same size. So each version of a file
  * (inode, size, times) is hashed once, by a thread of its own, from the time that it is announced, the smallest first;
  * the store keeps the digest, over restarts too.

@@ -1,5 +1,5 @@
-/* deliver.h -- a webhook's call, made by a process of its own: the daemon never resolves a stranger's
- * host name, speaks to his server or reads what it says.
+/* deliver.h -- a webhook's call, made by a process of its own: the daemon never resolves a host name that a
+ * user gave, speaks to that server or reads what it says.
  *
  * 1. Every address that the name has is looked at before it is called, and it is that address that
  *    is called: a name that changes in between gains nothing. Private addresses are refused

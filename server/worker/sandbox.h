@@ -1,4 +1,4 @@
-/* sandbox.h -- what a worker gives up before it reads what a stranger uploaded or sends.
+/* sandbox.h -- which rights a worker gives up before it parses untrusted uploads or replies.
  *
  *  - files: it may read the folders `read_dir` and the system's libraries, and write below `write_dir`
  *    (Landlock, Linux 5.13 and later); modes, owners, times and attributes of files it changes nowhere;

@@ -1,5 +1,5 @@
-/* test_progress.c -- what a worker says on its pipe, as the daemon hears it: a worker has read a
- * stranger's files, so it may say anything. The first byte chooses a job's attempt or a scene's
+/* test_progress.c -- what a worker says on its pipe, as the daemon hears it: a worker has parsed
+ * untrusted files, so it may say anything. The first byte chooses a job's attempt or a scene's
  * check; the outcome is entered after. */
 #include <fcntl.h>
 #include <unistd.h>
