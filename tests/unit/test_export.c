@@ -7,6 +7,7 @@
 #include "common/json.h"
 #include "common/mem.h"
 #include "common/protocol.h"
+#include "common/settings.h"
 #include "server/demo/room.h"
 #include "server/export/outputs.h"
 #include "server/export/pictures.h"
@@ -160,6 +161,10 @@ static void test_clean_levels(struct parallel *pool) {
     } table[] = {{1, 0}, {ATLAS_PADDING, 1}, {ATLAS_AUTOMATIC_PADDING, 2}, {16, 3}};
     struct room room;
     struct error err;
+    struct settings defaults;
+    settings_init(&defaults);
+    CHECK(settings_number(&defaults, "padding") == ATLAS_AUTOMATIC_PADDING);
+    settings_release(&defaults);
     CHECK(room_init(&room, &(struct room_look){64, 0.0f, 0.0f, ROOM_LAMPS_FRAMED}, pool, &err) == STATUS_OK);
     for (size_t i = 0; i < sizeof table / sizeof *table; i++) {
         struct atlas atlas;
