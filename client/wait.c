@@ -27,7 +27,16 @@ struct waiting {
     size_t open_count, ended, failed, cancelled;
     double heard_at; /* when the server last answered */
     bool ever, told;
+    bool told_paused; /* that a job is paused; said once, of the first */
 };
+
+static void tell_paused(struct waiting *w, const cJSON *job) {
+    double id = member_number(job, "id", 0.0);
+    if (w->told_paused || strcmp(member_text(job, "state"), JOB_STATE_PAUSED) != 0)
+        return;
+    client_note(w->client, "job %.0f is paused, and waited for: `unbake resume %.0f` lets it go on", id, id);
+    w->told_paused = true;
+}
 
 /* Counts the job's end, if that is its state, and tells it. Whether it has ended. */
 static bool take(struct waiting *w, const cJSON *job) {
@@ -66,6 +75,7 @@ static enum status ask_round(struct waiting *w, bool any, struct reply *reply, s
         w->heard_at = clock_sec();
         w->ever = true;
         w->told = false;
+        tell_paused(w, reply->json);
         if (take(w, reply->json))
             w->open[i] = w->open[--w->open_count];
         else

@@ -79,8 +79,8 @@ static const struct photograph *photograph_of(const struct divide *d, uint32_t t
     return &d->views->scene->photograph[d->views->train[train]];
 }
 
-/* Reads a photograph with a bicubic filter where all of its support shows one surface; else leaves `shown` and returns
- * false. */
+/* Reads a photograph with a bicubic filter where all of its support shows one surface; else leaves `observed` as it is
+ * and returns false. */
 static bool sharpen(const struct divide *d, const struct view *view, uint32_t triangle, rgb *observed) {
     return views_edge(d->views, view, triangle) < VIEWS_EDGE - 1 &&
            photograph_sample_cubic(photograph_of(d, view->train), view->x, view->y, observed);
@@ -175,7 +175,7 @@ static struct robust_sample above_bound(struct robust_sample sample, const bool 
     return sample;
 }
 
-/* Whether most of the looks at a texel say no more than a lower bound, by the median of their brightness. */
+/* Whether most of the observations of a texel say no more than a lower bound, by the median of their brightness. */
 static bool is_bound(const struct divide_candidates *of, const struct measured_observations *observations) {
     struct bounded gray[MEASURED_OBSERVATIONS];
     float median;

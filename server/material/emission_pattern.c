@@ -306,7 +306,7 @@ static float max_segment_base_color(const struct materials *m, const struct emit
     return darkest;
 }
 
-/* Turns the pattern of outgoing radiance (mean `shown`) into that of emitted radiance (mean `own`). */
+/* Turns the pattern of outgoing radiance (mean `observed`) into that of emitted radiance (mean `own`). */
 static void subtract_reflected(struct materials *m, uint32_t texel, rgb observed, rgb own) {
     rgb all = rgb_mul(rgb_from_half(m->emission_pattern[texel]), observed);
     materials_set_emission_pattern(m, texel, rgb_sub(all, rgb_sub(observed, own)), own);

@@ -178,6 +178,8 @@ run 6 resume 1
 run 0 pause "$job" --json
 so '.state == "paused" or .wanted == "pause"'
 wait_for 60 job_is "$job" paused
+run 9 wait "$job" --timeout 0.5
+equal "$(grep -c "job $job is paused, and waited for: .*resume" <<<"$err")" 1
 run 0 resume "$job"
 has "$out" "job $job is"
 wait_for 60 job_is "$job" running
