@@ -15,10 +15,10 @@ function makeRow(columns) {
 
 function fillUser(row, user) {
   const limit = user.kept_bytes_max ? ` of ${bytes(user.kept_bytes_max)}` : "";
-  const words = [user.name, `${user.open_jobs} of ${user.jobs}`, bytes(user.kept_bytes) + limit,
-    `${hours(user.cpu_sec_month)} of ${hours(user.cpu_sec)}`];
+  const words = [user.name, `${user.open_jobs} open, ${user.jobs} in all`, bytes(user.kept_bytes) + limit,
+    `${hours(user.cpu_sec_month)} this month, ${hours(user.cpu_sec)} in all`];
   words.forEach((text, i) => { row.children[i].textContent = text; });
-  row.lastElementChild.title = user.month ? `in ${user.month}, of all` : "";
+  row.lastElementChild.title = user.month ? `this month: ${user.month}` : "";
 }
 
 function fillToken(row, token) {
