@@ -254,7 +254,7 @@ int servers_run(struct client *c, const struct options *o) {
         else
             print_servers(c, items);
         if (s.count == 0 && s.path)
-            client_note(c, "no server has a name: %s", s.path);
+            client_note(c, "no server has a name yet; names are read from %s (`unbake servers --help`)", s.path);
         if (status != STATUS_OK)
             code = client_fail(c, NULL, &err);
     }

@@ -43,7 +43,7 @@ void nearest_offer(struct nearest *n, const char *candidate) {
     if (!begins && longer - shorter > edits_max) /* the distance is no less */
         return;
     size_t edits = begins ? 1 : distance(n->typed, candidate);
-    if (edits > edits_max || edits >= longer)
+    if (edits > edits_max || 2 * edits > longer)
         return;
     if (!n->best || edits < n->distance) {
         n->best = candidate;

@@ -223,7 +223,8 @@ enum status store_scene_list(struct store *store, const struct caller *who, cons
     *count = 0;
     next_cursor[0] = '\0';
     if (cursor[0] && sscanf(cursor, "%lld-%64[0-9a-f]%c", &before_ms, before_id, &rest) != 2)
-        return error_set(err, STATUS_INPUT, "\"%.64s\" is no cursor of a list of scenes", cursor);
+        return error_set(err, STATUS_INPUT,
+                         "\"%.64s\" is no cursor of a list of scenes: a cursor is `next` of the page before", cursor);
     sqlite3_stmt *stmt;
     store_lock(store);
     enum status status =

@@ -110,7 +110,8 @@ enum status store_upload_list(struct store *store, const struct caller *who, con
     *count = 0;
     next_cursor[0] = '\0';
     if (cursor[0] && sscanf(cursor, "%lld-%32[0-9a-f]%c", &before_ms, before_id, &rest) != 2)
-        return error_set(err, STATUS_INPUT, "\"%.64s\" is no cursor of a list of uploads", cursor);
+        return error_set(err, STATUS_INPUT,
+                         "\"%.64s\" is no cursor of a list of uploads: a cursor is `next` of the page before", cursor);
     sqlite3_stmt *stmt;
     store_lock(store);
     enum status status = sql_query(&store->sql, &stmt, err,

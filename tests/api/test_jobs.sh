@@ -92,6 +92,7 @@ equal "$(tr ' ' '\n' <<<"$seen" | grep . | tr '\n' ' ')" "$(seq 11 -1 1 | tr '\n
 call GET '/v1/jobs?state=running'; equal "$(field '.items | length')" 0
 call GET '/v1/jobs?state=asleep'; expect 400
 call GET '/v1/jobs?cursor=x'; expect 400
+equal "$(field .detail)" '"x" is no cursor of a list of jobs: a cursor is `next` of the page before'
 
 # --- ETag and PATCH ---
 call GET "/v1/jobs/$job"; etag=$(header etag)

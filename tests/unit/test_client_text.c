@@ -139,6 +139,8 @@ static void test_nearest(void) {
     CHECK_STRING(correction("scene"), "scenes");
     CHECK_STRING(correction("set"), "settings");
     CHECK_STRING(correction("lsit"), "list");
+    CHECK_STRING(correction("rn"), "rm");
+    CHECK_STRING(correction("wam"), "none");  /* one letter in three is not enough to guess by */
     CHECK_STRING(correction("siez"), "size"); /* two swapped letters are nearer than two others */
     CHECK_STRING(correction("frobnicate"), "none");
     CHECK_STRING(correction(""), "none");

@@ -62,7 +62,8 @@ static struct response *list_jobs(struct api *api, struct request *r, const stru
     const char *cursor = target_query(&r->target, "cursor");
     int64_t before = 0;
     if (cursor && !field_number(cursor, 1, INT64_MAX, &before))
-        return problem(r, 400, "invalid cursor");
+        return problem(r, 400, "\"%.64s\" is no cursor of a list of jobs: a cursor is `next` of the page before",
+                       cursor);
     size_t limit = view_limit(r, &refusal), count = 0;
     if (refusal)
         return refusal;
