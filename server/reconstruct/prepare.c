@@ -23,7 +23,7 @@
 #define NEUTRAL_SPECULAR 0.5f
 
 /* White paint over the room's median radiance: .85 and .4 (server/light/albedo.h). */
-#define SKY_OVER_ROOM 2.1
+#define SKY_OVER_ROOM 2.1f
 
 #define MIN_TRAINING 16 /* training photographs that must remain for any to be held out */
 
@@ -308,11 +308,18 @@ static enum status fill_holes(struct prepare *p, struct error *err) {
     return found.triangles > 0 ? remake_surface(p, NULL, err) : STATUS_OK;
 }
 
-/* Whether what photographs show through the mesh may be a sky that lights the room: it is brighter than white
- * paint would be in the room. */
+/* Whether what photographs show through the mesh may be a sky that lights the room: most of it is brighter than white
+ * paint would be there. Parts may be: lamps. */
 static bool shows_sky(const struct prepare *p) {
     const struct environment *e = &p->r->environment;
-    return e->map.pixel && e->seen_luminance > SKY_OVER_ROOM * (double)p->views->median_radiance;
+    float white = SKY_OVER_ROOM * p->views->median_radiance;
+    double seen = 0.0, bright = 0.0;
+    for (size_t i = 0; e->map.pixel && i < environment_pixel_count(e); i++) {
+        double angle = environment_pixel_is_seen(e, i) ? environment_cell_angle(e, i / e->map.width) : 0.0;
+        seen += angle;
+        bright += rgb_mean(environment_pixel_radiance(e, i)) > white ? angle : 0.0;
+    }
+    return bright > 0.5 * seen;
 }
 
 /* Calibrates the photographs, fills the holes that they show, and finds what of them is to be trusted and the distant
