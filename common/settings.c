@@ -61,7 +61,7 @@ static const struct setting table[] = {
     {"holes", SETTING_CHOICE, "", 0, 0, "auto|fill|keep", "keep", NULL,
      "holes of the mesh that photographs look through: auto fills those where photographs show that a wall, floor or ceiling "
      "goes on; fill all that lie in one; keep none, so that they are windows. Where some are filled and no bright sky is seen "
-     "through the rest, light that comes in there is given a place: lamps outside the mesh, each named opening"},
+     "through the rest, light that comes in there is given a place: surfaces outside the mesh, each named opening"},
     {"iterations", SETTING_INT, "", 0, 1e9, NULL, "0", NULL,
      "optimiser steps; 0: as many as refine_looks or listing1_looks take"},
     {"listing1_looks", SETTING_INT, "looks", 1, 1000000000, NULL, "4000", "listing1",

@@ -85,12 +85,11 @@ bool light_sky_known(const struct light_sky *s, struct image *map) {
         return false;
     image_init_rgb(map, e->map.width, e->map.height);
     memcpy(map->pixel, e->map.pixel, 3 * environment_pixel_count(e) * sizeof *map->pixel);
-    bool is_whole = s->is_dark && !s->surround; /* openings_find has left what is kept */
     for (size_t i = 0; i < environment_pixel_count(e); i++) {
         size_t half = environment_half(environment_pixel_direction(e, i));
         float kept = s->estimates_bounds && e->is_bound[i] ? 0.0f : 1.0f;
         if (!environment_pixel_is_seen(e, i))
-            kept = (is_whole ? 1.0f : light_sky_kept(s, i)) * (1.0f - follows_bounds(s, half));
+            kept = light_sky_kept(s, i) * (1.0f - follows_bounds(s, half));
         for (size_t c = 0; c < 3; c++)
             map->pixel[3 * i + c] *= kept;
     }

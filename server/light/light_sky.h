@@ -23,7 +23,7 @@ struct light_sky {
     float *angle;                          /* [map height][map width] to what is seen; NULL: nothing is; owned */
     const struct surround *surround; /* in place of unseen sky beyond what lies beside seen directions; NULL: none;
                                             * borrowed */
-    bool is_dark;                    /* there is no unseen light but what the map has */
+    bool is_dark;                    /* nothing comes from where no photograph looks */
     double fill[SKY_CELLS];          /* mean radiance of the fill about each cell; 0: there is none */
     bool estimates_bounds;           /* saturated directions are sources; else their bounds are known light */
     /* Of each half (environment.h): the part of the seen directions that saturates, -1: none is seen; and their mean. */

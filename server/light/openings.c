@@ -99,39 +99,39 @@ static void name_opening(struct mesh *mesh, struct segments *segments, int64_t i
     (*name)[id] = mem_strdup("opening");
 }
 
-static void add_surface(struct reconstruction *r, const struct surround *s, const struct opening_candidate *chosen,
-                        size_t count) {
+/* Adds a cell as a segment, the last one; returns its number. */
+static uint32_t add_segment(struct reconstruction *r, const struct surround *s, size_t cell) {
     struct segments *segments = &r->segments;
     int64_t id = -1;
+    vec3 corner[4];
     for (size_t i = 0; i < segments->count; i++)
         id = segments->id[i] > id ? segments->id[i] : id;
-    reserve(&r->scene->mesh, segments, count);
+    reserve(&r->scene->mesh, segments, 1);
+    surround_corners(s, cell, corner);
+    add_cell(&r->scene->mesh, segments, corner, id + 1);
+    name_opening(&r->scene->mesh, segments, id + 1);
+    return (uint32_t)segments->count - 1;
+}
+
+/* Adds what photographs look at, and then the openings; returns the number of cells. */
+static size_t add_surface(struct reconstruction *r, const struct surround *s, const struct opening_candidate *chosen,
+                          size_t count) {
+    size_t seen = 0;
+    for (size_t k = 0; k < SURROUND_CELLS; k++) {
+        if (s->is_seen[k])
+            add_segment(r, s, k), seen++;
+    }
     for (size_t i = 0; i < count; i++) {
-        vec3 corner[4];
-        surround_corners(s, chosen[i].cell, corner);
         rgb radiance = rgb_gray((float)chosen[i].radiance);
+        uint32_t segment = add_segment(r, s, chosen[i].cell);
         r->light.source[r->light.source_count++] =
-            (struct estimated_source){ESTIMATED_OPENING, (uint32_t)segments->count, radiance, (float)chosen[i].error};
-        add_cell(&r->scene->mesh, segments, corner, ++id);
-        name_opening(&r->scene->mesh, segments, id);
+            (struct estimated_source){ESTIMATED_OPENING, segment, radiance, (float)chosen[i].error};
     }
     r->opening_count = count;
+    return seen + count;
 }
 
 /* --- the whole --------------------------------------------------------------------------------------------- */
-
-/* Of the unseen sky what lies beside seen directions is kept. */
-static void darken_sky(struct reconstruction *r, const struct light_sky *sky) {
-    struct environment *e = &r->environment;
-    if (!e->map.pixel)
-        return;
-    for (size_t i = 0; i < environment_pixel_count(e); i++) {
-        for (size_t c = 0; c < 3 && !environment_pixel_is_seen(e, i); c++)
-            e->map.pixel[3 * i + c] *= light_sky_kept(sky, i);
-    }
-    environment_update_figures(e);
-    world_set_environment(&r->world, &e->map, r->pool);
-}
 
 size_t openings_find(struct reconstruction *r, const struct views *views) {
     struct light_model m;
@@ -146,8 +146,8 @@ size_t openings_find(struct reconstruction *r, const struct views *views) {
     light_model_survey(&m, views, NULL, NULL);
     joint_fit_solve(&m.fit, JOINT_STEPS);
     size_t count = choose(&m, chosen);
-    darken_sky(r, &m.sky);
     light_model_release(&m);
-    add_surface(r, &surround, chosen, count);
-    return count;
+    environment_release(&r->environment);
+    world_set_environment(&r->world, NULL, r->pool);
+    return add_surface(r, &surround, chosen, count);
 }

@@ -172,8 +172,9 @@ static enum status remake_surface(struct prepare *p, const float *density, struc
     return STATUS_OK;
 }
 
-/* Makes the atlas again, with the split segments and a density by visibility. */
-static enum status remap_surface(struct prepare *p, bool has_split, struct error *err) {
+/* Makes the atlas again, with the split segments and a density by visibility; so many triangles at the end of the mesh
+ * are coarse, be they seen. */
+static enum status remap_surface(struct prepare *p, bool has_split, size_t coarse, struct error *err) {
     struct reconstruction *r = p->r;
     bool even = settings_number(r->settings, "texels_per_metre") > 0.0;
     if (even && !has_split)
@@ -181,6 +182,9 @@ static enum status remap_surface(struct prepare *p, bool has_split, struct error
     float *density = even ? NULL : mem_array(r->scene->mesh.triangle_count, sizeof *density);
     if (density)
         texel_density_from_views(p->views, &r->atlas, r->pool, density);
+    size_t count = r->scene->mesh.triangle_count;
+    for (size_t t = count - coarse; t < count && density; t++)
+        density[t] = TEXEL_DENSITY_UNSEEN;
     enum status status = remake_surface(p, density, err);
     mem_free(density);
     return status;
@@ -361,7 +365,7 @@ enum status prepare_run(struct reconstruction *r, struct views *views, const str
         return status;
     status = measure_photographs(p, err);
     if (status == STATUS_OK)
-        status = remap_surface(p, split_bright_parts(p), err);
+        status = remap_surface(p, split_bright_parts(p), 0, err);
     add_prepare_figures(p);
     pace_measure_room(p->pace, r->scene, &r->inverse);
     advance(p, 1.0 - MAP_SHARE - VIEWS_SHARE - CALIBRATE_SHARE);
@@ -370,10 +374,10 @@ enum status prepare_run(struct reconstruction *r, struct views *views, const str
     return status == STATUS_OK ? find_grey_card(r, err) : status;
 }
 
-enum status prepare_again(struct reconstruction *r, struct views *views, struct error *err) {
+enum status prepare_again(struct reconstruction *r, struct views *views, size_t coarse, struct error *err) {
     struct prepare prepare = {.r = r, .views = views};
     enum status status = remake_surface(&prepare, NULL, err);
     if (status == STATUS_OK)
-        status = remap_surface(&prepare, false, err);
+        status = remap_surface(&prepare, false, coarse, err);
     return status == STATUS_OK ? find_grey_card(r, err) : status;
 }

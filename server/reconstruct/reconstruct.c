@@ -75,13 +75,14 @@ static enum status prepare(struct stage_run *run, struct error *err) {
     return prepare_run(run->r, &run->views, &run->pace, err);
 }
 
-/* Adds the surfaces by which light comes in, and fuses again what photographs show. */
+/* Adds the surfaces from which light comes in where a scan lacks some, and fuses again what photographs show. */
 static enum status find_openings(struct stage_run *run, struct error *err) {
     struct reconstruction *r = run->r;
-    if (openings_find(r, &run->views) == 0)
+    size_t cells = openings_find(r, &run->views);
+    if (cells == 0)
         return STATUS_OK;
     fused_release(&r->fused);
-    enum status status = prepare_again(r, &run->views, err);
+    enum status status = prepare_again(r, &run->views, OPENINGS_TRIANGLES * cells, err);
     if (status == STATUS_OK)
         fuse(&r->fused, &run->views, &r->noise, &r->atlas, &r->inverse, r->pool);
     return status;
