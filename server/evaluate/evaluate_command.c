@@ -77,7 +77,7 @@ int evaluate_command(int argc, char **argv) {
     bool as_json = options_flag(&a, "json");
     options_release(&a);
     if (status != STATUS_OK) {
-        fprintf(stderr, "unbaked evaluate: %s\n", err.message);
+        fprintf(stderr, "unbaked evaluate: %s%s%s\n", err.message, *err.hint ? "; " : "", err.hint);
         return EXIT_FAILURE;
     }
     if (as_json) {

@@ -298,6 +298,8 @@ static enum status run_open(struct relight_state *r, struct error *err) {
     enum status status = check_denoiser(r, err);
     if (status == STATUS_OK)
         status = mesh_file_read(scene, scene, MESH_MAX_TRIANGLES, &mesh, NULL, err);
+    if (status == STATUS_NOT_FOUND)
+        error_hint(err, "give a folder that `unbake get` has filled with a job's outputs");
     if (status == STATUS_OK)
         status = cameras_read(r->job, mesh.offset, &r->views, err);
     if (status == STATUS_OK)

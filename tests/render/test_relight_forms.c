@@ -360,6 +360,11 @@ static void test_lights(void) {
     CHECK_STRING(err.message, "setting light.9: the room has segments 0 to 5");
     CHECK(relit_picture(dir, "{\"remove\":\"door\",\"format\":\"exr\"}", pool, &one, &err) == STATUS_INPUT);
     CHECK(relit_picture(dir, "{\"denoise\":true,\"format\":\"exr\"}", pool, &one, &err) == STATUS_UNAVAILABLE);
+    char *scene = file_join(dir, "scene.ply");
+    CHECK(remove(scene) == 0);
+    CHECK(relit_picture(dir, "{\"format\":\"exr\"}", pool, &one, &err) == STATUS_NOT_FOUND);
+    CHECK_THAT(strstr(err.hint, "`unbake get`"), "%s; %s", err.message, err.hint);
+    mem_free(scene);
     relit_remove(dir);
 }
 
