@@ -88,9 +88,8 @@ static enum status add_settings(const struct options *a, cJSON *settings, struct
 static enum status check_room(const char *outputs, const cJSON *settings, cJSON *problems) {
     const struct relight_job job = {.outputs = outputs, .settings = settings};
     cJSON *report = files_report(&job), *cameras = cameras_own(&job);
-    enum status status =
-        render_settings_check_room(settings, cJSON_GetObjectItemCaseSensitive(report, "segments"),
-                                   cJSON_GetObjectItemCaseSensitive(cameras, "frames"), problems, NULL);
+    enum status status = render_settings_check_room(
+        settings, report->child ? report : NULL, cJSON_GetObjectItemCaseSensitive(cameras, "frames"), problems, NULL);
     cJSON_Delete(report);
     cJSON_Delete(cameras);
     return status;

@@ -51,6 +51,11 @@ try hdr 25 0.1 2
     fail "relit it is not near the truth"
 "$build/unbaked" relight "$work/hdr.out" --set light.99=off --view 99 --out "$work/none.png" 2>"$work/none"
 equal "$? $(grep -c 'setting light.99\|setting view' "$work/none")" "2 2" "relight of what the room has not"
+mkdir "$work/told"
+cp "$work/hdr.out"/*.exr "$work/hdr.out/scene.ply" "$work/hdr.out/views.json" "$work/told"
+jq '.luminance_per_unit = {"cd_per_m2": 100}' "$work/hdr.out/report.json" >"$work/told/report.json"
+"$build/unbaked" relight "$work/told" --set unit=nits --set size=8x6 --spp 1 --out "$work/nits.exr" --quiet 2>"$work/none" ||
+    fail "relight in nits where the report knows the unit: $(cat "$work/none")"
 "$build/unbaked" relight "$work/hdr.out" --view 0 --out "$work/none.jpg" 2>"$work/none"
 equal "$? $(grep -c 'pictures are .png' "$work/none")" "2 1" "relight into another format"
 [ ! -e "$work/none.jpg" ] || fail "a folder with the name of a picture"
