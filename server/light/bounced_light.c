@@ -21,7 +21,6 @@ struct particle {
 struct tracing {
     const struct reconstruction *r;
     const float *albedo;
-    const bool *is_lamp;
     float power; /* of the segment at radiance 1: pi times its area */
     size_t disc_count;
     struct segment_light_disc *disc; /* [BOUNCED_MOST] */
@@ -34,14 +33,14 @@ static struct accel_ray cosine_ray(const struct surface_point *at, uint32_t key,
     return (struct accel_ray){accel_offset(at->position, at->normal, direction), 0.0f, direction, INFINITY};
 }
 
-/* Where a particle is reflected; false where it escapes or meets a surface that photographs show, or a lamp. */
+/* Where a particle is reflected; false where it escapes or meets a surface that photographs show. */
 static bool meet_unseen(const struct tracing *t, const struct accel_ray *ray, const struct accel_hit *hit,
                         struct surface_point *at) {
     if (hit->triangle == ACCEL_NONE)
         return false;
     const struct world_triangle *met = &t->r->world.triangle[hit->triangle];
     bool is_front = vec3_dot(met->normal, ray->direction) < 0.0f;
-    if (t->is_lamp[met->segment] || (is_front && t->r->fused.count[incident_texel(&t->r->world, hit)] > 0.0f))
+    if (is_front && t->r->fused.count[incident_texel(&t->r->world, hit)] > 0.0f)
         return false;
     vec3 normal = is_front ? met->normal : vec3_neg(met->normal);
     *at = (struct surface_point){.triangle = hit->triangle, .normal = normal, .shading = normal};
@@ -81,9 +80,9 @@ static void trace(struct tracing *t, const struct segment_light_disc *from, size
     }
 }
 
-size_t bounced_light_find(const struct segment_light *light, uint32_t segment, const float *albedo, const bool *is_lamp,
+size_t bounced_light_find(const struct segment_light *light, uint32_t segment, const float *albedo,
                           struct segment_light_disc disc[BOUNCED_MOST]) {
-    struct tracing t = {light->r, albedo, is_lamp, BSDF_PI * light->area_m2[segment], 0, disc};
+    struct tracing t = {light->r, albedo, BSDF_PI * light->area_m2[segment], 0, disc};
     struct segment_light_disc from[PARTICLES];
     trace(&t, from, segment_light_spread(light, segment, PARTICLES, from), sampler_key(KEY_PARTICLES, segment, 0));
     return t.disc_count;

@@ -9,10 +9,9 @@
 #include "server/light/segment_light.h"
 
 /* Discs that stand for all reflections, by unseen surfaces, of a radiance of 1 from the front of a segment;
- * BOUNCED_MOST at most, their number is the result. albedo[segment_count] is that of unseen surfaces; segments of
- * is_lamp[segment_count] reflect nothing. */
+ * BOUNCED_MOST at most, their number is the result. albedo[segment_count]: of unseen surfaces, lamps among them. */
 #define BOUNCED_MOST 1024
-size_t bounced_light_find(const struct segment_light *light, uint32_t segment, const float *albedo, const bool *is_lamp,
+size_t bounced_light_find(const struct segment_light *light, uint32_t segment, const float *albedo,
                           struct segment_light_disc disc[BOUNCED_MOST]);
 
 #endif

@@ -147,7 +147,7 @@ static void allow_for_highlights(struct light_model *m) {
 /* Discs of what unseen surfaces reflect of a hidden lamp; the first result is the caller's. */
 static struct segment_light_disc *find_bounced(const struct light_model *m, uint32_t segment, size_t *count) {
     struct segment_light_disc *disc = mem_array(BOUNCED_MOST, sizeof *disc);
-    *count = bounced_light_find(&m->lamps.light, segment, m->albedo, m->lamps.is_lamp, disc);
+    *count = bounced_light_find(&m->lamps.light, segment, m->albedo, disc);
     return disc;
 }
 

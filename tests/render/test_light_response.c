@@ -167,12 +167,10 @@ static float *bounced_at(const struct rig *g, const struct light_point *point, s
     struct segment_light light;
     struct segment_light_disc *disc = mem_array(BOUNCED_MOST, sizeof *disc);
     float *lit = mem_calloc(count + 1, sizeof *lit), albedo[OBJECTS] = {0};
-    bool is_lamp[OBJECTS] = {0};
     size_t lamp = segment_of(g, LAMP);
     segment_light_init(&light, &g->r);
     albedo[segment_of(g, object)] = albedo_of;
-    is_lamp[lamp] = true;
-    size_t discs = bounced_light_find(&light, (uint32_t)lamp, albedo, is_lamp, disc);
+    size_t discs = bounced_light_find(&light, (uint32_t)lamp, albedo, disc);
     segment_light_add_discs(&light, point, count, disc, discs, lit);
     segment_light_release(&light);
     mem_free(disc);
