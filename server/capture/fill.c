@@ -4,6 +4,7 @@
 #include <math.h>
 #include <stddef.h>
 
+#include "common/cholesky_band.h"
 #include "common/mem.h"
 #include "common/vec.h"
 #include "server/scene/latlong.h"
@@ -12,9 +13,8 @@
  * a sun is not to be spread over what is unknown. */
 #define LUMINANCE_LIMIT 4.0 /* +25 %: no change */
 #define SWEEPS 32           /* of Gauss-Seidel after pull-push: smooths its blocks over 32 pixels; +25 %: no change */
-/* Weight of a row for another: distance to the power of minus this. Nearly the nearest row, without steps: at 1.1 times
- * its distance a tenth of its weight. */
-#define ROW_FALLOFF 24.0 /* +25 %: no change */
+/* Weight of the pull of neighbouring rows to each other over that of a pixel: decides only where no row is known. */
+#define ROWS_ALIKE 1e-3
 
 /* Solid angle of a pixel, by its index. */
 static double angle_of(const struct image *map, size_t pixel) {
@@ -43,34 +43,63 @@ static rgb below_limit(const struct image *map, size_t pixel, double limit) {
     return luminance > limit ? rgb_scale(color, (float)(limit / luminance)) : color;
 }
 
-/* --- means of rows ---------------------------------------------------------------------------------- */
+/* --- the profile -------------------------------------------------------------------------------------- */
 
-/* Row means: of the known pixels of a row and, where there are few or none, of the rows around it by inverse distance
- * (Shepard 1968). [height]; the caller's. */
+/* The colour of each row, p: minimises
+ *
+ *   sum over pairs of known pixels, one above the other in rows y and y + 1, of (p(y + 1) - p(y) - their difference)^2
+ *   + 1 / height^2 sum over known pixels of (p(y) - pixel)^2 + a weak pull of neighbouring rows to each other
+ *
+ * Each row shows directions of its own, and sky is brighter on one side than on the other. The differences of rows
+ * within the same columns tell how it changes with height; means only tell how bright it is on the whole. */
+struct profile {
+    size_t height;
+    double (*matrix)[2]; /* [height] a row's entry to the left of the diagonal, and on it; owned */
+    double *right;       /* [3][height] owned */
+};
+
+static void pull_to_each_other(struct profile *p, size_t row, double weight, const float *difference) {
+    p->matrix[row][1] += weight;
+    p->matrix[row + 1][0] -= weight;
+    p->matrix[row + 1][1] += weight;
+    for (size_t c = 0; c < 3; c++) {
+        p->right[c * p->height + row] -= weight * (double)difference[c];
+        p->right[c * p->height + row + 1] += weight * (double)difference[c];
+    }
+}
+
+static void add_pixel(struct profile *p, const struct image *map, const struct image *known, size_t i, double limit) {
+    size_t row = i / map->width, below = i + map->width, channels = known->channel_count;
+    double anchor = 1.0 / ((double)p->height * (double)p->height);
+    if (!(known->pixel[i * channels] > 0.0f))
+        return;
+    rgb color = below_limit(map, i, limit);
+    p->matrix[row][1] += anchor;
+    for (size_t c = 0; c < 3; c++)
+        p->right[c * p->height + row] += anchor * (double)(&color.r)[c];
+    if (row + 1 < p->height && known->pixel[below * channels] > 0.0f) {
+        rgb differs = rgb_sub(below_limit(map, below, limit), color);
+        pull_to_each_other(p, row, 1.0, &differs.r);
+    }
+}
+
+/* [height]; the caller's. */
 static rgb *row_colors(const struct image *map, const struct image *known, double limit) {
-    uint32_t width = map->width, height = map->height;
-    double(*sum)[4] = mem_calloc(height, sizeof *sum); /* by solid angle: red, green, blue, all */
-    rgb *color = mem_array(height, sizeof *color);
-    for (size_t i = 0; i < (size_t)width * height; i++) {
-        if (!(known->pixel[i * known->channel_count] > 0.0f))
-            continue;
-        rgb c = below_limit(map, i, limit);
-        double angle = angle_of(map, i), *s = sum[i / width];
-        s[0] += angle * (double)c.r;
-        s[1] += angle * (double)c.g;
-        s[2] += angle * (double)c.b;
-        s[3] += angle;
+    struct profile p = {map->height, mem_calloc(map->height, sizeof *p.matrix),
+                        mem_calloc(3 * (size_t)map->height, sizeof *p.right)};
+    rgb *color = mem_array(map->height, sizeof *color);
+    for (size_t i = 0; i < (size_t)map->width * map->height; i++)
+        add_pixel(&p, map, known, i, limit);
+    for (size_t y = 0; y + 1 < p.height; y++)
+        pull_to_each_other(&p, y, ROWS_ALIKE / ((double)p.height * (double)p.height), (const float[3]){0});
+    cholesky_band_factor(p.height, 1, &p.matrix[0][0]);
+    for (size_t c = 0; c < 3; c++) {
+        cholesky_band_solve(p.height, 1, &p.matrix[0][0], p.right + c * p.height);
+        for (size_t y = 0; y < p.height; y++)
+            (&color[y].r)[c] = (float)p.right[c * p.height + y];
     }
-    for (uint32_t y = 0; y < height; y++) {
-        double total[4] = {0.0};
-        for (uint32_t of = 0; of < height; of++) {
-            double rows = fmax(fabs((double)of - (double)y), 0.5), nearness = pow(rows, -ROW_FALLOFF);
-            for (int k = 0; k < 4; k++)
-                total[k] += nearness * sum[of][k];
-        }
-        color[y] = rgb_make((float)(total[0] / total[3]), (float)(total[1] / total[3]), (float)(total[2] / total[3]));
-    }
-    mem_free(sum);
+    mem_free(p.right);
+    mem_free(p.matrix);
     return color;
 }
 

@@ -81,8 +81,37 @@ static void check_horizon(void) {
     image_release(&known);
 }
 
+/* A sky twice as bright on one side as on the other, of which photographs show 20 rows of the bright side, and of the
+ * dark side the 12 rows above them, too: above what is known of the bright side it is as bright as there. */
+static void check_sides(void) {
+    static const char *const channels[] = {"count"};
+    struct image map, known;
+    float worst = 0.0f;
+    image_init_rgb(&map, WIDTH, HEIGHT);
+    image_init(&known, WIDTH, HEIGHT, 1, channels);
+    for (size_t i = 0; i < WIDTH * HEIGHT; i++) {
+        size_t x = i % WIDTH, y = i / WIDTH;
+        bool is_dark_side = x >= WIDTH / 4;
+        rgb color = rgb_scale(sky_or_ground(y), is_dark_side ? 0.5f : 1.0f);
+        known.pixel[i] = (x < WIDTH / 8 && y >= HEIGHT / 2 - 10 && y < HEIGHT / 2 + 10) ||
+                         (x >= WIDTH / 4 && x < WIDTH / 4 + 6 && y >= HEIGHT / 2 - 22 && y < HEIGHT / 2 + 10);
+        for (size_t c = 0; c < 3; c++)
+            map.pixel[3 * i + c] = known.pixel[i] > 0.0f ? (&color.r)[c] : 0.0f;
+    }
+    fill_sphere(&map, &known);
+    for (size_t y = HEIGHT / 2 - 20; y < HEIGHT / 2 - 10; y++) {
+        for (size_t x = WIDTH / 32; x < WIDTH / 8 - 2; x++)
+            worst = fmaxf(worst, fabsf(map.pixel[3 * (y * WIDTH + x)] / sky_or_ground(y).r - 1.0f));
+    }
+    printf("above what is known of the brighter side: %.2f off\n", (double)worst);
+    CHECK_THAT(worst < 0.25f, "%g", (double)worst);
+    image_release(&map);
+    image_release(&known);
+}
+
 int main(void) {
     check_angles();
     check_horizon();
+    check_sides();
     return check_result();
 }
