@@ -164,6 +164,9 @@ rgb irradiance_diffuse(const struct irradiance *irradiance, vec3 shading, float 
     return rgb_make(out[0], out[1], out[2]);
 }
 
+/* irradiance_diffuse with F(wo) = 0 and m = c. */
+float irradiance_matt(float cosine) { return 1.0f + bsdf_schlick(cosine) * (0.5f + cosine); }
+
 /* The terms of irradiance_diffuse averaged over view directions of density cos / pi, under which 1, wo, F(wo), F(wo) wo
  * have means 1, 2/3 n, 1/21, 1/84 n, and F(wo) wo wo^T is 1/252 along n and 11/504 across it. */
 rgb irradiance_diffuse_mean(const struct irradiance *irradiance, vec3 shading, float roughness) {

@@ -37,6 +37,10 @@ static inline rgb irradiance_flux(const struct irradiance *irradiance) {
 /* Radiance that the diffuse lobe with base colour 1 reflects towards unit `wo`. */
 rgb irradiance_diffuse(const struct irradiance *irradiance, vec3 shading, float roughness, vec3 wo);
 
+/* The same towards the normal, at roughness 1, of light at a cosine to it, over what a Lambertian surface would send:
+ * more where light grazes the surface, 1.5 at most. */
+float irradiance_matt(float cosine);
+
 /* Its cosine-weighted mean over view directions: radiosity over pi. */
 rgb irradiance_diffuse_mean(const struct irradiance *irradiance, vec3 shading, float roughness);
 

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "common/mem.h"
+#include "server/gather/irradiance.h"
 #include "server/gather/sun.h"
 #include "server/render/sampler.h"
 
@@ -74,7 +75,8 @@ static void set_guesses_apart(const struct gathering *g, struct incident *in, st
         if (!is_front || r->fused.count[texel] > 0.0f || r->world.lights->area_density[t->segment] > 0.0f ||
             (g->survey->field.specular_only && g->survey->field.specular_only[t->segment]))
             continue;
-        rgb radiance = rgb_scale(rgb_from_half(g->survey->field.radiance[texel]), 1.0f / SURVEY_RAYS);
+        float matt = irradiance_matt(vec3_dot(in->direction[i], p->at.shading));
+        rgb radiance = rgb_scale(rgb_from_half(g->survey->field.radiance[texel]), matt / SURVEY_RAYS);
         vec3 place = vec3_mad(in->ray[i].origin, hit->distance_m, in->direction[i]);
         float *of_region = light[light_points_region(g->points, place)];
         for (size_t c = 0; c < 3; c++)
@@ -100,8 +102,10 @@ static void look_at_sky(const struct gathering *g, struct incident *in, struct l
     incident_cosine_rays(&p->at, key, SKY_RAYS, in->shadow);
     accel_occluded_many(accel, SKY_RAYS, in->shadow, in->occluded);
     for (size_t i = 0; i < SKY_RAYS; i++) {
-        if (!in->occluded[i] && vec3_dot(in->shadow[i].direction, p->at.normal) > 0.0f)
-            light_sky_add_ray(g->sky, p->at.position, in->shadow[i].direction, 1.0f / SKY_RAYS, cell, p->saturated);
+        vec3 d = in->shadow[i].direction;
+        if (!in->occluded[i] && vec3_dot(d, p->at.normal) > 0.0f)
+            light_sky_add_ray(g->sky, p->at.position, d, irradiance_matt(vec3_dot(d, p->at.shading)) / SKY_RAYS, cell,
+                              p->saturated);
     }
     for (size_t k = 0; k < LIGHT_CELLS; k++)
         p->escaping += cell[k];

@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "common/mem.h"
+#include "server/gather/irradiance.h"
 #include "server/render/bsdf.h"
 
 /* Inverse powers of the plastic number: the sequence of least discrepancy of its kind in the plane. */
@@ -38,7 +39,7 @@ static float disc_light(const struct surface_point *from, const struct surface_p
     float square = vec3_dot(way, way), scale = 1.0f / sqrtf(fmaxf(square, 1e-20f));
     float here = vec3_dot(way, to->shading) * scale, there = -vec3_dot(way, from->normal) * scale;
     bool in_front = here > 0.0f && there > 0.0f && vec3_dot(way, to->normal) > 0.0f;
-    return in_front ? area_m2 * here * there / (BSDF_PI * square + area_m2) : 0.0f;
+    return in_front ? irradiance_matt(here) * area_m2 * here * there / (BSDF_PI * square + area_m2) : 0.0f;
 }
 
 static bool is_between(const struct accel *accel, const struct surface_point *from, const struct surface_point *to) {

@@ -130,7 +130,8 @@ static void shine_on(void *user, size_t index, int thread) {
     struct sun_search *s = user;
     struct light_place *p = &s->places.place[index];
     p->open = sun_visibility(&s->sun, s->r->world.accel, &p->at, s->rays);
-    p->lit = p->open > 0.0f ? p->open * vec3_dot(s->sun.direction, p->at.shading) : 0.0f;
+    float cosine = vec3_dot(s->sun.direction, p->at.shading);
+    p->lit = p->open > 0.0f ? p->open * cosine * irradiance_matt(cosine) : 0.0f;
 }
 
 /* Reduction of misfit by a sun in a direction. */

@@ -59,7 +59,8 @@ static void place_texel(void *user, size_t index, int thread) {
     p->shown = rgb_clamp(rgb_mul(measured_value(m), white), 0.0f, INFINITY);
     p->white = rgb_clamp(rgb_sub(white, of_sun), 0.0f, INFINITY);
     p->open = sun_visibility(d->sun, d->accel, &p->at, 0);
-    p->lit = p->open * vec3_dot(d->sun->direction, p->at.shading);
+    float cosine = vec3_dot(d->sun->direction, p->at.shading);
+    p->lit = p->open * cosine * irradiance_matt(cosine);
 }
 
 static void find_places(struct divide *d, struct light_places *places) {

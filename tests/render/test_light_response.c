@@ -103,11 +103,47 @@ static struct light_point *floor_points(const struct rig *g, size_t *count) {
     return point;
 }
 
-/* L r^2 h / d^3: exact for a sphere wholly above the floor. */
+/* L r^2 h / d^3, exact for a sphere wholly above the floor; times what the diffuse lobe sends more of grazing light. */
 static float sphere_over(vec3 p) {
     vec3 way = vec3_sub(centre, p);
-    float square = vec3_dot(way, way);
-    return RADIUS * RADIUS * way.y / (square * sqrtf(square));
+    float square = vec3_dot(way, way), far_m = sqrtf(square);
+    return irradiance_matt(way.y / far_m) * RADIUS * RADIUS * way.y / (square * far_m);
+}
+
+/* What a lamp sends as a source is what it sends as known light, also where it grazes the surface. */
+static void test_grazing(void) {
+    struct rig g = {0};
+    struct segment_light light;
+    double sum[2] = {0.0, 0.0};
+    start_room(&g.scene.mesh, 6);
+    add_quad(&g.scene.mesh, LAMP, (vec3){0, 0.2f, 1}, (vec3){0, 0.2f, 0}, (vec3){0, 0, 1});
+    rig_init(&g);
+    segment_light_init(&light, &g.r);
+    size_t count, lamp = 0;
+    struct light_point *point = floor_points(&g, &count);
+    float *lit = mem_calloc(count + 1, sizeof *lit);
+    for (size_t s = 0; s < g.r.segments.count; s++)
+        lamp = g.r.segments.id[s] == LAMP ? s : lamp;
+    segment_light_add(&light, point, count, (uint32_t)lamp, SEGMENT_LIGHT_POINTS, lit);
+    g.r.materials.emission[lamp] = rgb_gray(1.0f);
+    world_update_lights(&g.r.world);
+    struct light_field field = {&g.r.world, (const uint16_t(*)[3])g.r.fused.radiance, NULL, NULL};
+    struct incident *in = mem_array(1, sizeof *in);
+    for (size_t i = 0; i < count; i += 4) {
+        struct irradiance known;
+        if (point[i].at.position.x < 1.0f)
+            continue;
+        irradiance_gather(&known, in, &field, &point[i].at, (uint32_t)i, 256);
+        sum[0] += (double)lit[i];
+        sum[1] += (double)irradiance_diffuse(&known, point[i].at.shading, 1.0f, point[i].at.shading).g;
+    }
+    printf("grazing: %.3f of what is gathered\n", sum[0] / sum[1]);
+    CHECK_NEAR(sum[0] / sum[1], 1.0, 0.05);
+    mem_free(in);
+    mem_free(lit);
+    mem_free(point);
+    segment_light_release(&light);
+    rig_release(&g);
 }
 
 static void test_sphere(void) {
@@ -198,7 +234,9 @@ static void test_ceiling(void) {
             hidden++;
         } else if (point[i].at.position.x < WALL_AT - 0.1f) {
             sum[0] += (double)lit[i];
-            sum[1] += (double)(CEILING_ALBEDO * LAMP_SIDE * LAMP_SIDE * way.y * way.y) / (PI * square * square);
+            sum[1] += (double)(irradiance_matt(way.y / sqrtf((float)square)) * CEILING_ALBEDO * LAMP_SIDE * LAMP_SIDE *
+                               way.y * way.y) /
+                      (PI * square * square);
         }
     }
     CHECK(hidden > 100 && count - hidden > 100);
@@ -282,7 +320,8 @@ static double hole_factors(vec3 p, double cell[SKY_CELLS]) {
                    1.0f + HOLE * ((float)(i / PARTS) + 0.5f) / PARTS};
         vec3 way = vec3_sub(at, p);
         double square = (double)vec3_dot(way, way);
-        double factor = area * (double)(way.y * way.y) / (PI * square * square);
+        double factor = (double)irradiance_matt(way.y / sqrtf((float)square)) * area * (double)(way.y * way.y) /
+                        (PI * square * square);
         struct sky_corners c = sky_cells_around(vec3_normalize(way));
         for (int k = 0; k < 4; k++)
             cell[c.cell[k]] += factor * (double)c.weight[k];
@@ -473,6 +512,7 @@ static void test_surround(void) {
 
 int main(void) {
     test_sphere();
+    test_grazing();
     test_ceiling();
     test_box();
     test_sky();

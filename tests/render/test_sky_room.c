@@ -208,6 +208,7 @@ static void test_mostly_unseen(struct parallel *pool) {
 }
 
 int main(void) {
+    photograph_samples = 64;
     struct open_room room;
     open_room_init(&room);
     test_reconstruction(&room.scene, &room.masked, room.pool);
