@@ -21,6 +21,8 @@
 /* Least part of a segment's observations that are not outshone by their surroundings. Lamps in a row outshine each
  * other in many. */
 #define MIN_OWN_PART 0.25f
+/* Standard errors by which the mean of the looks must be below what most of them show. */
+#define SURELY_LESS 2.0f
 /* Segments this many times brighter than the median of the room outshine it. */
 #define BRIGHT 4.0f
 
@@ -37,14 +39,59 @@ struct channel_values {
     size_t count;
 };
 
+/* Looks where nothing saturates, and what was fused at their texels: sums. */
+struct looks {
+    double radiance[3];
+    double look, fused, look_look, look_fused, fused_fused; /* of the channels' means, and of products of these */
+    size_t count;
+};
+
 /* What the looks of one class of distance from an edge (views_edge) show. */
 struct shown_values {
     struct channel_values channel[3];
+    struct looks looks;
     size_t outshone_count; /* looks left out since something beside was as bright */
 };
 
 static void add_value(struct channel_values *v, float radiance, bool saturated) {
     v->value[v->count++] = (struct bounded){radiance, saturated};
+}
+
+static void add_look(const struct reconstruction *r, uint32_t texel, const struct photograph_sample *s,
+                     struct looks *looks) {
+    double fused =
+        r->fused.radiance && !r->fused.is_bound[texel] ? (double)rgb_mean(fused_radiance(&r->fused, texel)) : 0.0;
+    double look = (double)rgb_mean(s->radiance);
+    if (!(fused > 0.0) || photograph_sample_saturates(s))
+        return;
+    looks->look += look;
+    looks->fused += fused;
+    looks->look_look += look * look;
+    looks->look_fused += look * fused;
+    looks->fused_fused += fused * fused;
+    for (int c = 0; c < 3; c++)
+        looks->radiance[c] += (double)(&s->radiance.r)[c];
+    looks->count++;
+}
+
+/* Whether the mean of the looks is surely less than what most of them show, fused radiance: something that the mesh
+ * lacks, such as the bars of a window, stands before the surface in some. The standard error is that of a ratio of sums
+ * (Cochran 1977, eq. 6.13). */
+static bool is_obstructed(const struct looks *looks) {
+    if (looks->count < MIN_OBSERVATIONS)
+        return false;
+    double n = (double)looks->count, ratio = looks->look / looks->fused;
+    double squares = looks->look_look - 2.0 * ratio * looks->look_fused + ratio * ratio * looks->fused_fused;
+    double error = sqrt(fmax(squares, 0.0) * n / (n - 1.0)) / looks->fused;
+    return ratio + (double)SURELY_LESS * error < 1.0;
+}
+
+/* The mean of the looks, which is what the room gets of a lamp; not more than their median. */
+static rgb mean_radiance(const struct looks *looks, rgb median) {
+    float mean[3];
+    for (int c = 0; c < 3; c++)
+        mean[c] = fminf((float)(looks->radiance[c] / (double)looks->count), (&median.r)[c]);
+    return rgb_make(mean[0], mean[1], mean[2]);
 }
 
 /* Whether an observation of this edge class shows the surface itself. A bright window may be behind a thin frame: a
@@ -78,6 +125,7 @@ static void observe_texel(const struct evidence_job *job, uint32_t texel, struct
             shown[edge].outshone_count++;
             continue;
         }
+        add_look(r, texel, &sample, &shown[edge].looks);
         struct channel_values *channel = shown[edge].channel;
         add_value(&channel[0], sample.radiance.r, sample.saturated[0]);
         add_value(&channel[1], sample.radiance.g, sample.saturated[1]);
@@ -122,8 +170,11 @@ static void observe_segment(void *user, size_t segment, int thread) {
         e->saturated[c] = best->channel[c].count > 0 &&
                           !quantile_bounded_median(best->channel[c].value, best->channel[c].count, &value[c]);
     e->observed = rgb_make(value[0], value[1], value[2]);
+    bool is_measured = !(e->saturated[0] || e->saturated[1] || e->saturated[2]);
+    /* Near edges dark looks are left out as outshone: only those away from them tell. */
+    bool obstructed = best == shown && is_own && is_measured && is_obstructed(&shown->looks);
     if (!e->is_unbounded)
-        evidence_set_radiance(e, e->observed);
+        evidence_set_radiance(e, obstructed ? mean_radiance(&shown->looks, e->observed) : e->observed);
     mem_free(shown);
 }
 

@@ -10,7 +10,7 @@
 
 /* Radiances are by channel. */
 struct emitter_evidence {
-    rgb radiance;         /* estimated outgoing radiance; 0: not observed; set by evidence_set_radiance only */
+    rgb radiance;         /* estimated mean outgoing radiance; 0: not observed; set by evidence_set_radiance only */
     rgb observed;         /* median of the photographs; a lower bound in saturated channels */
     bool is_seen;         /* some photograph shows it, and not what is beside or behind it */
     bool only_mixed;      /* observed only in pixels that mix surfaces */
