@@ -12,6 +12,7 @@
 /* Luminance that is propagated is clamped to this many times the typical one: sky and clouds differ by less, a lamp or
  * a sun is not to be spread over what is unknown. */
 #define LUMINANCE_LIMIT 4.0 /* +25 %: no change */
+#define DARKEST 1e-3        /* of it: values below count as so bright, since logarithms are propagated */
 #define SWEEPS 32           /* of Gauss-Seidel after pull-push: smooths its blocks over 32 pixels; +25 %: no change */
 /* Weight of the pull of neighbouring rows to each other over that of a pixel: decides only where no row is known. */
 #define ROWS_ALIKE 1e-3
@@ -35,17 +36,19 @@ static double typical_luminance(const struct image *map, const struct image *kno
     return (sum / weight) * (sum / weight);
 }
 
-/* A colour, clamped to a luminance. */
+/* The logarithm of a colour that is clamped to a luminance. */
 static rgb below_limit(const struct image *map, size_t pixel, double limit) {
     const float *p = map->pixel + 3 * pixel;
     rgb color = rgb_make(p[0], p[1], p[2]);
     double luminance = (double)rgb_luminance(color);
-    return luminance > limit ? rgb_scale(color, (float)(limit / luminance)) : color;
+    float scale = luminance > limit ? (float)(limit / luminance) : 1.0f, least = (float)(limit * DARKEST);
+    return rgb_make(logf(fmaxf(scale * color.r, least)), logf(fmaxf(scale * color.g, least)),
+                    logf(fmaxf(scale * color.b, least)));
 }
 
 /* --- the profile -------------------------------------------------------------------------------------- */
 
-/* The colour of each row, p: minimises
+/* The logarithm of the colour of each row, p: minimises, of logarithms of pixels,
  *
  *   sum over pairs of known pixels, one above the other in rows y and y + 1, of (p(y + 1) - p(y) - their difference)^2
  *   + 1 / height^2 sum over known pixels of (p(y) - pixel)^2 + a weak pull of neighbouring rows to each other
@@ -105,7 +108,7 @@ static rgb *row_colors(const struct image *map, const struct image *known, doubl
 
 /* --- pull-push and diffusion ------------------------------------------------------------------------ */
 
-/* A pyramid level: difference from the row mean, and confidence from 0 to 1. */
+/* A pyramid level: difference from the row's colour, in logarithms, and confidence from 0 to 1. */
 struct fill_level {
     uint32_t width, height;
     float (*value)[4]; /* [height][width]; owned */
@@ -241,7 +244,7 @@ void fill_sphere(struct image *map, const struct image *known) {
     }
     for (size_t i = 0; i < (size_t)map->width * map->height; i++)
         for (size_t c = 0; c < 3 && level[0].value[i][3] < 1.0f; c++)
-            map->pixel[3 * i + c] = fmaxf(level[0].value[i][c] + (&row_color[i / map->width].r)[c], 0.0f);
+            map->pixel[3 * i + c] = expf(level[0].value[i][c] + (&row_color[i / map->width].r)[c]);
     for (int i = 0; i < count; i++) {
         mem_free(level[i].value);
         mem_free(level[i].angle);
