@@ -98,7 +98,7 @@ static enum status wait_for(struct waiting *w, bool any, double timeout_sec, boo
         if (*late)
             return STATUS_OK;
         if (!request_pause(w->client->request, 0, fmin(fmin(0.1 * (tries + 1), ROUND_SEC), left)))
-            return error_set(err, STATUS_CANCELLED, "interrupted; the jobs continue");
+            return STATUS_CANCELLED;
     }
 }
 
@@ -129,6 +129,8 @@ int wait_run(struct client *c, const struct options *o) {
     enum status status = read_jobs(&w, o, &reply, &err);
     if (status == STATUS_OK)
         status = wait_for(&w, options_flag(o, "any"), timeout_sec, &late, &reply, &err);
+    if (status == STATUS_CANCELLED) /* while it asked, or between */
+        error_set(&err, status, "interrupted; the jobs continue");
     if (status != STATUS_OK)
         code = client_fail(c, &reply, &err);
     else if (late)
