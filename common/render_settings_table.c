@@ -91,7 +91,9 @@ static const struct render_setting table[] = {
      "radiance of each source alone, too, as EXR: their sum is the whole"},
     {"precision", RENDER_CHOICE, "", 0, 0, 0, "half|float", "float",
      "of light, colours and normals in EXR: half takes half the space, with three digits and light up to 65504"},
-    {"remove", RENDER_TEXT, "", 0, 0, 0, NULL, "", "segments that are taken away, as numbers or names: 27,window"},
+    {"remove", RENDER_TEXT, "", 0, 0, 0, NULL, "",
+     "segments that are taken away, as numbers or names: 27,window; opening: what stands around a scan for what it lacks, and "
+     "keeps another sky out"},
     {"seed", RENDER_INT, "", 0, 9007199254740991.0, 0, NULL, "7", "names the random numbers"},
     {"segment.#.base_color", RENDER_NUMBERS, "", 0, 1, 3, NULL, "", "gives a segment another base colour"},
     {"segment.#.emission", RENDER_NUMBERS, "", 0, 1e9, 3, NULL, "", "gives a segment another emission, as radiance"},
