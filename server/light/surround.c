@@ -59,9 +59,22 @@ static void mark_seen(struct surround *s, const struct views *views, uint32_t tr
     }
 }
 
+/* Makes room for the cameras, which stand in the room, also where nothing around them was scanned: from outside they would
+ * look at the box's back. */
+static void hold_cameras(const struct scene *scene, vec3 *lower, vec3 *upper) {
+    for (size_t f = 0; f < scene->photograph_count; f++) {
+        vec3 at = camera_origin(&scene->photograph[f].camera);
+        for (size_t c = 0; c < 3; c++) {
+            (&lower->x)[c] = fminf(along(*lower, c), along(at, c));
+            (&upper->x)[c] = fmaxf(along(*upper, c), along(at, c));
+        }
+    }
+}
+
 void surround_init(struct surround *s, const struct views *views) {
     vec3 lower, upper;
     mesh_bounds(&views->scene->mesh, &lower, &upper);
+    hold_cameras(views->scene, &lower, &upper);
     vec3 size = vec3_sub(upper, lower);
     *s = (struct surround){.lower = vec3_mad(lower, -BEYOND, size), .upper = vec3_mad(upper, BEYOND, size)};
     for (uint32_t t = 0; t < views->train_count; t++)

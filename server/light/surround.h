@@ -13,7 +13,7 @@
 #define SURROUND_CELLS (6 * SURROUND_ACROSS * SURROUND_ACROSS)
 
 struct surround {
-    vec3 lower, upper;            /* corners, metres: the mesh lies inside */
+    vec3 lower, upper;            /* corners, metres: the mesh and all cameras lie inside */
     bool is_seen[SURROUND_CELLS]; /* some photograph looks at it through the mesh */
 };
 

@@ -99,7 +99,7 @@ for pass in radiance direct; do
 done
 
 # --- a worker dies in the middle of several pictures: those that are done stay, and all bytes are the same ---
-many="--set cameras=photographs --view all --size 64x48 --spp 200 --set format=both"
+many="--set cameras=photographs --view all --size 64x48 --spp 300 --set format=both"
 # shellcheck disable=SC2086
 run 0 render 1 $lamp $many -q; id=$out
 rendered() { [ "$("$build/unbake" show "$id" --json | jq '[.outputs[] | select(.name | test("radiance.exr"))] | length')" -ge "$1" ]; }

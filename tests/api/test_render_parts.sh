@@ -4,7 +4,7 @@
 set -u
 . tests/api/site.sh "$@"
 lamp="--set lamp.1.kind=sphere --set lamp.1.position=0,1,0 --set lamp.1.radius=0.3"
-many="$lamp --set cameras=photographs --view all --size 64x48 --spp 120 --set format=both"
+many="$lamp --set cameras=photographs --view all --size 64x48 --spp 200 --set format=both"
 make_room "$work/room" 8
 flags="--set threads=2 --set max_running=2 --set small_render_paths=100000 --set max_attempts=3"
 daemon_start

@@ -51,6 +51,7 @@ static void rig_release(struct rig *g) {
     mem_free(g->r.fused.is_bound);
     mem_free(g->r.fused.count);
     mem_free(g->r.fused.radiance);
+    g->model.world = g->r.world; /* as the test has left it */
     model_release(&g->model);
     scene_release(&g->scene);
     parallel_free(g->pool);

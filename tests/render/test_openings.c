@@ -29,6 +29,19 @@ static void test_cells(void) {
     CHECK_NEAR(area, 2.0 * (4.0 * 2.5 + 4.0 * 3.0 + 2.5 * 3.0), 1e-3);
 }
 
+/* Cameras stand inside, also where nothing of what is around them was scanned. */
+static void test_cameras(void) {
+    struct scene scene = {.photograph = mem_calloc(1, sizeof *scene.photograph), .photograph_count = 1};
+    struct views views = {.scene = &scene};
+    struct surround s;
+    make_mesh(&scene.mesh);
+    scene.photograph->camera = look((vec3){2.0f, 4.5f, -1.0f}, (vec3){2.0f, 0.0f, 1.0f});
+    surround_init(&s, &views);
+    CHECK(s.lower.x < 0.0f && s.lower.y < 0.0f && s.lower.z < -1.0f);
+    CHECK(s.upper.x > 4.0f && s.upper.y > 4.5f && s.upper.z > 3.0f);
+    scene_release(&scene);
+}
+
 /* --- a room ------------------------------------------------------------------------------------------------ */
 
 /* Towards floor and walls, so that none shows ceiling or lamp; every other one at the wall of which a part is missing. */
@@ -132,6 +145,7 @@ static void test_room(struct parallel *pool) {
 int main(void) {
     struct parallel *pool = parallel_new(0);
     test_cells();
+    test_cameras();
     test_room(pool);
     parallel_free(pool);
     return check_result();
