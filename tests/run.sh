@@ -43,7 +43,7 @@ without_own_threads() {
 slow_tsan="$slow_asan render/test_relight_forms render/test_sun_caustics
 unit/test_checkpoint_faults unit/test_checkpoint_parts unit/test_export unit/test_store_faults
 api/test_one_job render/test_gather unit/test_checkpoint unit/test_captures api/test_client_check unit/test_bundle unit/test_segment
-unit/test_evaluate api/test_metrics
+unit/test_evaluate api/test_metrics api/test_usd
 api/test_http_durable api/test_http_threads render/test_inserts unit/test_demo
 chaos/test_memory_faults api/test_node_tls api/test_scenes render/test_furnace
 $(cd tests && echo fuzz/test_*.c | sed 's/\.c//g') $(without_own_threads)"
