@@ -21,7 +21,8 @@ void cameras_release(struct cameras *v) {
 }
 
 static void add_view(struct cameras *v, const struct camera *camera, const char *name) {
-    v->view = mem_realloc_array(v->view, v->count + 1, sizeof *v->view);
+    if ((v->count & (v->count - 1)) == 0) /* 0 and powers of two: a path may have 100,000 views */
+        v->view = mem_realloc_array(v->view, v->count ? 2 * v->count : 1, sizeof *v->view);
     v->view[v->count++] = (struct placed_camera){*camera, mem_strdup(name)};
 }
 
