@@ -151,9 +151,7 @@ static void add_vertices(struct hole_patch *p, struct mesh *mesh) {
     uint32_t width = p->plane->columns + 1, corners = width * (p->plane->rows + 1), count = 0;
     for (uint32_t i = 0; i < corners; i++)
         count += isnan(p->height_m[i]) ? 0 : 1;
-    mesh->position = mem_realloc_array(mesh->position, mesh->vertex_count + count, sizeof *mesh->position);
-    if (mesh->normal)
-        mesh->normal = mem_realloc_array(mesh->normal, mesh->vertex_count + count, sizeof *mesh->normal);
+    mesh_reserve(mesh, count, 0);
     for (uint32_t i = 0; i < corners; i++) {
         if (isnan(p->height_m[i]))
             continue;
@@ -187,12 +185,7 @@ static void add_triangles(const struct hole_patch *p, struct mesh *mesh, struct 
     for (size_t i = 0; i < cells; i++)
         count += p->state[i] != CELL_EMPTY;
     size_t total = mesh->triangle_count + 2 * count;
-    mesh->index = mem_realloc_array(mesh->index, total, sizeof *mesh->index);
-    mesh->face = mem_realloc_array(mesh->face, total, sizeof *mesh->face);
-    if (mesh->object_id)
-        mesh->object_id = mem_realloc_array(mesh->object_id, total, sizeof *mesh->object_id);
-    if (mesh->uv)
-        mesh->uv = mem_realloc_array(mesh->uv, total, sizeof *mesh->uv);
+    mesh_reserve(mesh, 0, 2 * count);
     segments->of_triangle = mem_realloc_array(segments->of_triangle, total, sizeof *segments->of_triangle);
     for (uint32_t i = 0; i < cells; i++) {
         if (p->state[i] == CELL_EMPTY)

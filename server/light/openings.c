@@ -42,16 +42,8 @@ static size_t choose(struct light_model *m, struct opening_candidate chosen[SURR
 /* --- surface ----------------------------------------------------------------------------------------------- */
 
 static void reserve(struct mesh *mesh, struct segments *segments, size_t cells) {
-    size_t vertices = mesh->vertex_count + 4 * cells, triangles = mesh->triangle_count + 2 * cells;
-    mesh->position = mem_realloc_array(mesh->position, vertices, sizeof *mesh->position);
-    if (mesh->normal)
-        mesh->normal = mem_realloc_array(mesh->normal, vertices, sizeof *mesh->normal);
-    mesh->index = mem_realloc_array(mesh->index, triangles, sizeof *mesh->index);
-    mesh->face = mem_realloc_array(mesh->face, triangles, sizeof *mesh->face);
-    if (mesh->object_id)
-        mesh->object_id = mem_realloc_array(mesh->object_id, triangles, sizeof *mesh->object_id);
-    if (mesh->uv)
-        mesh->uv = mem_realloc_array(mesh->uv, triangles, sizeof *mesh->uv);
+    size_t triangles = mesh->triangle_count + 2 * cells;
+    mesh_reserve(mesh, 4 * cells, 2 * cells);
     segments->of_triangle = mem_realloc_array(segments->of_triangle, triangles, sizeof *segments->of_triangle);
     segments->id = mem_realloc_array(segments->id, segments->count + cells, sizeof *segments->id);
 }
@@ -85,7 +77,8 @@ static void add_cell(struct mesh *mesh, struct segments *segments, const vec3 co
     segments->id[segments->count++] = id;
 }
 
-/* Calls an id an opening, all of which have one name, by which they can be taken away; where names are kept by id: of the segments, or of the input's objects. */
+/* Calls an id an opening, all of which have one name, by which they can be taken away; where names are kept by id: of
+ * the segments, or of the input's objects. */
 static void name_opening(struct mesh *mesh, struct segments *segments, int64_t id) {
     char ***name = segments->is_given ? &mesh->name : &segments->name;
     size_t *count = segments->is_given ? &mesh->name_count : &segments->name_count;

@@ -23,8 +23,8 @@ struct emission_cone {
 
 #define MATERIALS_BY_TEXEL -1.0f /* in place of a segment's share of metal, see there */
 
-/* Relative standard deviation of base colour along plain surface where none was measured: that of a room with even walls
- * (plain_spread.h measures .008 in den, .042 in gallery, .045 in the demo room). */
+/* Relative standard deviation of base colour along plain surface where none was measured: that of a room with even
+ * walls (plain_spread.h measures .008 in den, .042 in gallery, .045 in the demo room). */
 #define MATERIALS_SPREAD 0.01f
 
 struct materials {

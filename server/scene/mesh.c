@@ -41,6 +41,20 @@ double mesh_area(const struct mesh *mesh) {
     return sum;
 }
 
+void mesh_reserve(struct mesh *mesh, size_t vertices, size_t triangles) {
+    vertices += mesh->vertex_count;
+    triangles += mesh->triangle_count;
+    mesh->position = mem_realloc_array(mesh->position, vertices, sizeof *mesh->position);
+    if (mesh->normal)
+        mesh->normal = mem_realloc_array(mesh->normal, vertices, sizeof *mesh->normal);
+    mesh->index = mem_realloc_array(mesh->index, triangles, sizeof *mesh->index);
+    mesh->face = mem_realloc_array(mesh->face, triangles, sizeof *mesh->face);
+    if (mesh->object_id)
+        mesh->object_id = mem_realloc_array(mesh->object_id, triangles, sizeof *mesh->object_id);
+    if (mesh->uv)
+        mesh->uv = mem_realloc_array(mesh->uv, triangles, sizeof *mesh->uv);
+}
+
 void mesh_bounds(const struct mesh *mesh, vec3 *lower, vec3 *upper) {
     *lower = (vec3){INFINITY, INFINITY, INFINITY};
     *upper = vec3_neg(*lower);

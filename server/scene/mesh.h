@@ -49,6 +49,9 @@ void mesh_release(struct mesh *mesh);
  * adjacent faces'. Fails when no triangle is left. `name` is for messages; report may be NULL. */
 enum status mesh_check(struct mesh *mesh, const char *name, struct mesh_report *report, struct error *err);
 
+/* Makes room for so many more vertices and triangles in the arrays that the mesh has; the counts stay. */
+void mesh_reserve(struct mesh *mesh, size_t vertices, size_t triangles);
+
 /* Swaps the second and the third corner. */
 void mesh_turn_triangle(struct mesh *mesh, size_t triangle);
 
