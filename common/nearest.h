@@ -7,9 +7,9 @@
 #include "common/buf.h"
 
 /* Offer every valid name; `best` is then the one with the fewest edits (letters changed, left out, added,
- * or swapped with their neighbours), the first of equals. Names further away than a third of the longer length plus one,
- * or than half of it, are not suggested, nor are names of more than 63 bytes; a name that begins with `typed` counts as
- * distance 1. */
+ * or swapped with their neighbours), the first of equals. Names further away than a third of the longer length plus
+ * one, or than half of it, are not suggested, nor are names of more than 63 bytes; a name that begins with `typed`
+ * counts as distance 1. */
 struct nearest {
     const char *typed; /* borrowed */
     const char *best;  /* NULL while nothing is near; borrowed */

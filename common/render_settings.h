@@ -64,8 +64,9 @@ cJSON *render_settings_describe(void);
  * `problems` (may be NULL); STATUS_INPUT if there is any. */
 enum status render_settings_check(const cJSON *object, enum render_files files, cJSON *problems, struct error *err);
 
-/* Checks settings that render_settings_check found good against the room that they are for: its report.json and the array
- * "frames" of the file that `cameras` means. Either may be NULL: what it would tell is not checked. Problems as above. */
+/* Checks settings that render_settings_check found good against the room that they are for: its report.json and the
+ * array "frames" of the file that `cameras` means. Either may be NULL: what it would tell is not checked. Problems as
+ * above. */
 enum status render_settings_check_room(const cJSON *object, const cJSON *report, const cJSON *frames, cJSON *problems,
                                        struct error *err);
 /* Whether a setting is checked against report.json. */

@@ -135,8 +135,8 @@ static bool check_value(const struct render_setting *t, const cJSON *value, enum
     return check_text(t, value->valuestring, files, why);
 }
 
-/* What settings say of one another is asked of those that are good by themselves; nothing is said of a setting where one
- * that it depends on is not good. */
+/* What settings say of one another is asked of those that are good by themselves; nothing is said of a setting where
+ * one that it depends on is not good. */
 struct settings_check {
     struct setting_faults faults;
     const cJSON *given, *good; /* good: those of `given` without a fault of their own */

@@ -1,5 +1,5 @@
-/* render_settings_room.c -- whether good settings of a render fit the room that they are for: the segments and views that
- * they name are there, and it is known how bright its radiance is where they need it (render_settings.h). */
+/* render_settings_room.c -- whether good settings of a render fit the room that they are for: the segments and views
+ * that they name are there, and it is known how bright its radiance is where they need it (render_settings.h). */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

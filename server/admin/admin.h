@@ -25,7 +25,8 @@ enum status admin_start(struct admin **admin, const char *data_dir, struct store
 void admin_stop(struct admin *admin); /* NULL is allowed */
 
 /* The command's side: asks the daemon of that folder or, if none runs, does the work and says "daemon_runs": false in
- * the reply. STATUS_NOT_FOUND, with a hint: it is no data folder. *reply is the caller's (cJSON_Delete); *fd is a file that came with it, or -1. */
+ * the reply. STATUS_NOT_FOUND, with a hint: it is no data folder. *reply is the caller's (cJSON_Delete); *fd is a file
+ * that came with it, or -1. */
 enum status admin_call(const char *data_dir, const cJSON *request, cJSON **reply, int *fd, struct error *err);
 
 #endif

@@ -1,11 +1,11 @@
 /* fill.h -- fills in a latitude-longitude map where nothing is known.
  *
  * Distant surroundings are alike around the horizon: sky above, ground below. Each row gets a colour: ratios of rows
- * are those within columns, rows of which nothing is known continue the nearest ones. The ratio of known pixels to their
- * row is propagated, as a logarithm, by pull-push (Gortler et al. 1996, The Lumigraph, section 3.4), weighted by solid
- * angle and periodic in azimuth, then smoothed by diffusion with the sphere's metric: the fill continues known pixels
- * next to them and tends to the row's colour far away. Highlights are clamped first: a sun at the rim of a window would
- * otherwise light half of the sky. */
+ * are those within columns, rows of which nothing is known continue the nearest ones. The ratio of known pixels to
+ * their row is propagated, as a logarithm, by pull-push (Gortler et al. 1996, The Lumigraph, section 3.4), weighted by
+ * solid angle and periodic in azimuth, then smoothed by diffusion with the sphere's metric: the fill continues known
+ * pixels next to them and tends to the row's colour far away. Highlights are clamped first: a sun at the rim of a
+ * window would otherwise light half of the sky. */
 #ifndef UNBAKE_CAPTURE_FILL_H
 #define UNBAKE_CAPTURE_FILL_H
 

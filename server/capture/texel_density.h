@@ -6,8 +6,8 @@
 #include "server/capture/views.h"
 #include "server/scene/atlas.h"
 
-/* Linear texel density of what no photograph sees: it reflects light, which needs no detail, and takes a sixteenth of the
- * texels; +25 %: -0.22 dB, roughness +0.07. */
+/* Linear texel density of what no photograph sees: it reflects light, which needs no detail, and takes a sixteenth of
+ * the texels; +25 %: -0.22 dB, roughness +0.07. */
 #define TEXEL_DENSITY_UNSEEN 0.25f
 
 /* Fills density[triangle_count], for atlas_make_uneven: 1 where a photograph sees any part of the triangle's chart,

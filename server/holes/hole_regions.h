@@ -1,9 +1,9 @@
 /* hole_regions.h -- connected cells that pixels see through the mesh: which are holes of the scan, and which openings
  * of the room.
  *
- * Each observation is first assigned to the nearest cell on its ray. Cells that rays pass, about which photographs disagree, or that touch
- * no mesh are refused, and so are regions that are openings by the evidence (hole_evidence.h); the observations then go
- * on to the next cell, until all that are left are holes. */
+ * Each observation is first assigned to the nearest cell on its ray. Cells that rays pass, about which photographs
+ * disagree, or that touch no mesh are refused, and so are regions that are openings by the evidence (hole_evidence.h);
+ * the observations then go on to the next cell, until all that are left are holes. */
 #ifndef UNBAKE_HOLES_HOLE_REGIONS_H
 #define UNBAKE_HOLES_HOLE_REGIONS_H
 

@@ -7,9 +7,10 @@
  * hole_evidence.h).
  *
  * Limits. Holes that no photograph shows, that are narrower than a cell, or that lie off the widest planes stay open:
- * what comes in through them is found by server/light/openings.h. Where photographs cannot tell a plain wall from distant light, it is closed only
- * if radiance goes on across its rim: an opening that is closed by mistake takes away light that is then looked for
- * elsewhere, a hole that stays open adds light that is measured, if at the wrong distance. */
+ * what comes in through them is found by server/light/openings.h. Where photographs cannot tell a plain wall from
+ * distant light, it is closed only if radiance goes on across its rim: an opening that is closed by mistake takes away
+ * light that is then looked for elsewhere, a hole that stays open adds light that is measured, if at the wrong
+ * distance. */
 #ifndef UNBAKE_HOLES_HOLES_H
 #define UNBAKE_HOLES_HOLES_H
 

@@ -7,8 +7,8 @@
 #include "server/state/reconstruction.h"
 
 /* Least part of a segment's radiance beyond the reflection of base colour 1 that makes an emitter. White walls of
- * albedo .9 stay near .1; bowls around lamps, whose pixels mix with the lamp, stay below .25. And what is added where all
- * incident light is an estimate (unseen_light.h), which may be half of the truth. */
+ * albedo .9 stay near .1; bowls around lamps, whose pixels mix with the lamp, stay below .25. And what is added where
+ * all incident light is an estimate (unseen_light.h), which may be half of the truth. */
 #define EMITTER_SHARE 0.25f
 #define EMITTER_SHARE_UNSEEN 0.25f
 

@@ -1,13 +1,13 @@
 /* joint_alike.h -- how much less the patches of a joint fit say than independent ones would.
  *
  * Errors of neighbouring patches agree: the same texture, the same light that is not modelled. A source lights patches
- * smoothly, so the likelihood's slope by it is a sum of the patches' scores with weights that vary slowly, whose variance
- * is that of independent scores times
+ * smoothly, so the likelihood's slope by it is a sum of the patches' scores with weights that vary slowly, whose
+ * variance is that of independent scores times
  *
  *     V = sum over p, q of s_p s_q / sum over p of s_p^2        p, q of one segment, less than a radius apart
  *
- * (the estimator of Conley 1999 with a uniform kernel). Logarithms of likelihood ratios divided by V are those of a model
- * that knows, and so are variances multiplied by V. */
+ * (the estimator of Conley 1999 with a uniform kernel). Logarithms of likelihood ratios divided by V are those of a
+ * model that knows, and so are variances multiplied by V. */
 #ifndef UNBAKE_LIGHT_JOINT_ALIKE_H
 #define UNBAKE_LIGHT_JOINT_ALIKE_H
 

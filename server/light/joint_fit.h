@@ -10,10 +10,11 @@
  *     eta_p       error of the model in a patch: texture and light that is not modelled, Student's t
  *     epsilon_i   texture, noise and highlights at the point, Student's t
  *
- * and the mean of a patch hardly exceeds that of white paint, which is normal about ALBEDO_WHITE: all errors of E_i have
- * a common part. Patches make neighbouring points count as what they are: not
- * independent. The maximum of the posterior in theta, with mu and eta at their best, is found by Gauss-Newton steps with
- * iterative reweighting; mu and eta are eliminated by Schur complements. Its curvature gives the sources' variances.
+ * and the mean of a patch hardly exceeds that of white paint, which is normal about ALBEDO_WHITE: all errors of E_i
+ * have a common part. Patches make neighbouring points count as what they are: not
+ * independent. The maximum of the posterior in theta, with mu and eta at their best, is found by Gauss-Newton steps
+ * with iterative reweighting; mu and eta are eliminated by Schur complements. Its curvature gives the sources'
+ * variances.
  *
  * Lange, Little and Taylor 1989 (Student's t by reweighting). */
 #ifndef UNBAKE_LIGHT_JOINT_FIT_H

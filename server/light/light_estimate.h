@@ -1,8 +1,8 @@
 /* light_estimate.h -- the light that photographs do not measure, estimated from what it lights, all of it together.
  *
  * Its sources are lamps that no photograph shows, and lamps and sky at which every photograph saturates
- * (light_model.h). They get the radiances under which base colours are most plausible (joint_fit.h); light of unseen sky,
- * of unseen surfaces and of lamps that are seen is fitted with them, within its uncertainty, but left as it is. */
+ * (light_model.h). They get the radiances under which base colours are most plausible (joint_fit.h); light of unseen
+ * sky, of unseen surfaces and of lamps that are seen is fitted with them, within its uncertainty, but left as it is. */
 #ifndef UNBAKE_LIGHT_LIGHT_ESTIMATE_H
 #define UNBAKE_LIGHT_LIGHT_ESTIMATE_H
 
@@ -22,17 +22,17 @@ void light_estimate_again(struct reconstruction *r, const struct views *views, c
 /* Whether there is light that was estimated. */
 bool light_is_estimated(const struct reconstruction *r);
 
-/* Standard deviation of the logarithm of all light by those of the lamps whose radiance was estimated: each one's by its
- * share of the power of all emitting segments, as if their errors were independent. An error that all base colours share.
- * Which lamp lights what is left out. 0 where sky, sun or openings light the room as well: what comes in of theirs, of which a lamp's
- * power would be a part, is not known as one figure. */
+/* Standard deviation of the logarithm of all light by those of the lamps whose radiance was estimated: each one's by
+ * its share of the power of all emitting segments, as if their errors were independent. An error that all base colours
+ * share. Which lamp lights what is left out. 0 where sky, sun or openings light the room as well: what comes in of
+ * theirs, of which a lamp's power would be a part, is not known as one figure. */
 float light_deviation(const struct reconstruction *r);
 
 /* After a resume: makes the environment what it was at the checkpoint. */
 void light_restore(struct reconstruction *r);
 
-/* Adds the sources and their deviations to the report ("lights"); of segments those that are emitters: of white surfaces
- * that saturate, solve finds that they are none. */
+/* Adds the sources and their deviations to the report ("lights"); of segments those that are emitters: of white
+ * surfaces that saturate, solve finds that they are none. */
 void light_report(const struct reconstruction *r);
 
 #endif

@@ -13,7 +13,8 @@
  * Luminous panels and shades have 30 to 1,000 times the luminance of walls. */
 #define LAMP_OVER_ROOM 100.0
 #define LAMP_DEVIATION 1.5
-/* Of an opening: most of what lies behind gaps of a scan is dark, or a surface no brighter than the room, some are lamps. */
+/* Of an opening: most of what lies behind gaps of a scan is dark, or a surface no brighter than the room, some are
+ * lamps. */
 #define OPENING_OVER_ROOM 0.1
 /* Lamps that photographs measure: in pixels of their own, and in pixels that mix them with what is beside. */
 #define SEEN_DEVIATION 0.1
@@ -118,7 +119,8 @@ static bool is_saturated(const struct emitter_evidence *e) {
     return e->is_seen && (e->saturated[0] || e->saturated[1] || e->saturated[2]);
 }
 
-/* Segments, of those that are saturated or are not, that outshine the room, most power first; *found is the caller's. */
+/* Segments, of those that are saturated or are not, that outshine the room, most power first; *found is the
+ * caller's. */
 static size_t sort_bright(const struct light_lamps *l, bool saturated, struct bright **found) {
     const struct reconstruction *r = l->r;
     size_t count = 0;

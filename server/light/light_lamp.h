@@ -1,5 +1,5 @@
-/* light_lamp.h -- the lamps of the joint fit (light_model.h), and the saturated sky and ground: which segments they are,
- * what is known of their radiance, and what they send to points. */
+/* light_lamp.h -- the lamps of the joint fit (light_model.h), and the saturated sky and ground: which segments they
+ * are, what is known of their radiance, and what they send to points. */
 #ifndef UNBAKE_LIGHT_LIGHT_LAMP_H
 #define UNBAKE_LIGHT_LIGHT_LAMP_H
 
@@ -14,8 +14,8 @@
 _Static_assert(LIGHT_MOST *LIGHT_MOST + LIGHT_MOST + LIGHT_OPENINGS_MOST + ENVIRONMENT_HALVES <= ESTIMATED_MOST,
                "all lamps and the sky are reported");
 
-/* Standard deviation of the logarithm of a radiance of which photographs tell no more than where to begin: a lower bound,
- * or the room's median. */
+/* Standard deviation of the logarithm of a radiance of which photographs tell no more than where to begin: a lower
+ * bound, or the room's median. */
 #define LIGHT_UNKNOWN_DEVIATION 2.0
 
 /* A segment, several that look alike, or the saturated part of sky or ground, whose radiance is then a factor of the
@@ -48,8 +48,8 @@ void light_lamps_release(struct light_lamps *l);
 void light_lamps_add_half(struct light_lamps *l, size_t half);
 const struct light_lamp *light_lamps_half(const struct light_lamps *l, size_t half);
 
-/* Adds the lamps at which photographs saturate, by r->evidence (emitters_observe); with `again` those of r->light, and the
- * hidden ones, instead. And those that photographs measure. */
+/* Adds the lamps at which photographs saturate, by r->evidence (emitters_observe); with `again` those of r->light, and
+ * the hidden ones, instead. And those that photographs measure. */
 void light_lamps_choose(struct light_lamps *l, bool again);
 
 /* Adds a hidden lamp. */

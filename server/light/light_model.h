@@ -32,7 +32,8 @@ void light_model_survey(struct light_model *m, const struct views *views, const 
 /* Adds to lit[points.count] the response of a hidden lamp: its own light and what unseen surfaces reflect of it. */
 void light_model_respond_hidden(const struct light_model *m, uint32_t segment, float *lit);
 
-/* Adds a hidden lamp of which `lit` is the column of the response; takes it over. Its radiance is of the fit's value. */
+/* Adds a hidden lamp of which `lit` is the column of the response; takes it over. Its radiance is of the fit's
+ * value. */
 void light_model_add_hidden(struct light_model *m, uint32_t segment, const struct joint_source *source, float *lit);
 /* Removes a hidden lamp. */
 void light_model_remove_hidden(struct light_model *m, size_t lamp);

@@ -32,8 +32,9 @@ struct light_points {
 /* The region of a place. */
 size_t light_points_region(const struct light_points *p, vec3 place);
 
-/* Makes the points from a survey, the world lit by light_sky_known. Observed radiance is that of `observed` around each,
- * or fused radiance where that has none or is NULL. median_radiance: of the room. The same for any number of threads. */
+/* Makes the points from a survey, the world lit by light_sky_known. Observed radiance is that of `observed` around
+ * each, or fused radiance where that has none or is NULL. median_radiance: of the room. The same for any number of
+ * threads. */
 void light_points_init(struct light_points *p, const struct survey *survey, const struct light_sky *sky,
                        const struct fused *observed, float median_radiance);
 void light_points_release(struct light_points *p);

@@ -40,8 +40,8 @@ bool light_sky_known(const struct light_sky *s, struct image *map);
 /* How many cells there are. */
 static inline size_t light_sky_cells(const struct light_sky *s) { return s->surround ? SURROUND_CELLS : SKY_CELLS; }
 
-/* Shares of rays: what a ray of weight `share` that escapes from a point in a unit direction adds to each cell, and to the
- * saturated directions of its half, times their radiance. */
+/* Shares of rays: what a ray of weight `share` that escapes from a point in a unit direction adds to each cell, and to
+ * the saturated directions of its half, times their radiance. */
 void light_sky_add_ray(const struct light_sky *s, vec3 origin, vec3 direction, float share, float cell[LIGHT_CELLS],
                        float saturated[ENVIRONMENT_HALVES]);
 

@@ -7,8 +7,8 @@
 #include "common/quantile.h"
 #include "server/light/albedo.h"
 
-/* Strengths tried: from one on that adds this share of the light that is known to what is lit, on average, octaves apart;
- * then nearer and nearer to the best. */
+/* Strengths tried: from one on that adds this share of the light that is known to what is lit, on average, octaves
+ * apart; then nearer and nearer to the best. */
 #define FAINTEST 0.01
 #define NEARER 5
 /* Rounds in which the strength tells what places it is asked of, and they tell the strength. */

@@ -4,8 +4,8 @@
  * would be in the room, nothing that is open is a window to a sky that lights it. There is no distant light then: the
  * cells of a box around the scan (surround.h) are in its place. Those that photographs look at through the mesh become
  * surface, which shows what they show. The others are fitted together with all other sources (light_model.h), and those
- * of which surfaces tell become surface, too: lamps of the kind ESTIMATED_OPENING. Each is a segment, at the end of mesh
- * and segments, the lamps last. The rest of the box stays open and dark.
+ * of which surfaces tell become surface, too: lamps of the kind ESTIMATED_OPENING. Each is a segment, at the end of
+ * mesh and segments, the lamps last. The rest of the box stays open and dark.
  *
  * Limits: a source behind a gap lies farther away than it is; a light that several cells share is spread over them. */
 #ifndef UNBAKE_LIGHT_OPENINGS_H
@@ -16,8 +16,8 @@
 
 /* Needs fused radiance, and a world lit by r->environment if that has a map. Does nothing unless r->is_surrounded. Sets
  * r->opening_count and r->light.source, takes r->environment away, and returns the number of new segments, each of
- * OPENINGS_TRIANGLES, the last ones of the mesh. Where there are any, the mesh's arrays may have moved, and what was made
- * of mesh and segments must be made again. The same for any number of threads. */
+ * OPENINGS_TRIANGLES, the last ones of the mesh. Where there are any, the mesh's arrays may have moved, and what was
+ * made of mesh and segments must be made again. The same for any number of threads. */
 #define OPENINGS_TRIANGLES 2
 size_t openings_find(struct reconstruction *r, const struct views *views);
 

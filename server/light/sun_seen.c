@@ -10,7 +10,8 @@
 /* Half the angle of the widest disc: the sun's aureole in haze; what is wider is a sky. */
 #define WIDEST_DEGREES 3.0
 /* Least part of the map's light; what brings less has shadows that nobody sees. Of a uniform sky the widest disc brings
- * that if it is 30 times as bright; the sun is 100,000 times as bright as a clear sky, 100 times through thin clouds. */
+ * that if it is 30 times as bright; the sun is 100,000 times as bright as a clear sky, 100 times through thin
+ * clouds. */
 #define LEAST_SHARE 0.02
 /* Photographs and map spread the disc over so many pixels of the map beyond its edge: the width of a bilinear pixel,
  * twice. What is around it lies as far away again. */

@@ -59,8 +59,8 @@ static void mark_seen(struct surround *s, const struct views *views, uint32_t tr
     }
 }
 
-/* Makes room for the cameras, which stand in the room, also where nothing around them was scanned: from outside they would
- * look at the box's back. */
+/* Makes room for the cameras, which stand in the room, also where nothing around them was scanned: from outside they
+ * would look at the box's back. */
 static void hold_cameras(const struct scene *scene, vec3 *lower, vec3 *upper) {
     for (size_t f = 0; f < scene->photograph_count; f++) {
         vec3 at = camera_origin(&scene->photograph[f].camera);

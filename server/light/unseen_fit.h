@@ -1,8 +1,8 @@
 /* unseen_fit.h -- fits radiance of unobserved directions (unseen_light.h) to points of the surface.
  *
- * The unknown is the logarithm of a coarse map (sky_cells.h). A point's radiance is base colour times Lambert radiance, by known light and by the map. Robust
- * Gauss-Newton with a smoothness prior makes base colours similar within a segment and plausible; a common factor then
- * leaves nine tenths of them below that of white paint. */
+ * The unknown is the logarithm of a coarse map (sky_cells.h). A point's radiance is base colour times Lambert
+ * radiance, by known light and by the map. Robust Gauss-Newton with a smoothness prior makes base colours similar
+ * within a segment and plausible; a common factor then leaves nine tenths of them below that of white paint. */
 #ifndef UNBAKE_LIGHT_UNSEEN_FIT_H
 #define UNBAKE_LIGHT_UNSEEN_FIT_H
 

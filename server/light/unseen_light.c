@@ -11,9 +11,9 @@
 
 #define POINTS 2048
 #define KEY_UNSEEN 23 /* keeps these random numbers apart from others of the texel */
-/* Part of the light at a grey card that the unseen one must be, as guessed: what is wrong with the rest is taken for its
- * scale. Between a room whose light is all unseen and one where it is all seen (test_grey_card.c) it may be anything: .15 and .25 give
- * the same there. */
+/* Part of the light at a grey card that the unseen one must be, as guessed: what is wrong with the rest is taken for
+ * its scale. Between a room whose light is all unseen and one where it is all seen (test_grey_card.c) it may be
+ * anything: .15 and .25 give the same there. */
 #define CARD_LEAST 0.2
 /* Nothing is so white. Light is missing, and not only known badly, if more than the rest of the points are. */
 #define IMPOSSIBLE_BASE_COLOR 1.5
@@ -94,9 +94,9 @@ static void gather_points(struct unseen *u, const struct views *views) {
     survey_release(&survey);
 }
 
-/* Scales the map, whose level is a guess (nine tenths of base colours below that of white paint), so that base colour at
- * the grey card is its reflectance. Not where too little of the light there is unseen, or the known light alone is too
- * much for what the card shows. */
+/* Scales the map, whose level is a guess (nine tenths of base colours below that of white paint), so that base colour
+ * at the grey card is its reflectance. Not where too little of the light there is unseen, or the known light alone is
+ * too much for what the card shows. */
 static void scale_by_card(struct unseen *u) {
     struct grey_card *card = &u->r->grey_card;
     const struct unseen_point *p = &u->card;

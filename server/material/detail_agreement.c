@@ -13,8 +13,8 @@
 #define MIN_HALF 0.15f /* +25 %: +0.01 dB */
 /* Radius over which the halves' agreement is averaged, texels. */
 #define AGREEMENT_RADIUS 4 /* +25 %: +0.02 dB */
-/* Halves of noise alone agree by chance, in a window by some .3 of its variance (a standard deviation): this part of the
- * variance that the photographs' noise is expected to have is taken off what halves have in common. .1: error of
+/* Halves of noise alone agree by chance, in a window by some .3 of its variance (a standard deviation): this part of
+ * the variance that the photographs' noise is expected to have is taken off what halves have in common. .1: error of
  * test_detail's noisy tiles .0355 to .0373; 1: its waves .0157 to .0182. */
 #define CHANCE 0.25
 /* Weight of the halves' disagreement as noise: it is low because most of it is a difference of sharpness. */
@@ -58,8 +58,8 @@ static void sum_weighted(struct detail *d, int split, float scale) {
             detail_pixels_rows(d, t, weigh_row);
 }
 
-/* Sums over the splits: the square of a texel's mean residual, the product of the halves' mean residuals, and the variance
- * that the photographs' noise is expected to make of the mean residual. */
+/* Sums over the splits: the square of a texel's mean residual, the product of the halves' mean residuals, and the
+ * variance that the photographs' noise is expected to make of the mean residual. */
 struct agreement {
     float square, common, noise;
 };

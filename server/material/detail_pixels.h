@@ -1,4 +1,5 @@
-/* detail_pixels.h -- the photographs' pixels that detail.h uses: which show one surface, their residuals and weights. */
+/* detail_pixels.h -- the photographs' pixels that detail.h uses: which show one surface, their residuals and
+ * weights. */
 #ifndef UNBAKE_MATERIAL_DETAIL_PIXELS_H
 #define UNBAKE_MATERIAL_DETAIL_PIXELS_H
 

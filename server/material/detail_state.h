@@ -1,4 +1,5 @@
-/* detail_state.h -- what the parts of detail.h share: its input, the pixels' and the texels' arrays, and sums over pixels.
+/* detail_state.h -- what the parts of detail.h share: its input, the pixels' and the texels' arrays, and sums over
+ * pixels.
  *
  * Pixels are processed on all threads. Their contributions to texels are summed in integers, whose result does not
  * depend on the order. */

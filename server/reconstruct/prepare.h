@@ -12,8 +12,8 @@
  * be released whatever it returns. STATUS_INPUT where the scene is not one that can be reconstructed. */
 enum status prepare_run(struct reconstruction *r, struct views *views, const struct pace *pace, struct error *err);
 
-/* Makes again what is made of mesh and segments, after triangles were added at their ends; the last `coarse` triangles get
- * few texels. */
+/* Makes again what is made of mesh and segments, after triangles were added at their ends; the last `coarse` triangles
+ * get few texels. */
 enum status prepare_again(struct reconstruction *r, struct views *views, size_t coarse, struct error *err);
 
 /* Lights the world by r->environment, after its map changed. */

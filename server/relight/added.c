@@ -71,8 +71,7 @@ static void extend_textures(struct materials *m, const struct texel_plan *l) {
     t->height = l->height;
 }
 
-/* --- segments
- * ------------------------------------------------------------------------------------------------------- */
+/* --- segments ------------------------------------------------------------------------------------- */
 
 static void extend_segments(struct recovered *r, const struct things *things) {
     struct materials *m = &r->materials;
@@ -108,8 +107,7 @@ static void extend_segments(struct recovered *r, const struct things *things) {
     m->segment_count = r->segments.count = count;
 }
 
-/* --- texels
- * --------------------------------------------------------------------------------------------------------- */
+/* --- texels --------------------------------------------------------------------------------------- */
 
 /* The texel of material number i. */
 static vec2 set_cell(struct materials *m, const struct texel_plan *l, size_t i, rgb color) {
@@ -143,8 +141,7 @@ static void set_block(struct materials *m, const struct texel_plan *l, const str
     }
 }
 
-/* --- triangles
- * ------------------------------------------------------------------------------------------------------ */
+/* --- triangles ------------------------------------------------------------------------------------ */
 
 /* Where one mesh has normals, the others get zeros, which mean none. */
 static void append_mesh(struct mesh *mesh, const struct mesh *more) {

@@ -67,7 +67,7 @@ static enum status make_atlas(const struct mesh *mesh, const struct mesh_look *l
     return status;
 }
 
-/* --- filling it ----------------------------------------------------------------------------------------------------- */
+/* --- filling it ----------------------------------------------------------------------------------- */
 
 struct filling {
     const struct mesh *mesh;

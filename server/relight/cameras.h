@@ -26,8 +26,8 @@ enum status cameras_read(const struct relight_job *job, const double offset[3], 
                          struct error *err);
 void cameras_release(struct cameras *views);
 
-/* The outputs' own file that the setting `cameras` means; NULL where it means another, or it cannot be read. The caller's
- * (cJSON_Delete). */
+/* The outputs' own file that the setting `cameras` means; NULL where it means another, or it cannot be read. The
+ * caller's (cJSON_Delete). */
 cJSON *cameras_own(const struct relight_job *job);
 
 /* The same view at another size; where the aspect differs, the largest part of it that has the new one. */

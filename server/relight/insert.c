@@ -29,8 +29,7 @@ static void move_mesh(const cJSON *s, uint32_t n, const struct compass *compass,
     }
 }
 
-/* --- materials
- * ------------------------------------------------------------------------------------------------------ */
+/* --- materials ------------------------------------------------------------------------------------ */
 
 /* Whether the setting is given, or nothing else says it. */
 static bool decides(const cJSON *s, uint32_t n, const char *name, bool has_own) {
@@ -102,8 +101,7 @@ static void settle_materials(const cJSON *s, uint32_t n, struct mesh *mesh, stru
         apply_settings(s, n, has_own && look->material[i].is_own, &look->material[i]);
 }
 
-/* --- the thing
- * ------------------------------------------------------------------------------------------------------ */
+/* --- the thing ------------------------------------------------------------------------------------ */
 
 /* The mean over the part's texels. */
 static rgb mean_emission(const struct baked *b, size_t part) {

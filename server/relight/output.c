@@ -34,7 +34,8 @@ static void digest_settings(struct sha256 *hash, const cJSON *settings) {
     }
 }
 
-/* The settings, the files that they name, and all that is read of the outputs: somebody may have painted a texture over. */
+/* The settings, the files that they name, and all that is read of the outputs: somebody may have painted a texture
+ * over. */
 void output_digest(const struct relight_job *job, char digest[SHA256_HEX_SIZE]) {
     static const char *const names[] = {"report.json",     "scene.ply",     "views.json",   "cameras.json",
                                         "base_color.exr",  "roughness.exr", "specular.exr", "emission.exr",

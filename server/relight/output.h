@@ -2,9 +2,9 @@
  *
  * NNNNN is the picture's number, with more digits where there are more pictures: names sort as numbers do. A pass is
  * NNNNN_radiance.png or .exr, a source alone NNNNN_light_27.exr, a multilayer EXR NNNNN.exr. views.jsonl has a line of
- * JSON for each picture that is done, with the sizes and digests of its files, appended when all of them have their final
- * names; a line that was cut off counts as none. When all are done it is put in their order, and views.json is made of it,
- * with the settings, the seed and the program's version. */
+ * JSON for each picture that is done, with the sizes and digests of its files, appended when all of them have their
+ * final names; a line that was cut off counts as none. When all are done it is put in their order, and views.json is
+ * made of it, with the settings, the seed and the program's version. */
 #ifndef UNBAKE_RELIGHT_OUTPUT_H
 #define UNBAKE_RELIGHT_OUTPUT_H
 

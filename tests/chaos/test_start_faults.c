@@ -1,7 +1,7 @@
 /* test_start_faults.c -- the daemon starts, and the commands of whoever runs it work, while each call of the
  * system, or of SQLite, fails once: it does what it should, or ends with 1 and a sentence that says why, and leaves
- * nothing half done; the next time all is well. A daemon that is up answers and stops as always. Every third call; in the
- * long form each. */
+ * nothing half done; the next time all is well. A daemon that is up answers and stops as always. Every third call; in
+ * the long form each. */
 #include <poll.h>
 
 #include "tests/chaos/daemon.h"

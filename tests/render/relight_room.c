@@ -1,21 +1,22 @@
-/* relight_room ROOM OUTPUTS DIR [OPTION=VALUE ...] -- how near renders of a recovered room in another light are to those of
- * the true room in the same light. ROOM is a bundle with truth/, OUTPUTS those of a reconstruction of it. Lightings, all of
- * them with what else shines turned off:
+/* relight_room ROOM OUTPUTS DIR [OPTION=VALUE ...] -- how near renders of a recovered room in another light are to
+ * those of the true room in the same light. ROOM is a bundle with truth/, OUTPUTS those of a reconstruction of it.
+ * Lightings, all of them with what else shines turned off:
  *
  *   ball      a glowing ball in the middle of free space, nothing outside
  *   lamp N    one of the three brightest emitters of the truth alone
  *   sky       the map `sky`, with the segments `remove` taken away; left out without a map, or where nothing of it comes in
  *
- * Each is rendered twice of either room, with independent noise: o1, o2 of the recovered one, a, b of the true one. PSNR is
- * that of sRGB pictures at one exposure a lighting, of which the mean square is the mean of (o1 - a) (o2 - b), to which
- * noise adds nothing. The ratio is that of the means of radiance. Prints "what<TAB>value<TAB>goal<TAB>better" and writes
- * DIR/LIGHTING_N_ours.png and _true.png beside each other, means of two renders, and for comparisons that noise does add
- * to, single ones: _o1.png, _a.png, _b.png. The true room's outputs go to DIR/truth, renders to DIR/renders, and a render
- * that is there already is not made again; the caller removes what another program has made.
+ * Each is rendered twice of either room, with independent noise: o1, o2 of the recovered one, a, b of the true one.
+ * PSNR is that of sRGB pictures at one exposure a lighting, of which the mean square is the mean of (o1 - a) (o2 - b),
+ * to which noise adds nothing. The ratio is that of the means of radiance. Prints "what<TAB>value<TAB>goal<TAB>better"
+ * and writes DIR/LIGHTING_N_ours.png and _true.png beside each other, means of two renders, and for comparisons that
+ * noise does add to, single ones: _o1.png, _a.png, _b.png. The true room's outputs go to DIR/truth, renders to
+ * DIR/renders, and a render that is there already is not made again; the caller removes what another program has made.
  *
  * Options: views=0,3,6 (numbers of held-out views), spp=64 (of each of the four), sky=FILE, remove=NAME, label=TEXT,
- * scan=OUTPUTS (those of a reconstruction of the same room on another mesh: they are compared, under the ball and the sky,
- * with the truth on the first), truth=DIR (where the true room and its renders are, or go to, in place of DIR). The exit status is 1 where a figure misses one of least=PSNR, ratio=FACTOR. */
+ * scan=OUTPUTS (those of a reconstruction of the same room on another mesh: they are compared, under the ball and the
+ * sky, with the truth on the first), truth=DIR (where the true room and its renders are, or go to, in place of DIR).
+ * The exit status is 1 where a figure misses one of least=PSNR, ratio=FACTOR. */
 #include <stdio.h>
 #include <unistd.h>
 
@@ -193,7 +194,7 @@ static enum status try_lighting(struct relight_bench *b, const char *name, const
     return status;
 }
 
-/* --- where the ball hangs ------------------------------------------------------------------------------------------ */
+/* --- where the ball hangs ------------------------------------------------------------------------- */
 
 static float clearance(const struct true_room *t, vec3 point) {
     float least = INFINITY;
@@ -238,7 +239,7 @@ static enum status try_ball(struct relight_bench *b, struct error *err) {
     return status;
 }
 
-/* --- the lamps, and the sky ------------------------------------------------------------------------------------------ */
+/* --- the lamps, and the sky ----------------------------------------------------------------------- */
 
 static double power(const struct true_segment *s) { return s->area_m2 * (double)rgb_luminance(s->emission); }
 

@@ -44,7 +44,8 @@ static void test_cameras(void) {
 
 /* --- a room ------------------------------------------------------------------------------------------------ */
 
-/* Towards floor and walls, so that none shows ceiling or lamp; every other one at the wall of which a part is missing. */
+/* Towards floor and walls, so that none shows ceiling or lamp; every other one at the wall of which a part is
+ * missing. */
 static vec3 look_low(int frame) {
     vec3 from = spread(frame, 0.4f);
     float angle = 2.4f * (float)frame;
@@ -82,8 +83,8 @@ static void check_colors(const struct reconstruction *r) {
     }
 }
 
-/* Of the report: the openings lie over the room and are about as bright as the lamp, which is smaller than two cells and
- * nearer; they have a name, by which they can be taken away. */
+/* Of the report: the openings lie over the room and are about as bright as the lamp, which is smaller than two cells
+ * and nearer; they have a name, by which they can be taken away. */
 static void check_lights(const struct reconstruction *r) {
     const cJSON *light;
     int count = 0;

@@ -1,10 +1,10 @@
 /* true_room.h -- the true materials and lights of a known room as a reconstruction's outputs, for renders beside it.
  *
- * The room is a bundle with truth/ (demo/generate.h, evaluate.h). The outputs are those of a reconstruction of it on its own
- * mesh: the truth takes their geometry, atlas and cameras, and has the room's values by object. Base colour of an object
- * with a texture is, of the demo room, what it is painted with; of others what the truth's pictures of held-out views
- * show of it, and where none shows it what was recovered. Renders from these views are of true base colour therefore; of
- * light that comes from where none of them looks a small part is not. */
+ * The room is a bundle with truth/ (demo/generate.h, evaluate.h). The outputs are those of a reconstruction of it on
+ * its own mesh: the truth takes their geometry, atlas and cameras, and has the room's values by object. Base colour of
+ * an object with a texture is, of the demo room, what it is painted with; of others what the truth's pictures of
+ * held-out views show of it, and where none shows it what was recovered. Renders from these views are of true base
+ * colour therefore; of light that comes from where none of them looks a small part is not. */
 #ifndef UNBAKE_TESTS_TRUE_ROOM_H
 #define UNBAKE_TESTS_TRUE_ROOM_H
 
@@ -106,8 +106,8 @@ static inline enum status true_room_views(struct true_room *t, const char *room,
     return status;
 }
 
-/* Base colour of a view's truth at the pixel that shows a point, if it shows the point and the 3 x 3 pixels around it show
- * the same object. */
+/* Base colour of a view's truth at the pixel that shows a point, if it shows the point and the 3 x 3 pixels around it
+ * show the same object. */
 static inline bool true_room_look(const struct true_room *t, size_t view, int64_t object, const struct surface_point *p,
                                   rgb *color) {
     const struct camera *camera = &t->views.view[view].camera;

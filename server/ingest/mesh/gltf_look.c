@@ -55,8 +55,7 @@ static float share(double value) { return (float)fmin(fmax(value, 0.0), 1.0); }
 
 static rgb clamp_color(rgb c) { return rgb_make(share((double)c.r), share((double)c.g), share((double)c.b)); }
 
-/* --- pictures
- * ------------------------------------------------------------------------------------------------------- */
+/* --- pictures ------------------------------------------------------------------------------------- */
 
 static const cJSON *texture_of(const cJSON *material, const struct slot *s) {
     return member(s->object ? member(material, s->object) : material, s->key);
@@ -160,8 +159,7 @@ static enum status read_slot(struct gltf_file *g, const cJSON *material, const s
     return STATUS_OK;
 }
 
-/* --- materials
- * ------------------------------------------------------------------------------------------------------ */
+/* --- materials ------------------------------------------------------------------------------------ */
 
 static void leave_out(const cJSON *material, struct mesh_look *look) {
     static const char *const read[] = {"KHR_materials_emissive_strength", "KHR_materials_ior",

@@ -53,8 +53,7 @@ static enum status read_number(const struct mtl_reader *r, const char *line, con
     return end == text || !isfinite(*number) ? bad_line(r, line) : STATUS_OK;
 }
 
-/* --- pictures
- * ------------------------------------------------------------------------------------------------------- */
+/* --- pictures ------------------------------------------------------------------------------------- */
 
 /* Takes the options before a picture's name: -o and -s move and scale, -clamp; others that change nothing here are
  * skipped. False: one is not known. */
@@ -112,8 +111,7 @@ static enum status read_map(const struct mtl_reader *r, const char *line, const 
     return status;
 }
 
-/* --- lines
- * ---------------------------------------------------------------------------------------------------------- */
+/* --- lines ---------------------------------------------------------------------------------------- */
 
 static void end_material(struct mtl_reader *r) {
     struct look_material *m = r->current;

@@ -1,5 +1,6 @@
-/* oidn.c -- under the name libOpenImageDenoise.so.2, in the place of that library: version 2.99.1, whose filter makes each
- * colour the mean of the picture. It refuses to work without albedo and normals of the same size, and for other than HDR. */
+/* oidn.c -- under the name libOpenImageDenoise.so.2, in the place of that library: version 2.99.1, whose filter makes
+ * each colour the mean of the picture. It refuses to work without albedo and normals of the same size, and for other
+ * than HDR. */
 #include <stdbool.h>
 #include <stddef.h>
 #include <string.h>
