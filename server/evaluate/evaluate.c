@@ -12,7 +12,7 @@
 #include "server/evaluate/pair_picture.h"
 #include "server/relight/recovered.h"
 #include "server/evaluate/seen.h"
-#include "server/evaluate/stated.h"
+#include "server/evaluate/stated_deviation.h"
 #include "server/ingest/bundle.h"
 #include "server/ingest/pixels.h"
 #include "server/reconstruct/held_render.h"
@@ -202,10 +202,12 @@ static enum status score_view(struct evaluator *e, const struct photograph *p, u
     seen_flags(&e->seen, &p->camera, e->pool, flags);
     mark_by_truth(&truth, flags);
     score_add(&v->score, &found, &truth, flags);
-    if (e->deviation.texel)
-        stated_render(&e->recovered, &e->deviation, &p->camera, e->settings->samples, e->settings->seed, e->pool,
-                      &deviation);
-    trust_add(&v->trust, &found, e->deviation.texel ? &deviation : NULL, &truth, flags);
+    if (e->deviation.texel) {
+        stated_deviation_render(&e->recovered, &e->deviation, &p->camera, e->settings->samples, e->settings->seed,
+                                e->pool, &deviation);
+        deviation_coverage_add(&v->coverage, &found, &deviation, &truth, flags);
+    }
+    plain_surface_add(&v->plain, &found, &truth, flags);
     if (e->settings->pictures_dir)
         status = write_pair(e, "base_color", stem, &truth, &found, "base_color.", 1.0f, err);
     if (status == STATUS_OK && e->settings->spp)
@@ -283,7 +285,7 @@ enum status evaluate_outputs(const char *room, const char *outputs, const struct
         goto out;
     status = settings->pictures_dir ? file_make_dirs(settings->pictures_dir, err) : STATUS_OK;
     if (status == STATUS_OK)
-        status = stated_load(outputs, &e.recovered, &e.deviation, err);
+        status = stated_deviation_load(outputs, &e.recovered, &e.deviation, err);
     if (status == STATUS_OK)
         status = found_emitters_count(room, &e.scene.mesh, &e.recovered, e.emits, &v->emitters, err);
     if (status == STATUS_OK) {
@@ -310,10 +312,10 @@ cJSON *evaluate_to_json(const struct evaluation *v) {
     json_add_number(root, "base_color_inside_psnr_db", score_psnr_db(s->base_color_inside));
     json_add_number(root, "base_color_ratio", score_base_color_ratio(s));
     json_add_number(root, "seen_share", s->plain_pixels ? (double)s->seen_pixels / (double)s->plain_pixels : 0.0);
-    json_add_number(root, "base_color_within_one_deviation", trust_share(v->trust.within_one, v->trust.judged));
-    json_add_number(root, "base_color_within_two_deviations", trust_share(v->trust.within_two, v->trust.judged));
-    json_add_number(root, "plain_deviation", trust_plain_deviation(&v->trust));
-    json_add_number(root, "plain_specks", trust_share(v->trust.specks, v->trust.plain_pixels));
+    json_add_number(root, "base_color_within_one_deviation", score_share(v->coverage.within_one, v->coverage.count));
+    json_add_number(root, "base_color_within_two_deviations", score_share(v->coverage.within_two, v->coverage.count));
+    json_add_number(root, "plain_deviation", plain_surface_spread(&v->plain));
+    json_add_number(root, "plain_specks", score_share(v->plain.specks, v->plain.pixels));
     json_add_number(root, "roughness_psnr_db", score_psnr_db(s->roughness));
     json_add_number(root, "roughness_rms_error", sqrt(score_mean(s->roughness)));
     json_add_number(root, "specular_psnr_db", score_psnr_db(s->specular));

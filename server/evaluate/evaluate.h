@@ -17,8 +17,9 @@
 #include "server/evaluate/found_emitters.h"
 #include "server/evaluate/smooth_areas.h"
 #include "server/evaluate/noise_floor.h"
+#include "server/evaluate/plain_surface.h"
 #include "server/evaluate/score.h"
-#include "server/evaluate/trust.h"
+#include "server/evaluate/stated_deviation.h"
 
 struct reading; /* common/reading.h */
 
@@ -35,7 +36,8 @@ struct evaluate_settings evaluate_default_settings(void);
 
 struct evaluation {
     struct score score;
-    struct trust trust;
+    struct deviation_coverage coverage;
+    struct plain_surface plain;
     size_t view_count;
     /* By object of the truth. An emitter is found if more than half of its area emits; a non-emitting object any part
      * of which emits is a false emitter. */

@@ -27,14 +27,14 @@ static void print_table(const struct evaluation *v) {
            score_psnr_db(s->base_color_seen),
            s->plain_pixels ? 100.0 * (double)s->seen_pixels / (double)s->plain_pixels : 0.0,
            score_psnr_db(s->base_color_all));
-    if (v->trust.judged)
+    if (v->coverage.count)
         printf("  %-22s %6.1f %% of errors within one standard deviation of confidence.exr, %.1f %% within two\n",
-               "its confidence", 100.0 * trust_share(v->trust.within_one, v->trust.judged),
-               100.0 * trust_share(v->trust.within_two, v->trust.judged));
-    if (v->trust.plain_pixels)
+               "its confidence", 100.0 * score_share(v->coverage.within_one, v->coverage.count),
+               100.0 * score_share(v->coverage.within_two, v->coverage.count));
+    if (v->plain.pixels)
         printf("  %-22s %6.4f   (%.2f %% of the pixels are off their surroundings by more than %.2f)\n",
-               "plain surface, spread", trust_plain_deviation(&v->trust),
-               100.0 * trust_share(v->trust.specks, v->trust.plain_pixels), (double)TRUST_SPECK);
+               "plain surface, spread", plain_surface_spread(&v->plain),
+               100.0 * score_share(v->plain.specks, v->plain.pixels), (double)PLAIN_SURFACE_SPECK);
     printf("  %-22s %6.2f dB   (off by %.3f)\n", "roughness", score_psnr_db(s->roughness),
            sqrt(score_mean(s->roughness)));
     printf("  %-22s %6.2f dB   (off by %.3f)\n", "specular", score_psnr_db(s->specular), sqrt(score_mean(s->specular)));

@@ -92,6 +92,8 @@ void score_add(struct score *score, const struct image *found, const struct imag
     }
 }
 
+double score_share(size_t part, size_t whole) { return whole ? (double)part / (double)whole : (double)NAN; }
+
 double score_mean(struct score_sum sum) { return sum.count ? sum.sum / (double)sum.count : (double)NAN; }
 
 double score_base_color_ratio(const struct score *score) {

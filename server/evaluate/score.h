@@ -42,6 +42,7 @@ struct score {
 void score_add(struct score *score, const struct image *found, const struct image *truth, const uint8_t *flags);
 
 double score_mean(struct score_sum sum);                  /* NaN when empty */
+double score_share(size_t part, size_t whole);            /* NaN of nothing */
 double score_base_color_ratio(const struct score *score); /* found by truth; NaN when the truth is black or empty */
 double score_psnr_db(struct score_sum sum);               /* infinite without error, NaN when empty */
 double score_emission_iou(const struct score *score);     /* 1 when neither emits anywhere */

@@ -17,7 +17,7 @@
  *                                   what is less than two pixels from one
  *   within_one_deviation, within_two_deviations   share of the errors of base colour that are at most so many of the
  *                                   deviations that confidence.exr states
- *   plain_specks                    as evaluate's (trust.h)
+ *   plain_specks                    as evaluate's (plain_surface.h)
  *
  * With PICTURES, and unless that is "": of each held-out view base_color_NNN.png (true | recovered). With TRUTH the
  * held-out views of that folder in place of ROOM's (scan_ceiling). */
@@ -34,8 +34,8 @@
 #include "server/evaluate/pair_picture.h"
 #include "server/evaluate/score.h"
 #include "server/evaluate/seen.h"
-#include "server/evaluate/stated.h"
-#include "server/evaluate/trust.h"
+#include "server/evaluate/stated_deviation.h"
+#include "server/evaluate/plain_surface.h"
 #include "server/ingest/bundle.h"
 #include "server/ingest/mesh/mesh_file.h"
 #include "server/relight/recovered.h"
@@ -61,7 +61,8 @@ struct comparison {
     struct recovered recovered;
     struct texture deviation; /* stated of base colour; texel NULL: none is */
     struct score score;
-    struct trust trust;
+    struct deviation_coverage coverage;
+    struct plain_surface plain;
     size_t lamps, missed, false_lamps;
     double false_pixels, seen_pixels, hole_pixels;
 };
@@ -104,7 +105,7 @@ static enum status load(struct comparison *c, const char *room, const char *out,
     if (status == STATUS_OK)
         status = recovered_load(out, &c->mesh, c->pool, &c->recovered, err);
     if (status == STATUS_OK)
-        status = stated_load(out, &c->recovered, &c->deviation, err);
+        status = stated_deviation_load(out, &c->recovered, &c->deviation, err);
     mem_free(path);
     return status;
 }
@@ -236,9 +237,11 @@ static enum status score_view(struct comparison *c, const struct photograph *p, 
     seen_flags(&c->seen, &p->camera, c->pool, flags);
     leave_out(c, &truth, &found, flags);
     score_add(&c->score, &found, &truth, flags);
-    if (c->deviation.texel)
-        stated_render(&c->recovered, &c->deviation, &moved, SAMPLES, SEED, c->pool, &deviation);
-    trust_add(&c->trust, &found, c->deviation.texel ? &deviation : NULL, &truth, flags);
+    if (c->deviation.texel) {
+        stated_deviation_render(&c->recovered, &c->deviation, &moved, SAMPLES, SEED, c->pool, &deviation);
+        deviation_coverage_add(&c->coverage, &found, &deviation, &truth, flags);
+    }
+    plain_surface_add(&c->plain, &found, &truth, flags);
     path = pictures ? mem_printf("%s/base_color_%s.png", pictures, stem) : NULL;
     if (path)
         status = pair_picture_write(path, &truth, &found, "base_color.", 1.0f, err);
@@ -358,13 +361,13 @@ static void count_lamps(struct comparison *c) {
 
 /* JSON has no NaN. */
 static const char *share_text(char text[16], size_t part, size_t whole) {
-    snprintf(text, 16, whole ? "%.4f" : "null", trust_share(part, whole));
+    snprintf(text, 16, whole ? "%.4f" : "null", score_share(part, whole));
     return text;
 }
 
 static void print(const struct comparison *c) {
     char one[16], two[16], specks[16];
-    const struct trust *trust = &c->trust;
+    const struct deviation_coverage *coverage = &c->coverage;
     const struct score *s = &c->score;
     printf(
         "{\"turned_degrees\": %.3f, \"moved\": %.4f,\n \"base_color\": %.3f, \"base_color_inside\": %.3f, \"roughness\": %.2f, \"specular\": %.2f,\n"
@@ -375,8 +378,8 @@ static void print(const struct comparison *c) {
         score_psnr_db(s->base_color_seen), score_psnr_db(s->base_color_inside), score_psnr_db(s->roughness),
         score_psnr_db(s->specular), score_emission_iou(s), score_mean(s->emission_log), score_base_color_ratio(s),
         c->lamps, c->missed, c->false_lamps, c->false_pixels, c->hole_pixels / c->seen_pixels,
-        share_text(one, trust->within_one, trust->judged), share_text(two, trust->within_two, trust->judged),
-        share_text(specks, trust->specks, trust->plain_pixels));
+        share_text(one, coverage->within_one, coverage->count), share_text(two, coverage->within_two, coverage->count),
+        share_text(specks, c->plain.specks, c->plain.pixels));
 }
 
 static enum status run(int argc, char **argv, struct error *err) {

@@ -1,6 +1,6 @@
-/* test_trust.c -- specks on plain surface are what is found, not what the truth has: mottled paint counts, print does
- * not. */
-#include "server/evaluate/trust.h"
+/* test_plain_surface.c -- specks on plain surface are what is found, not what the truth has: mottled paint counts,
+ * print does not. */
+#include "server/evaluate/plain_surface.h"
 
 #include <stdlib.h>
 
@@ -17,7 +17,7 @@ static float *pixel(struct image *image, int x, int y) {
 
 int main(void) {
     struct image truth, found;
-    struct trust trust = {0};
+    struct plain_surface plain = {0};
     uint8_t flags[SIDE * SIDE];
     image_init(&truth, SIDE, SIDE, 4, names);
     image_init(&found, SIDE, SIDE, 3, names);
@@ -33,13 +33,13 @@ int main(void) {
     }
     pixel(&found, 15, 5)[1] += 0.1f; /* a speck on the wall, and one in print */
     pixel(&found, 4, 15)[1] += 0.1f;
-    trust_add(&trust, &found, NULL, &truth, flags);
+    plain_surface_add(&plain, &found, &truth, flags);
     size_t all = (SIDE - 4) * (SIDE - 4),
            in_print =
                10 * 10 - 1; /* windows that touch columns 0 to 9, rows 10 to 19; of one the corner, which is bare */
-    CHECK_THAT(trust.plain_pixels == all - in_print, "%zu", trust.plain_pixels);
-    CHECK_THAT(trust.specks == 1, "%zu", trust.specks);
-    double spread = trust_plain_deviation(&trust);
+    CHECK_THAT(plain.pixels == all - in_print, "%zu", plain.pixels);
+    CHECK_THAT(plain.specks == 1, "%zu", plain.specks);
+    double spread = plain_surface_spread(&plain);
     CHECK_THAT(spread > 0.002 && spread < 0.006, "%g",
                spread); /* .1 in one channel of one of 156 pixels; little else */
     image_release(&truth);

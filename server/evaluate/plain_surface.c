@@ -1,5 +1,5 @@
-/* trust.c -- see trust.h. */
-#include "server/evaluate/trust.h"
+/* plain_surface.c -- see plain_surface.h. */
+#include "server/evaluate/plain_surface.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -16,17 +16,6 @@
 
 static const float *pixel_at(const struct image *image, uint32_t x, uint32_t y) {
     return image->pixel + ((size_t)y * image->width + x) * image->channel_count;
-}
-
-static void judge(struct trust *trust, const float *found, const float *truth, const float *deviation,
-                  struct rgb_columns fc, struct rgb_columns tc, struct rgb_columns dc) {
-    for (int c = 0; c < 3; c++) {
-        float sigma = deviation[dc.at[c]];
-        float off = fabsf(clampf(found[fc.at[c]], 0.0f, 1.0f) - clampf(truth[tc.at[c]], 0.0f, 1.0f));
-        trust->judged++;
-        trust->within_one += off <= sigma;
-        trust->within_two += off <= 2.0f * sigma;
-    }
 }
 
 /* Whether the window shows one plain surface of the truth, seen in all its pixels; mean[] is then found's error over
@@ -52,8 +41,8 @@ static bool is_plain(const struct image *found, const struct image *truth, const
     return true;
 }
 
-static void add_plain(struct trust *trust, const struct image *found, const struct image *truth, const uint8_t *flags,
-                      uint32_t x, uint32_t y) {
+static void add_pixel(struct plain_surface *plain, const struct image *found, const struct image *truth,
+                      const uint8_t *flags, uint32_t x, uint32_t y) {
     double mean[3], most = 0.0;
     struct rgb_columns fc = pair_picture_columns(found, "base_color."), tc = pair_picture_columns(truth, "base_color.");
     if (x < RADIUS || y < RADIUS || x + RADIUS >= truth->width || y + RADIUS >= truth->height ||
@@ -62,30 +51,21 @@ static void add_plain(struct trust *trust, const struct image *found, const stru
     for (int c = 0; c < 3; c++) {
         double error = (double)pixel_at(found, x, y)[fc.at[c]] - (double)pixel_at(truth, x, y)[tc.at[c]];
         double off = error - mean[c];
-        trust->plain_squares += off * off;
+        plain->squares += off * off;
         most = fmax(most, fabs(off));
     }
-    trust->plain_pixels++;
-    trust->specks += most > (double)TRUST_SPECK;
+    plain->pixels++;
+    plain->specks += most > (double)PLAIN_SURFACE_SPECK;
 }
 
-void trust_add(struct trust *trust, const struct image *found, const struct image *deviation, const struct image *truth,
-               const uint8_t *flags) {
-    struct rgb_columns fc = pair_picture_columns(found, "base_color."), tc = pair_picture_columns(truth, "base_color.");
-    for (uint32_t y = 0; y < truth->height; y++) {
-        for (uint32_t x = 0; x < truth->width; x++) {
-            if (!(flags[(size_t)y * truth->width + x] & SCORE_SEEN))
-                continue;
-            if (deviation)
-                judge(trust, pixel_at(found, x, y), pixel_at(truth, x, y), pixel_at(deviation, x, y), fc, tc,
-                      pair_picture_columns(deviation, "base_color."));
-            add_plain(trust, found, truth, flags, x, y);
-        }
-    }
+void plain_surface_add(struct plain_surface *plain, const struct image *found, const struct image *truth,
+                       const uint8_t *flags) {
+    for (uint32_t y = 0; y < truth->height; y++)
+        for (uint32_t x = 0; x < truth->width; x++)
+            if (flags[(size_t)y * truth->width + x] & SCORE_SEEN)
+                add_pixel(plain, found, truth, flags, x, y);
 }
 
-double trust_share(size_t part, size_t whole) { return whole ? (double)part / (double)whole : (double)NAN; }
-
-double trust_plain_deviation(const struct trust *trust) {
-    return trust->plain_pixels ? sqrt(trust->plain_squares / (3.0 * (double)trust->plain_pixels)) : (double)NAN;
+double plain_surface_spread(const struct plain_surface *plain) {
+    return plain->pixels ? sqrt(plain->squares / (3.0 * (double)plain->pixels)) : (double)NAN;
 }
