@@ -25,7 +25,7 @@
 #include "server/admin/admin.h"
 #include "server/admin/commands.h"
 #include "server/data/layout.h"
-#include "server/executor/examine.h"
+#include "server/executor/site_check.h"
 #include "server/executor/sites.h"
 #include "server/libraries.h"
 #include "server/net/tls.h"
@@ -282,7 +282,7 @@ static void check_executors(struct doctor *d) {
     sites_read(&sites, d->config->executors, d->config->executors_dir, &none); /* was checked with the rest */
     for (size_t i = 0; i < sites.count; i++)
         if (!sites.place[i].is_process)
-            site_examine(&sites.place[i].site, tell_executor, d);
+            site_check(&sites.place[i].site, tell_executor, d);
     sites_release(&sites);
     buf_release(&none);
 }

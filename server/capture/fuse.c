@@ -5,7 +5,7 @@
 
 #include "common/image.h"
 #include "common/mem.h"
-#include "server/capture/best.h"
+#include "server/capture/top_k.h"
 #include "server/capture/robust.h"
 #include "server/scene/surface.h"
 
@@ -33,8 +33,8 @@ struct fuse_job {
 /* Observations of a texel: the best of those that measured it or, where none did, of the lower bounds. */
 struct fuse_observations {
     bool is_measured;
-    struct best best;
-    struct best_item item[MAX_OBSERVATIONS];
+    struct top_k best;
+    struct top_k_item item[MAX_OBSERVATIONS];
     struct robust_sample observation[MAX_OBSERVATIONS];
     struct view view[MAX_OBSERVATIONS];
     float mixing[MAX_OBSERVATIONS]; /* see views_mixing */
@@ -54,15 +54,15 @@ static void add_observation(const struct fuse_job *job, struct fuse_observations
     l->gray_sum += (double)gray;
     l->gray_square_sum += (double)gray * (double)gray;
     if (is_measured && !l->is_measured)
-        best_init(&l->best, l->item, MAX_OBSERVATIONS);
+        top_k_init(&l->best, l->item, MAX_OBSERVATIONS);
     l->is_measured |= is_measured;
     if (is_measured != l->is_measured)
         return;
     /* Noise at the same radiance for all photographs: by their own values bright noise would be preferred. */
     float weight = view->weight * views_trust(v, view, triangle);
-    size_t slot =
-        best_put(&l->best, weight * noise_weight(job->noise, v, view, rgb_gray(v->median_radiance), 0.0f), view->train);
-    if (slot == BEST_NONE)
+    size_t slot = top_k_put(&l->best, weight * noise_weight(job->noise, v, view, rgb_gray(v->median_radiance), 0.0f),
+                            view->train);
+    if (slot == TOP_K_NONE)
         return;
     l->observation[slot] = (struct robust_sample){.value = s->radiance, .gray = gray, .weight = weight};
     l->view[slot] = *view;
@@ -97,7 +97,7 @@ static void observe_all(const struct fuse_job *job, const struct surface_point *
     l->is_measured = false;
     l->seen = l->clean = 0;
     l->gray_sum = l->gray_square_sum = 0.0;
-    best_init(&l->best, l->item, MAX_OBSERVATIONS);
+    top_k_init(&l->best, l->item, MAX_OBSERVATIONS);
     for (uint32_t t = 0; t < v->train_count; t++) {
         const struct photograph *photo = &v->scene->photograph[v->train[t]];
         struct view view;

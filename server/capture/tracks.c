@@ -5,7 +5,7 @@
 
 #include "common/mem.h"
 #include "common/rng.h"
-#include "server/capture/choose.h"
+#include "server/capture/stratified.h"
 
 /* Tracks in all, for time and memory; for each photograph at least 25 a pose's unknown, at most one in a square of 22
  * pixels of PYRAMID_MAX. */
@@ -80,7 +80,7 @@ static bool make_track(const struct views *views, size_t t, float x, float y, ui
     track->down = to_pixel(camera, x, y + 1.0f, track->point, normal);
     uint32_t frames = (uint32_t)views->train_count;
     for (uint32_t i = 0; i < frames && track->other_count < TRACK_OTHERS; i++) {
-        uint32_t other = choose_permute(i, frames, key);
+        uint32_t other = stratified_permute(i, frames, key);
         struct view view;
         vec3 to = vec3_sub(camera_origin(&views->scene->photograph[views->train[other]].camera), track->point);
         float distance = vec3_length(to);

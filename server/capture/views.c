@@ -7,7 +7,7 @@
 #include "common/mem.h"
 #include "common/quantile.h"
 #include "common/rng.h"
-#include "server/capture/choose.h"
+#include "server/capture/stratified.h"
 
 /* Least cosine between normal and view at which a photograph is used: 84 degrees, where an error of the normal by 2
  * degrees, as scans have, changes the cosine by a third. */
@@ -203,7 +203,7 @@ size_t views_pick(const struct views *v, vec3 point, vec3 normal, uint32_t key, 
     uint32_t cameras = (uint32_t)v->train_count;
     for (uint32_t i = 0; i < cameras && count < max; i++) {
         struct view seen;
-        if (!views_sees(v, choose_permute(i, cameras, key), point, normal, &seen))
+        if (!views_sees(v, stratified_permute(i, cameras, key), point, normal, &seen))
             continue;
         if (views_clean(v, &seen))
             view[count++] = seen;

@@ -9,7 +9,7 @@
 #include "common/file.h"
 #include "common/mem.h"
 #include "server/executor/sites.h"
-#include "server/executor/try.h"
+#include "server/executor/trial_job.h"
 
 #define WAIT_SEC 600 /* as the flag's line says */
 
@@ -55,7 +55,7 @@ static int test(const struct config *c, const char *name, double wait_sec) {
     else if (problems.length > 0)
         fprintf(stderr, "%s", buf_text(&problems));
     else
-        is_good = try_site(&site, wait_sec);
+        is_good = trial_job_run(&site, wait_sec);
     if (status == STATUS_OK || site.where)
         site_release(&site);
     int code = is_good ? EXIT_SUCCESS : status == STATUS_OK && problems.length == 0 ? EXIT_FAILURE : EXIT_USAGE;

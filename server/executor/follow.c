@@ -41,14 +41,15 @@ void remote_decide(struct remote_run *r, enum run_way way, int code, const char 
 
 /* --- commands that are sent ---------------------------------------------------------------- */
 
-static void send(struct remote *m, enum errand_kind kind, char *const *words, const struct site_job *job, char *input) {
-    struct errand *e = mem_calloc(1, sizeof *e);
+static void send(struct remote *m, enum site_command_kind kind, char *const *words, const struct site_job *job,
+                 char *input) {
+    struct site_command *e = mem_calloc(1, sizeof *e);
     e->kind = kind;
     snprintf(e->name, sizeof e->name, "%s", job->name ? job->name : "");
     e->argv = site_words(m->parts.site, words, job);
     e->input = input;
     e->begun = now_sec(m);
-    m->parts.courier->send(m->parts.courier, e);
+    m->parts.commands->add(m->parts.commands, e);
 }
 
 void remote_submit(struct remote_run *r, const char *token) {
@@ -63,13 +64,13 @@ void remote_submit(struct remote_run *r, const char *token) {
     r->absent_count = r->unknown_count = 0;
     r->submitted_at = r->heard_at = now_sec(m);
     atomic_fetch_add(&m->figures.submissions, 1);
-    send(m, ERRAND_SUBMIT, m->parts.site->submit, &job, site_script(m->parts.site, &job));
+    send(m, SITE_COMMAND_SUBMIT, m->parts.site->submit, &job, site_script(m->parts.site, &job));
 }
 
 static void cancel(struct remote *m, const char *name, const char *id, int64_t job_id, int number) {
     const struct site_job job = {.name = name, .id = id, .job_id = job_id, .attempt = number};
     atomic_fetch_add(&m->figures.cancels, 1);
-    send(m, ERRAND_CANCEL, m->parts.site->cancel, &job, NULL);
+    send(m, SITE_COMMAND_CANCEL, m->parts.site->cancel, &job, NULL);
 }
 
 void remote_cancel(struct remote_run *r) {
@@ -109,14 +110,14 @@ void remote_ask(struct remote *m) {
     const struct site_job job = {.ids = ids};
     m->asking = true;
     atomic_fetch_add(&m->figures.queries, 1);
-    send(m, ERRAND_STATUS, m->parts.site->status, &job, NULL);
+    send(m, SITE_COMMAND_STATUS, m->parts.site->status, &job, NULL);
     mem_free(ids);
 }
 
 /* --- what a listing says ------------------------------------------------------------------- */
 
 /* The site has it, alive. */
-static void note_alive(struct remote_run *r, const struct listed *job) {
+static void note_alive(struct remote_run *r, const struct job_status *job) {
     struct remote *m = r->remote;
     struct error err;
     r->absent_count = 0;
@@ -137,7 +138,7 @@ static void note_alive(struct remote_run *r, const struct listed *job) {
 }
 
 /* The site does not have it, or not alive. */
-static void note_gone(struct remote_run *r, const struct listed *job) {
+static void note_gone(struct remote_run *r, const struct job_status *job) {
     if (!job && r->submission == SUBMISSION_DOUBTED) {
         r->absent_count++;
         return;
@@ -148,10 +149,10 @@ static void note_gone(struct remote_run *r, const struct listed *job) {
 }
 
 /* The site's jobs that carry the names of attempts that are over. */
-static void cancel_orphans(struct remote *m, const struct listed_jobs *listing) {
+static void cancel_orphans(struct remote *m, const struct job_status_list *listing) {
     int count = 0;
     for (size_t i = 0; i < listing->count && count < ORPHANS_MAX; i++) {
-        const struct listed *job = &listing->job[i];
+        const struct job_status *job = &listing->job[i];
         struct remote_row row;
         long long id = 0;
         int number = 0;
@@ -167,11 +168,11 @@ static void cancel_orphans(struct remote *m, const struct listed_jobs *listing) 
     }
 }
 
-static void take_listing(struct remote *m, const struct errand *e) {
-    struct listed_jobs listing = {0};
+static void take_listing(struct remote *m, const struct site_command *e) {
+    struct job_status_list listing = {0};
     m->asking = false;
     m->ask_at = now_sec(m) + m->parts.site->status_sec;
-    bool is_good = e->status == STATUS_OK && listed_read(&listing, m->parts.site, e->output);
+    bool is_good = e->status == STATUS_OK && job_status_parse(&listing, m->parts.site, e->output);
     if (!is_good) {
         atomic_fetch_add(&m->figures.faults, 1);
         if (!m->complained)
@@ -183,7 +184,7 @@ static void take_listing(struct remote *m, const struct errand *e) {
         /* One that was submitted after the question may be missing from the answer. */
         if (r->has_verdict || r->submission == SUBMISSION_SENT || r->submitted_at >= e->begun)
             continue;
-        const struct listed *job = listed_find(&listing, r->row.name);
+        const struct job_status *job = job_status_find(&listing, r->row.name);
         if (job && (job->state == SITE_WAITING || job->state == SITE_RUNNING || job->state == SITE_UNKNOWN))
             note_alive(r, job);
         else
@@ -191,7 +192,7 @@ static void take_listing(struct remote *m, const struct errand *e) {
     }
     if (is_good)
         cancel_orphans(m, &listing);
-    listed_release(&listing);
+    job_status_release(&listing);
 }
 
 /* --- what a submission says ---------------------------------------------------------------- */
@@ -217,7 +218,7 @@ static bool find_id(const struct site *site, const char *output, char id[64]) {
     return false;
 }
 
-static void take_submission(struct remote *m, const struct errand *e) {
+static void take_submission(struct remote *m, const struct site_command *e) {
     struct remote_run *r = find_run(m, e->name);
     char id[64] = "";
     bool is_good = e->status == STATUS_OK && (find_id(m->parts.site, e->output, id) || !*m->parts.site->submit_id);
@@ -242,15 +243,15 @@ static void take_submission(struct remote *m, const struct errand *e) {
 }
 
 void remote_receive(struct remote *m) {
-    struct errand *e;
-    while ((e = m->parts.courier->receive(m->parts.courier)) != NULL) {
-        if (e->kind == ERRAND_STATUS)
+    struct site_command *e;
+    while ((e = m->parts.commands->next_done(m->parts.commands)) != NULL) {
+        if (e->kind == SITE_COMMAND_STATUS)
             take_listing(m, e);
-        else if (e->kind == ERRAND_SUBMIT)
+        else if (e->kind == SITE_COMMAND_SUBMIT)
             take_submission(m, e);
         else if (e->status != STATUS_OK) /* what should have gone and is still there, the next listing shows */
             atomic_fetch_add(&m->figures.faults, 1);
-        errand_free(e);
+        site_command_free(e);
     }
 }
 

@@ -8,9 +8,8 @@
  *    through, its reply does not decide alone: a failed one is found by name in the site's listing, and repeated, under
  *    another name and token, only after REMOTE_ABSENT_MAX good listings without it.
  * 2. A status command that fails, comes too late or says nothing that can be understood changes nothing.
- * 3. An attempt is lost when REMOTE_UNKNOWN_MAX listings in a row do not have it alive, and its node has been silent
- * for one
- *    and a half of its lease; both by a monotonic clock, which begins anew with the daemon. Then its row is closed,
+ * 3. An attempt is lost when REMOTE_UNKNOWN_MAX listings in a row do not have it alive, and its node has been silent for
+ *    one and a half of its lease; both by a monotonic clock, which begins anew with the daemon. Then its row is closed,
  *    which shuts its node out, and only after its last writer has left it has ended.
  * 4. What the site has ended for its own reasons (pre-empted, out of time, a broken node), or started again, counts as
  *    pre-empted: the job goes on elsewhere and is not charged. But where its time was up before it had saved anything,
@@ -24,7 +23,7 @@
 
 #include <stdatomic.h>
 
-#include "server/executor/courier.h"
+#include "server/executor/command_queue.h"
 #include "server/executor/site.h"
 #include "server/job/run.h"
 #include "server/store/store.h"
@@ -46,7 +45,7 @@ struct remote; /* opaque */
 struct remote_parts { /* all borrowed */
     const struct site *site;
     struct store *store;
-    struct courier *courier;
+    struct command_queue *commands;
     const char *data_dir;
     double (*now)(void *user); /* seconds of a monotonic clock */
     void *user;

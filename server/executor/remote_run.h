@@ -3,7 +3,7 @@
 #ifndef UNBAKE_EXECUTOR_REMOTE_RUN_H
 #define UNBAKE_EXECUTOR_REMOTE_RUN_H
 
-#include "server/executor/listed.h"
+#include "server/executor/job_status.h"
 #include "server/executor/remote.h"
 #include "server/store/remote.h"
 
@@ -54,7 +54,7 @@ struct remote {
 void remote_submit(struct remote_run *r, const char *token);
 /* Sends a status command if one is due and any run needs it. */
 void remote_ask(struct remote *remote);
-/* What has come back: takes all errands that are done. */
+/* What has come back: takes all commands that are done. */
 void remote_receive(struct remote *remote);
 /* Judges runs by how long they have been silent. */
 void remote_judge(struct remote *remote);

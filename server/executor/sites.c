@@ -63,11 +63,11 @@ enum status sites_start(struct sites *s, const struct executor *process, struct 
         s->executor[i] = process;
         if (place->is_process)
             continue;
-        place->courier = courier_thread_new(place->site.deadline_sec, wake, user, err);
-        if (!place->courier)
+        place->commands = command_queue_new(place->site.deadline_sec, wake, user, err);
+        if (!place->commands)
             return STATUS_IO;
         const struct remote_parts parts = {
-            .site = &place->site, .store = store, .courier = place->courier, .data_dir = data_dir, .now = monotonic};
+            .site = &place->site, .store = store, .commands = place->commands, .data_dir = data_dir, .now = monotonic};
         place->remote = remote_new(&parts);
         s->executor[i] = remote_executor(place->remote);
     }
@@ -78,7 +78,7 @@ void sites_release(struct sites *s) {
     for (size_t i = 0; i < s->count; i++) {
         if (s->place[i].is_process)
             continue;
-        courier_thread_free(s->place[i].courier);
+        command_queue_free(s->place[i].commands);
         remote_free(s->place[i].remote);
         site_release(&s->place[i].site);
     }

@@ -7,7 +7,7 @@
 struct site_place {
     bool is_process; /* this machine; the rest is empty then */
     struct site site;
-    struct courier *courier;
+    struct command_queue *commands;
     struct remote *remote;
 };
 

@@ -12,14 +12,14 @@
 #include "common/file.h"
 #include "common/mem.h"
 #include "server/ingest/archive.h"
-#include "server/ingest/applied.h"
-#include "server/ingest/doubled.h"
+#include "server/ingest/applied_transform.h"
+#include "server/ingest/duplicate_frames.h"
 #include "server/ingest/mesh_choice.h"
 #include "server/ingest/mesh/mesh_file.h"
 #include "server/ingest/path.h"
 #include "server/ingest/photos.h"
 #include "server/ingest/reading_apply.h"
-#include "server/ingest/source/missing.h"
+#include "server/ingest/source/unsupported.h"
 #include "server/ingest/source/sources.h"
 #include "server/ingest/frames.h"
 
@@ -113,7 +113,7 @@ static enum status load_cameras(const struct listing *l, const char *chosen, str
     if (!match->source && chosen && listing_find(l, "", chosen)) /* of another name */
         *match = (struct source_match){&source_nerfstudio, mem_strdup(""), mem_strdup(chosen), NULL};
     if (!match->source) {
-        missing_tell_cameras(l, chosen, f);
+        unsupported_tell_cameras(l, chosen, f);
         return STATUS_OK;
     }
     struct source_place place = {l, match->base, match->found};
@@ -274,14 +274,14 @@ enum status bundle_load(const char *dir, const struct reading *given, const stru
     if (match.source) /* else what is missing has been said */
         status = mesh_choose(&choice, &mesh, &f, err);
     if (match.source == &source_nerfstudio)
-        applied_settle(&t, name, mesh, reading.coordinates, &f);
+        applied_transform_settle(&t, name, mesh, reading.coordinates, &f);
     if (mesh)
         status = load_mesh(root, mesh, &reading, limits, scene, &f, err);
     if (status == STATUS_OK && match.source)
         status = settle_coordinates(&t, name, reading.coordinates, scene, &f, err);
     reading_apply_frames(&reading, &t);
     scene->pose_axes = reading.axes != AXES_OF_FORMAT ? reading.axes : t.axes;
-    doubled_settle(&t, name, &f);
+    duplicate_frames_remove(&t, name, &f);
     if (status == STATUS_OK && has_frames)
         status = load_photographs(root, name, &t, limits, pool, scene, &f, err);
     if (status == STATUS_OK && f.problem_count > 0 && listing.link_count > 0)

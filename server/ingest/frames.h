@@ -50,7 +50,7 @@ struct frames {
     enum matrix_axes axes; /* of the file's matrices; the frames' are with our axes already */
     char *mesh;            /* clean path or NULL; owned */
     char *point_cloud;     /* ply_file_path, a mesh or a point cloud, or NULL; owned */
-    /* stored = applied_scale * applied (world of the capture), where the file says so: applied.h */
+    /* stored = applied_scale * applied (world of the capture), where the file says so: applied_transform.h */
     bool has_applied;
     double applied[3][4], applied_scale;
     /* Others than those of the poses, which are called `coordinates`; NULL: "file". */

@@ -11,7 +11,7 @@
 #include "common/mem.h"
 #include "server/ingest/mesh/mesh_file.h"
 #include "server/ingest/path.h"
-#include "server/ingest/source/missing.h"
+#include "server/ingest/source/unsupported.h"
 
 /* Bytes of a triangle in a binary glTF file, about: half a vertex of 32 bytes and three indices. */
 #define GLTF_TRIANGLE_BYTES 28
@@ -253,7 +253,7 @@ static enum status choose_among(const struct mesh_choice *choice, char **found, 
     } else if (status == STATUS_OK && c.count > 0) {
         *found = mem_strdup(c.item[0].file->path);
     } else if (status == STATUS_OK) {
-        missing_tell_mesh(choice->listing, choice->match->source, c.unread, c.cloud_count > 0, f);
+        unsupported_tell_mesh(choice->listing, choice->match->source, c.unread, c.cloud_count > 0, f);
     }
     mem_free(c.item);
     return status;

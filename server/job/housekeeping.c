@@ -12,9 +12,9 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "server/data/attempt_folder.h"
-#include "server/data/attempt_tidy.h"
+#include "server/data/attempt_cleanup.h"
 #include "server/data/layout.h"
-#include "server/job/measure.h"
+#include "server/job/disk_usage.h"
 #include "server/store/remote.h"
 
 #define RUNNING_MAX 10000 /* attempts that an earlier daemon may have left running */
@@ -56,7 +56,7 @@ void housekeeping_drop_temporary(const char *dir) {
 
 void housekeeping_tidy_job(const char *data_dir, struct store *store, int64_t job_id, int ended) {
     struct error err;
-    if (attempt_tidy(data_dir, store, job_id, ended, &err) != STATUS_OK)
+    if (attempt_cleanup(data_dir, store, job_id, ended, &err) != STATUS_OK)
         log_warning("job %lld: what its attempts have left over stays: %s", (long long)job_id, err.message);
 }
 
@@ -92,7 +92,7 @@ static enum status drop_checkpoint(const char *data_dir, struct store *store, in
     enum status status = attempt_folder_drop_checkpoint(data_dir, id, err);
     if (status == STATUS_OK)
         housekeeping_tidy_job(data_dir, store, id, 0);
-    status = status == STATUS_OK ? measure_job(store, id, dir, err) : status;
+    status = status == STATUS_OK ? disk_usage_enter_job(store, id, dir, err) : status;
     mem_free(dir);
     return status;
 }

@@ -15,7 +15,7 @@
 #include "server/job/worker_log.h"
 #include "server/job/worker_messages.h"
 #include "server/job/housekeeping.h"
-#include "server/job/measure.h"
+#include "server/job/disk_usage.h"
 #include "server/job/memory.h"
 #include "server/worker/progress.h"
 
@@ -213,7 +213,7 @@ static void add_left_out(struct attempt *a) {
 /* Enters the size of a good scene. A size above what its owners may keep is a problem of the scene. */
 static enum status settle_size(struct attempt *a, struct store *store, struct error *err) {
     struct error why = {0};
-    struct disk_use use = {.bytes = measure_folder(a->dir)};
+    struct disk_use use = {.bytes = disk_usage_of_folder(a->dir)};
     memcpy(use.scene_id, a->scene_id, sizeof use.scene_id);
     enum status status =
         use.bytes < 0 ? STATUS_OK
@@ -312,7 +312,7 @@ enum status outcome_settle(struct attempt *a, struct store *store, struct trash 
     if (status == STATUS_OK && a->job_id) {
         take_log(a);
         housekeeping_tidy_job(a->data_dir, store, a->job_id, a->number);
-        status = measure_job(store, a->job_id, a->whole_dir, err);
+        status = disk_usage_enter_job(store, a->job_id, a->whole_dir, err);
     }
     if (status == STATUS_OK)
         status = a->job_id ? settle_job(a, store, &verdict, err) : settle_check(a, store, trash, &verdict, err);

@@ -25,8 +25,8 @@
 #include "server/job/deliveries.h"
 #include "server/job/disk.h"
 #include "server/job/housekeeping.h"
-#include "server/job/lanes.h"
-#include "server/job/measure.h"
+#include "server/job/dispatch.h"
+#include "server/job/disk_usage.h"
 #include "server/job/outcome.h"
 #include "server/job/resume.h"
 #include "server/job/worker_messages.h"
@@ -42,9 +42,9 @@ struct scheduler {
     atomic_int running;
     struct counters counters;
     atomic_ulong rounds;
-    struct lanes lanes;
+    struct dispatch dispatch;
     size_t slot_count;
-    struct attempt *slot; /* [slot_count]; the first lanes.job_slots run jobs */
+    struct attempt *slot; /* [slot_count]; the first dispatch.job_slots run jobs */
     struct checks checks;
     struct trash *trash;    /* NULL: this thread removes trees itself */
     bool must_retry;        /* something failed that may work later */
@@ -73,9 +73,9 @@ enum status scheduler_new(struct scheduler **out, const struct scheduler_config 
     }
     if (config->small_renders == 0)
         s->config.small_render_cost = 0.0; /* without a lane of their own they wait with the others */
-    lanes_init(&s->lanes, &s->config, store, &s->counters);
-    s->slot_count = s->lanes.job_slots + (size_t)(config->max_checks > 0 ? config->max_checks : CHECKS_AT_ONCE);
-    s->lanes.slot = s->slot = mem_calloc(s->slot_count, sizeof *s->slot);
+    dispatch_init(&s->dispatch, &s->config, store, &s->counters);
+    s->slot_count = s->dispatch.job_slots + (size_t)(config->max_checks > 0 ? config->max_checks : CHECKS_AT_ONCE);
+    s->dispatch.slot = s->slot = mem_calloc(s->slot_count, sizeof *s->slot);
     s->poll = mem_calloc(1 + RUN_FDS * (s->slot_count + DELIVERIES_AT_ONCE), sizeof *s->poll);
     *out = s;
     return STATUS_OK;
@@ -89,7 +89,7 @@ void scheduler_free(struct scheduler *s) {
     close(s->wake_fd);
     for (size_t i = 0; i < s->slot_count; i++) /* what outlives this daemon, and what could not be entered */
         attempt_empty(&s->slot[i]);
-    lanes_release(&s->lanes);
+    dispatch_release(&s->dispatch);
     mem_free(s->slot);
     mem_free(s->poll);
     mem_free(s);
@@ -144,14 +144,14 @@ static enum status check_again(struct scheduler *s, struct error *err) {
 }
 
 static void start_checks(struct scheduler *s) {
-    struct attempt *slots = s->slot + s->lanes.job_slots;
+    struct attempt *slots = s->slot + s->dispatch.job_slots;
     struct error err;
     enum status status = check_again(s, &err);
-    for (size_t i = 0; i < s->slot_count - s->lanes.job_slots && status == STATUS_OK; i++) {
+    for (size_t i = 0; i < s->slot_count - s->dispatch.job_slots && status == STATUS_OK; i++) {
         struct unchecked next;
         if (slots[i].phase != ATTEMPT_EMPTY)
             continue;
-        status = checks_next(&s->checks, s->store, slots, s->slot_count - s->lanes.job_slots, &next, &err);
+        status = checks_next(&s->checks, s->store, slots, s->slot_count - s->dispatch.job_slots, &next, &err);
         if (status == STATUS_OK)
             status = attempt_start_check(&slots[i], &s->config, s->store, &next, s->config.thread_count, &err);
     }
@@ -203,7 +203,7 @@ static void follow_wishes(struct scheduler *s) {
     }
     for (size_t i = 0; i < count; i++) {
         struct attempt *a = NULL;
-        for (size_t k = 0; k < s->lanes.job_slots && !a; k++)
+        for (size_t k = 0; k < s->dispatch.job_slots && !a; k++)
             if (s->slot[k].phase != ATTEMPT_EMPTY && s->slot[k].job_id == list[i].key.job_id &&
                 s->slot[k].number == list[i].key.number)
                 a = &s->slot[k];
@@ -231,8 +231,8 @@ static void watch_disk(struct scheduler *s) {
     atomic_store(&s->waits_for_disk, s->disk.is_low);
     if (!changed && !s->disk.is_low)
         return;
-    lanes_forget_reasons(&s->lanes); /* the reason that a job waits is the disk now, or none */
-    for (size_t i = 0; s->disk.is_low && i < s->lanes.job_slots; i++)
+    dispatch_forget_reasons(&s->dispatch); /* the reason that a job waits is the disk now, or none */
+    for (size_t i = 0; s->disk.is_low && i < s->dispatch.job_slots; i++)
         ask_to_stop(s, &s->slot[i]);
     if (store_job_explain(s->store, 0, s->disk.is_low ? s->disk.reason : "", DISK_REASON,
                           s->disk.is_low ? DISK_HINT : "", &err) != STATUS_OK)
@@ -292,7 +292,7 @@ static void listen_and_settle(struct scheduler *s) {
         struct attempt *a = &s->slot[i];
         struct error err;
         worker_messages_read(a, s->store, &s->counters);
-        bool is_postponed = i >= s->lanes.job_slots && outcome_lacks_room(a);
+        bool is_postponed = i >= s->dispatch.job_slots && outcome_lacks_room(a);
         if (a->phase == ATTEMPT_ENDED && outcome_settle(a, s->store, s->trash, &s->counters, &err) != STATUS_OK)
             retry_later(s, "cannot record how an attempt ended", &err);
         else if (is_postponed)
@@ -313,14 +313,14 @@ enum status scheduler_run(struct scheduler *s, struct error *err) {
     size_t requeued;
     housekeeping_after_kill(&s->config, s->store);
     enum status status =
-        resume_all(s->slot, s->lanes.job_slots, &s->lanes.places, &s->config, s->store, &requeued, err);
+        resume_all(s->slot, s->dispatch.job_slots, &s->dispatch.places, &s->config, s->store, &requeued, err);
     if (status == STATUS_OK)
         status = store_scene_check_again(s->store, err);
     if (status != STATUS_OK)
         return status;
     if (requeued)
         log_info("%zu jobs that ran when the daemon ended are queued again", requeued);
-    measure_unknown(&s->config, s->store);
+    disk_usage_enter_unknown(&s->config, s->store);
     for (;;) {
         bool stopping = atomic_load(&s->stopping);
         s->must_retry = false;
@@ -335,7 +335,7 @@ enum status scheduler_run(struct scheduler *s, struct error *err) {
             watch_disk(s);
             start_checks(s);
             struct error why;
-            if (!s->disk.is_low && lanes_start(&s->lanes, &why) != STATUS_OK)
+            if (!s->disk.is_low && dispatch_start(&s->dispatch, &why) != STATUS_OK)
                 retry_later(s, "cannot start a job", &why);
             keep_house(s);
             if (deliveries_run(&s->deliveries, &s->config, s->store, &why) != STATUS_OK)

@@ -18,7 +18,7 @@
 #include "common/mem.h"
 #include "common/protocol.h"
 #include "server/data/layout.h"
-#include "server/job/measure.h"
+#include "server/job/disk_usage.h"
 
 #define THINNED_SEC 1.0   /* between two reports that are entered, once they are thinned */
 #define UNTAKEN_MAX 2000  /* files; a normal job has a few hundred */
@@ -263,7 +263,7 @@ static void note_space(const struct message_listener *l, const cJSON *line) {
     struct attempt *a = l->attempt;
     struct error err;
     double bytes;
-    struct disk_use use = {.job_id = a->job_id, .bytes = a->job_id ? measure_folder(a->whole_dir) : -1};
+    struct disk_use use = {.job_id = a->job_id, .bytes = a->job_id ? disk_usage_of_folder(a->whole_dir) : -1};
     if (json_number(line, "bytes", "space", -1.0, &bytes, NULL) != STATUS_OK || !(bytes >= 0.0 && bytes < 1e15) ||
         use.bytes < 0)
         return;

@@ -5,7 +5,7 @@
 
 #include "common/rng.h"
 #include "common/spaced.h"
-#include "server/capture/best.h"
+#include "server/capture/top_k.h"
 #include "server/gather/highlight.h"
 #include "server/render/sampler.h"
 #include "server/scene/surface.h"
@@ -79,10 +79,10 @@ static bool changed(const struct divide *d, uint32_t texel, int thread) {
         uint32_t train;
         float shown;
     } lit[BOTH_KINDS];
-    struct best drawn;
-    struct best_item item[BOTH_KINDS];
+    struct top_k drawn;
+    struct top_k_item item[BOTH_KINDS];
     size_t black_count = 0, own = 0;
-    best_init(&drawn, item, BOTH_KINDS);
+    top_k_init(&drawn, item, BOTH_KINDS);
     if (!surface_at_texel(s->mesh, s->atlas, s->inverse, texel, &at) || !divide_lambert(d, texel, &white))
         return false;
     for (uint32_t t = 0; t < d->views->train_count; t++) {
@@ -92,8 +92,8 @@ static bool changed(const struct divide *d, uint32_t texel, int thread) {
                                    ? kind_of(d, &view, at.triangle, rgb_mean(white), &shown)
                                    : TELLS_NOTHING;
         black_count += kind == TELLS_BLACK;
-        size_t slot = kind == TELLS_LIT ? best_put(&drawn, drawn_weight(texel, t), t) : BEST_NONE;
-        if (slot != BEST_NONE)
+        size_t slot = kind == TELLS_LIT ? top_k_put(&drawn, drawn_weight(texel, t), t) : TOP_K_NONE;
+        if (slot != TOP_K_NONE)
             lit[slot].train = t, lit[slot].shown = shown;
     }
     if (black_count < MIN_OBSERVATIONS)

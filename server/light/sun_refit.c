@@ -45,7 +45,7 @@ static void place_texel(void *user, size_t index, int thread) {
     const struct placing *job = user;
     const struct divide *d = job->divide;
     const struct surface *s = &d->surface;
-    const struct measured *m = &d->measured[job->texel[index]];
+    const struct measurement *m = &d->measured[job->texel[index]];
     struct light_place *p = &job->place[index];
     struct irradiance light = {0};
     rgb white;
@@ -56,7 +56,7 @@ static void place_texel(void *user, size_t index, int thread) {
     sun_add_light(d->sun, d->accel, &p->at, &light);
     rgb of_sun = irradiance_diffuse(&light, p->at.shading, 1.0f, p->at.shading);
     p->weight = 1.0f;
-    p->shown = rgb_clamp(rgb_mul(measured_value(m), white), 0.0f, INFINITY);
+    p->shown = rgb_clamp(rgb_mul(measurement_value(m), white), 0.0f, INFINITY);
     p->white = rgb_clamp(rgb_sub(white, of_sun), 0.0f, INFINITY);
     p->open = sun_visibility(d->sun, d->accel, &p->at, 0);
     float cosine = vec3_dot(d->sun->direction, p->at.shading);

@@ -33,8 +33,8 @@ struct grids {
 };
 
 /* What one texel adds. */
-static struct chart_evidence evidence_of(const struct measured *m) {
-    rgb v = measured_value(m);
+static struct chart_evidence evidence_of(const struct measurement *m) {
+    rgb v = measurement_value(m);
     double weight = MIXING_FLOOR / (MIXING_FLOOR + (double)image_float_from_half(m->mixing));
     return (struct chart_evidence){
         {weight * (double)v.r, weight * (double)v.g, weight * (double)v.b}, weight * (double)rgb_dot(v, v), weight};
@@ -90,7 +90,7 @@ static struct chart_evidence *grids_cell(const struct grids *g, int level, vec3 
 struct prior_sums {
     const struct surface *surface;
     const bool *is_emitter;
-    const struct measured *measured;
+    const struct measurement *measured;
     struct parallel *pool;
     struct grids grids;
     struct chart_evidence *around; /* [chart_count] means over the surroundings of each chart's texels */
@@ -209,8 +209,8 @@ static struct color_prior mix(struct color_prior a, struct color_prior b, float 
                                 a.variance + part_of_b * (b.variance - a.variance)};
 }
 
-struct color_prior *color_priors(const struct surface *surface, const bool *is_emitter, const struct measured *measured,
-                                 struct parallel *pool) {
+struct color_prior *color_priors(const struct surface *surface, const bool *is_emitter,
+                                 const struct measurement *measured, struct parallel *pool) {
     struct prior_sums s = {.surface = surface, .is_emitter = is_emitter, .measured = measured, .pool = pool};
     sums_make(&s);
     struct color_prior *prior = mem_array(surface->atlas->chart_count, sizeof *prior);

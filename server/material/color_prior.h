@@ -11,7 +11,7 @@
 #include "server/scene/surface.h"
 
 /* [chart_count] from measured[height][width]; the caller's. Emitters get NEUTRAL_BASE_COLOR. */
-struct color_prior *color_priors(const struct surface *surface, const bool *is_emitter, const struct measured *measured,
-                                 struct parallel *pool);
+struct color_prior *color_priors(const struct surface *surface, const bool *is_emitter,
+                                 const struct measurement *measured, struct parallel *pool);
 
 #endif

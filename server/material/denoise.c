@@ -42,7 +42,7 @@ struct item {
 struct denoise_job {
     const struct atlas *atlas;
     const struct inverse_uv *inverse;
-    const struct measured *measured;
+    const struct measurement *measured;
     const struct color_prior *prior;
     struct texture *out;
     uint32_t stride;
@@ -69,11 +69,11 @@ static void tile_read(struct wiener *t, const struct denoise_job *job, const str
     size_t at = 0;
     for (long y = b->y0; y < b->y1; y++) {
         for (long x = b->x0; x < b->x1; x++, at++) {
-            struct measured m = {0};
+            struct measurement m = {0};
             t->inside[at] = is_inside(job, item->chart, x, y);
             if (t->inside[at])
                 m = job->measured[(size_t)y * job->inverse->width + (size_t)x];
-            rgb value = measured_value(&m);
+            rgb value = measurement_value(&m);
             rgb noise = rgb_from_half(m.noise);
             const float plane[WIENER_PLANES] = {
                 value.r, value.g, value.b, noise.r, noise.g, noise.b, image_float_from_half(m.mixing), 1.0f};
@@ -276,8 +276,8 @@ static size_t list_items(const struct denoise_job *job, struct item *item) {
 }
 
 void denoise(const struct atlas *atlas, const struct inverse_uv *inverse, size_t triangle_count,
-             const struct measured *measured, const struct color_prior *prior, const bool *wanted, struct texture *out,
-             uint32_t stride, uint16_t *deviation, struct parallel *pool) {
+             const struct measurement *measured, const struct color_prior *prior, const bool *wanted,
+             struct texture *out, uint32_t stride, uint16_t *deviation, struct parallel *pool) {
     struct denoise_job job = {.atlas = atlas,
                               .inverse = inverse,
                               .measured = measured,

@@ -59,7 +59,7 @@ static void step_texel(struct detail *d, uint32_t texel) {
     const _Atomic int32_t *sum = d->sum[texel];
     rgb step = rgb_scale(rgb_make((float)sum[RED], (float)sum[GREEN], (float)sum[BLUE]), scale);
     rgb change = rgb_scale(rgb_add(extrapolated(d, texel), step), d->signal_share[texel]);
-    rgb start = measured_value(&d->in.measured[texel]);
+    rgb start = measurement_value(&d->in.measured[texel]);
     memcpy(d->change[texel][1], d->change[texel][0], sizeof d->change[texel][0]);
     rgb_to_half(d->change[texel][0],
                 rgb_make(bounded(change.r, start.r), bounded(change.g, start.g), bounded(change.b, start.b)));
@@ -87,10 +87,10 @@ void detail_step(struct detail *d) {
 void detail_finish(struct detail *d) {
     for (size_t i = 0; i < d->in.surface.inverse->valid_count; i++) {
         uint32_t texel = d->in.surface.inverse->valid[i];
-        struct measured *m = &d->in.measured[texel];
+        struct measurement *m = &d->in.measured[texel];
         if (!(d->signal_share[texel] > 0.0f))
             continue;
-        rgb_to_half(m->value, rgb_add(measured_value(m), rgb_from_half(d->change[texel][0])));
+        rgb_to_half(m->value, rgb_add(measurement_value(m), rgb_from_half(d->change[texel][0])));
         rgb_to_half(m->noise, rgb_scale(rgb_from_half(m->noise), 1.0f - d->signal_share[texel]));
     }
 }

@@ -6,7 +6,7 @@
  * Residuals are high-pass filtered over a few pixels, since errors of light and highlights are smooth.
  *
  * Deconvolution amplifies noise. Each texel's correction is shrunk by the share of noise in its residual, measured by
- * one half of the photographs against the other (halves.h). Several splits are used, since in one the only sharp
+ * one half of the photographs against the other (split_half.h). Several splits are used, since in one the only sharp
  * photograph of a place may be alone in its half; where one half always has almost no weight a texel is not changed.
  * Halves of noise alone agree by chance; as much as the photographs' own noise (noise.h) explains is taken off.
  * The noise sample in `measured` includes the differences of blur between photographs, so it is reduced by the same

@@ -4,7 +4,7 @@
 #include <math.h>
 
 #include "common/mem.h"
-#include "server/capture/halves.h"
+#include "server/capture/split_half.h"
 #include "server/material/detail_pixels.h"
 #include "server/scene/rgb_half.h"
 
@@ -54,7 +54,7 @@ static void sum_weighted(struct detail *d, int split, float scale) {
     detail_clear_sums(d);
     d->sum_scale = scale;
     for (uint32_t t = 0; t < d->in.views->train_count; t++)
-        if (split == ALL_PHOTOGRAPHS || halves_of(t, split) == 0)
+        if (split == ALL_PHOTOGRAPHS || split_half_of(t, split) == 0)
             detail_pixels_rows(d, t, weigh_row);
 }
 

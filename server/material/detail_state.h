@@ -14,7 +14,7 @@
 #include "common/parallel.h"
 #include "server/capture/noise.h"
 #include "server/capture/views.h"
-#include "server/material/measured.h"
+#include "server/material/measurement.h"
 #include "server/scene/surface.h"
 
 #define DETAIL_CHUNK 4096      /* texels a work item */
@@ -27,7 +27,7 @@ struct detail_input {
     const struct noise *noise;    /* of the photographs */
     const bool *is_emitter;       /* [segment_count] */
     const uint16_t (*lambert)[3]; /* [height][width] radiance at albedo 1 (divide.h); 0: not known */
-    struct measured *measured;    /* [height][width] value and noise are written */
+    struct measurement *measured; /* [height][width] value and noise are written */
     struct parallel *pool;
 };
 

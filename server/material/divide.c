@@ -8,7 +8,7 @@
 #include "common/image.h"
 #include "common/mem.h"
 #include "common/quantile.h"
-#include "server/capture/best.h"
+#include "server/capture/top_k.h"
 #include "server/gather/highlight.h"
 #include "server/material/color_prior.h"
 #include "server/render/bsdf.h"
@@ -96,9 +96,9 @@ struct divide_candidate {
 
 /* The photographs of a texel with the greatest weights. */
 struct divide_candidates {
-    struct best best;
-    struct best_item item[MEASURED_OBSERVATIONS];
-    struct divide_candidate candidate[MEASURED_OBSERVATIONS];
+    struct top_k best;
+    struct top_k_item item[MEASUREMENT_OBSERVATIONS];
+    struct divide_candidate candidate[MEASUREMENT_OBSERVATIONS];
 };
 
 static bool is_saturated(const struct divide_candidate *c) {
@@ -117,7 +117,7 @@ static void add_candidate(const struct divide *d, uint32_t segment, const struct
                                         views_direction(d->views, train, at->position));
     rgb typical = rgb_scale(c.unit_diffuse, TYPICAL_BASE_COLOR);
     /* An upper bound of the weight: edges and mixing only lower it. Saves the visibility ray. */
-    if (!best_takes(&of->best, c.view.weight * noise_weight(d->noise, d->views, &c.view, typical, 0.0f), train) ||
+    if (!top_k_takes(&of->best, c.view.weight * noise_weight(d->noise, d->views, &c.view, typical, 0.0f), train) ||
         !views_unoccluded(d->views, train, at->position, at->normal) ||
         photograph_has_firefly(photo, c.view.x, c.view.y) || !photograph_sample(photo, c.view.x, c.view.y, &s))
         return;
@@ -128,8 +128,8 @@ static void add_candidate(const struct divide *d, uint32_t segment, const struct
     float times_typical = rgb_mean(c.observed) / fmaxf(rgb_mean(typical), MIN_LAMBERT * d->views->median_radiance);
     c.weight = c.view.weight * views_trust(d->views, &c.view, at->triangle) *
                noise_weight(d->noise, d->views, &c.view, typical, c.mixing * times_typical * times_typical);
-    size_t slot = best_put(&of->best, c.weight, train);
-    if (slot != BEST_NONE)
+    size_t slot = top_k_put(&of->best, c.weight, train);
+    if (slot != TOP_K_NONE)
         of->candidate[slot] = c;
 }
 
@@ -176,8 +176,8 @@ static struct robust_sample above_bound(struct robust_sample sample, const bool 
 }
 
 /* Whether most of the observations of a texel say no more than a lower bound, by the median of their brightness. */
-static bool is_bound(const struct divide_candidates *of, const struct measured_observations *observations) {
-    struct bounded gray[MEASURED_OBSERVATIONS];
+static bool is_bound(const struct divide_candidates *of, const struct measurement_observations *observations) {
+    struct bounded gray[MEASUREMENT_OBSERVATIONS];
     float median;
     bool any = false;
     for (size_t i = 0; i < observations->count; i++) {
@@ -189,7 +189,7 @@ static bool is_bound(const struct divide_candidates *of, const struct measured_o
 
 /* Leaves out the observations that saturate. But if the median is a lower bound those that do not are what noise or a
  * shadow has left below, and would say that white is grey: then only the greatest bound is kept. */
-static void settle_bounds(const struct divide_candidates *of, struct measured_observations *observations) {
+static void settle_bounds(const struct divide_candidates *of, struct measurement_observations *observations) {
     bool bound = is_bound(of, observations);
     struct robust_sample *observation = observations->observation, greatest = {.gray = -INFINITY};
     size_t kept = 0, count = observations->count;
@@ -206,13 +206,13 @@ static void settle_bounds(const struct divide_candidates *of, struct measured_ob
 }
 
 static void observe_all(const struct divide *d, uint32_t texel, struct incident *scratch, struct irradiance *light,
-                        struct measured_observations *observations) {
+                        struct measurement_observations *observations) {
     struct surface_point at;
     struct divide_candidates candidates;
     observations->count = 0;
     if (!light_at(d, texel, &at, light))
         return;
-    best_init(&candidates.best, candidates.item, MEASURED_OBSERVATIONS);
+    top_k_init(&candidates.best, candidates.item, MEASUREMENT_OBSERVATIONS);
     for (uint32_t t = 0; t < d->views->train_count; t++)
         add_candidate(d, surface_segment(&d->surface, texel), &at, light, t, &candidates);
     for (; observations->count < candidates.best.count; observations->count++)
@@ -226,8 +226,9 @@ rgb divide_color(const struct divide *d, uint32_t texel) {
     return rgb_make(from[0], from[1], from[2]);
 }
 
-static struct measured mean_of(struct measured_observations *observations, const struct irradiance *light) {
-    return measured_mean(observations, OUTLIER_SCALE, divide_channels(light->noise, irradiance_flux(light), FLT_MIN));
+static struct measurement mean_of(struct measurement_observations *observations, const struct irradiance *light) {
+    return measurement_mean(observations, OUTLIER_SCALE,
+                            divide_channels(light->noise, irradiance_flux(light), FLT_MIN));
 }
 
 /* The texel whose measurement this one takes: its own, or that of its stride x stride block. */
@@ -240,10 +241,10 @@ static uint32_t source_texel(const struct divide *d, uint32_t texel) {
 }
 
 static void divide_texel(struct divide *d, uint32_t texel, struct incident *scratch) {
-    struct measured_observations observations;
+    struct measurement_observations observations;
     struct irradiance light;
     observe_all(d, texel, scratch, &light, &observations);
-    d->measured[texel] = (struct measured){0};
+    d->measured[texel] = (struct measurement){0};
     if (observations.count > 0 && !d->is_emitter[surface_segment(&d->surface, texel)])
         d->measured[texel] = mean_of(&observations, &light);
 }
@@ -297,13 +298,14 @@ struct diffuse_job {
 
 static void diffuse_texel(const void *user, uint32_t texel) {
     const struct diffuse_job *job = user;
-    const struct measured *m = &job->divide->measured[texel];
+    const struct measurement *m = &job->divide->measured[texel];
     rgb lambert;
     if (source_texel(job->divide, texel) != texel || !(m->weight > 0.0f) || job->divide->fused->is_bound[texel] ||
         !divide_lambert(job->divide, texel, &lambert))
         return;
     job->diffuse->count[texel] = m->weight;
-    rgb_to_half(job->diffuse->radiance[texel], rgb_mul(rgb_clamp(measured_value(m), 0.0f, DIVIDE_MAX_ALBEDO), lambert));
+    rgb_to_half(job->diffuse->radiance[texel],
+                rgb_mul(rgb_clamp(measurement_value(m), 0.0f, DIVIDE_MAX_ALBEDO), lambert));
 }
 
 void divide_diffuse(const struct divide *d, struct fused *diffuse) {
@@ -357,8 +359,8 @@ static void keep_measured(struct divide *d, const struct color_prior *prior) {
     const struct inverse_uv *inverse = d->surface.inverse;
     for (size_t i = 0; i < inverse->valid_count; i++) {
         uint32_t texel = inverse->valid[i];
-        const struct measured *m = &d->measured[texel];
-        rgb value = m->weight > 0.0f ? measured_value(m) : prior[surface_chart(&d->surface, texel)].mean;
+        const struct measurement *m = &d->measured[texel];
+        rgb value = m->weight > 0.0f ? measurement_value(m) : prior[surface_chart(&d->surface, texel)].mean;
         float *to = d->materials->base_color.texel[texel];
         to[0] = clampf(value.r, 0.0f, 1.0f);
         to[1] = clampf(value.g, 0.0f, 1.0f);

@@ -2,8 +2,8 @@
  *
  * Each observation of a texel gives a base colour, (observed - highlight) / lambert. Their robust mean is taken,
  * weighted as in fuse.h, and lower where the highlight is a large part of the observation. Of more than
- * MEASURED_OBSERVATIONS photographs those of the greatest weights are used, without regard to highlights. The result is
- * denoised (denoise.h); texels that were not measured are filled in from their neighbours or their prior
+ * MEASUREMENT_OBSERVATIONS photographs those of the greatest weights are used, without regard to highlights. The
+ * result is denoised (denoise.h); texels that were not measured are filled in from their neighbours or their prior
  * (color_prior.h). */
 #ifndef UNBAKE_MATERIAL_DIVIDE_H
 #define UNBAKE_MATERIAL_DIVIDE_H
@@ -34,12 +34,12 @@ struct divide {
     const bool *is_emitter;      /* [segment_count] */
     struct materials *materials; /* base_color and deviation are written, roughness and specular are read */
     struct parallel *pool;
-    bool denoises;             /* else base colour is as measured */
-    size_t highlight_samples;  /* directions of one highlight (divide_highlight_samples) */
-    uint32_t stride;           /* one texel of each chart is measured in every stride x stride */
-    float *typical;            /* [segment_count] mean base colour, by the last divide_finish; .5 before */
-    struct incident *scratch;  /* [threads] */
-    struct measured *measured; /* [height][width] base colour by the photographs */
+    bool denoises;                /* else base colour is as measured */
+    size_t highlight_samples;     /* directions of one highlight (divide_highlight_samples) */
+    uint32_t stride;              /* one texel of each chart is measured in every stride x stride */
+    float *typical;               /* [segment_count] mean base colour, by the last divide_finish; .5 before */
+    struct incident *scratch;     /* [threads] */
+    struct measurement *measured; /* [height][width] base colour by the photographs */
 };
 
 /* Directions of one highlight where a pixel covers that many texels. */

@@ -24,7 +24,7 @@ struct outgoing_job {
 static void find_outgoing(const void *user, uint32_t texel) {
     const struct outgoing_job *job = user;
     const struct divide *d = job->divide;
-    const struct measured *m = &d->measured[texel];
+    const struct measurement *m = &d->measured[texel];
     uint32_t segment = surface_segment(&d->surface, texel);
     struct surface_point at;
     struct irradiance light;
@@ -36,7 +36,7 @@ static void find_outgoing(const void *user, uint32_t texel) {
     if (!mirrors)
         flux = irradiance_flux(&light);
     float known = m->weight > 0.0f ? MIXING_HALF / (MIXING_HALF + image_float_from_half(m->mixing)) : 0.0f;
-    rgb measured = rgb_clamp(measured_value(m), 0.0f, DIVIDE_MAX_ALBEDO), expected = divide_color(d, texel);
+    rgb measured = rgb_clamp(measurement_value(m), 0.0f, DIVIDE_MAX_ALBEDO), expected = divide_color(d, texel);
     rgb base = rgb_mad(rgb_scale(expected, 1.0f - known), known, measured);
     rgb unit_diffuse = irradiance_diffuse_mean(&light, at.shading, d->materials->roughness[segment]);
     rgb diffuse = rgb_mul(base, unit_diffuse);

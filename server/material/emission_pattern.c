@@ -5,7 +5,7 @@
 
 #include "common/mem.h"
 #include "common/quantile.h"
-#include "server/capture/best.h"
+#include "server/capture/top_k.h"
 #include "server/material/denoise.h"
 #include "server/scene/by_segment.h"
 #include "server/scene/surface.h"
@@ -46,10 +46,10 @@ struct finder {
     struct texels_by_segment texels;   /* owned, as all below */
     struct emitter *emitter;           /* [emitter_count] */
     size_t emitter_count;
-    struct measured *measured; /* [height][width] observed radiance, times the emitter's scale */
-    struct color_prior *prior; /* [chart_count] where has_emitter */
-    bool *has_emitter;         /* [chart_count] charts of emitters that may have a pattern */
-    struct texture denoised;   /* `measured`, denoised */
+    struct measurement *measured; /* [height][width] observed radiance, times the emitter's scale */
+    struct color_prior *prior;    /* [chart_count] where has_emitter */
+    bool *has_emitter;            /* [chart_count] charts of emitters that may have a pattern */
+    struct texture denoised;      /* `measured`, denoised */
 };
 
 /* --- observations ---------------------------------------------------------------------------------- */
@@ -80,23 +80,24 @@ static struct robust_sample observation_of(const struct emitter *e, const struct
 /* Observations of a texel away from edges, those of the greatest weights. Saturated ones are lower bounds: the greatest
  * is used where there is no other observation, and only if it exceeds the segment's radiance; else the texel may be as
  * bright as the rest of the segment. */
-static void observe_all(const struct emitter *e, uint32_t texel, struct measured_observations *observations) {
+static void observe_all(const struct emitter *e, uint32_t texel, struct measurement_observations *observations) {
     const struct surface *s = &e->finder->in.surface;
     const struct views *views = e->finder->in.views;
     rgb fused = fused_radiance(e->finder->in.fused, texel);
     struct robust_sample bound = {.weight = 0.0f};
     struct surface_point at;
-    struct best best;
-    struct best_item item[MEASURED_OBSERVATIONS];
+    struct top_k best;
+    struct top_k_item item[MEASUREMENT_OBSERVATIONS];
     observations->count = 0;
     if (!surface_at_texel(s->mesh, s->atlas, s->inverse, texel, &at))
         return;
-    best_init(&best, item, MEASURED_OBSERVATIONS);
+    top_k_init(&best, item, MEASUREMENT_OBSERVATIONS);
     for (uint32_t t = 0; t < views->train_count; t++) {
         const struct photograph *photo = &views->scene->photograph[views->train[t]];
         struct view view;
         struct photograph_sample sample;
-        if (!views_faces(views, t, at.position, at.normal, &view) || !best_takes(&best, weight_of(e, &view, 0.0f), t) ||
+        if (!views_faces(views, t, at.position, at.normal, &view) ||
+            !top_k_takes(&best, weight_of(e, &view, 0.0f), t) ||
             views_edge(views, &view, at.triangle) >= VIEWS_EDGE - 1 ||
             !views_unoccluded(views, t, at.position, at.normal) || !photograph_sample(photo, view.x, view.y, &sample))
             continue;
@@ -104,8 +105,8 @@ static void observe_all(const struct emitter *e, uint32_t texel, struct measured
         bool saturated = photograph_sample_saturates(&sample);
         bool sharp = !saturated && photograph_sample_cubic(photo, view.x, view.y, &sample.radiance);
         struct robust_sample observation = observation_of(e, &view, mixing, sample.radiance, sharp, fused);
-        size_t slot = saturated ? BEST_NONE : best_put(&best, observation.weight, t);
-        if (slot != BEST_NONE)
+        size_t slot = saturated ? TOP_K_NONE : top_k_put(&best, observation.weight, t);
+        if (slot != TOP_K_NONE)
             observations->observation[slot] = observation;
         else if (saturated && (bound.weight == 0.0f || observation.gray > bound.gray))
             bound = observation;
@@ -116,13 +117,13 @@ static void observe_all(const struct emitter *e, uint32_t texel, struct measured
 }
 
 static void measure_texel(const struct emitter *e, uint32_t texel) {
-    struct measured_observations observations;
+    struct measurement_observations observations;
     observe_all(e, texel, &observations);
     /* Of a screen whose picture changed, keep the majority: the rest is another picture, not noise. */
     if (observations.count > 0 && e->finder->evidence[e->segment].changing_share > 0.0f)
         observations.count = robust_keep(observations.observation, observations.count, MAX_SCREEN_DEVIATION);
     if (observations.count > 0)
-        e->finder->measured[texel] = measured_mean(&observations, OUTLIER_SCALE, rgb_gray(0.0f));
+        e->finder->measured[texel] = measurement_mean(&observations, OUTLIER_SCALE, rgb_gray(0.0f));
 }
 
 static void measure_chunk(void *user, size_t chunk, int thread) {
@@ -134,14 +135,14 @@ static void measure_chunk(void *user, size_t chunk, int thread) {
 
 /* Scales the greatest value of an emitter to 1: denoise clamps to [0, 1]. */
 static void fit_range(struct emitter *e) {
-    struct measured *measured = e->finder->measured;
+    struct measurement *measured = e->finder->measured;
     float greatest = 0.0f;
     for (size_t i = 0; i < e->count; i++)
-        greatest = fmaxf(greatest, rgb_max(measured_value(&measured[e->texel[i]])));
+        greatest = fmaxf(greatest, rgb_max(measurement_value(&measured[e->texel[i]])));
     float factor = greatest > 0.0f ? 1.0f / greatest : 1.0f;
     for (size_t i = 0; i < e->count; i++) {
-        struct measured *m = &measured[e->texel[i]];
-        rgb_to_half(m->value, rgb_scale(measured_value(m), factor));
+        struct measurement *m = &measured[e->texel[i]];
+        rgb_to_half(m->value, rgb_scale(measurement_value(m), factor));
         rgb_to_half(m->noise, rgb_scale(rgb_from_half(m->noise), factor));
         m->mixing = image_half_from_float(factor * factor * image_float_from_half(m->mixing));
     }
@@ -176,9 +177,9 @@ static void mark_charts(struct emitter *e) {
     const struct finder *f = e->finder;
     struct moments known = {.weight = 0.0};
     for (size_t i = 0; i < e->count; i++) {
-        const struct measured *m = &f->measured[e->texel[i]];
+        const struct measurement *m = &f->measured[e->texel[i]];
         if (m->weight > 0.0f)
-            moments_add(&known, 1.0, measured_value(m));
+            moments_add(&known, 1.0, measurement_value(m));
     }
     e->is_measured = known.weight >= MIN_MEASURED * (double)e->count;
     struct color_prior prior = {moments_mean(&known), (float)moments_variance(&known)};

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "common/mem.h"
-#include "server/capture/choose.h"
+#include "server/capture/stratified.h"
 #include "server/render/sampler.h"
 #include "server/scene/surface.h"
 
@@ -163,7 +163,7 @@ bool specular_observe(const struct specular_observer *l, size_t segment, size_t 
                       struct specular_criteria criteria, struct specular_sample *sample) {
     uint32_t texels = (uint32_t)by_segment_count(&l->texels, segment);
     const uint32_t *texel = &l->texels.texel[l->texels.first[segment]];
-    return observe_texel(l, texel[attempt * choose_even_step(texels) % texels], criteria, sample);
+    return observe_texel(l, texel[attempt * stratified_even_step(texels) % texels], criteria, sample);
 }
 
 void specular_observer_init(struct specular_observer *l, const struct specular_input *input, int threads) {

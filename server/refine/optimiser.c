@@ -91,7 +91,7 @@ static double observation_count(const struct optimiser *o) {
 
 /* Observations of an iteration, at most. */
 static double visits_per_iteration(const struct optimiser *o) {
-    return (double)o->pass.chooser.stratum_count * settings_number(o->settings, "cameras_per_texel");
+    return (double)o->pass.strata.stratum_count * settings_number(o->settings, "cameras_per_texel");
 }
 
 /* Planned iterations, or else observations; infinite where only the time limit ends them. */

@@ -11,8 +11,8 @@ void pass_init(struct pass *p, const struct surface *surface, const struct world
     *p = (struct pass){.surface = *surface, .views = views, .pool = pool};
     p->by_pixels = settings_is(set, "choose", "pixels");
     p->one_estimate = settings_is(set, "estimates", "one");
-    chooser_init(&p->chooser, surface->inverse->valid_count, (size_t)settings_number(set, "texels_per_iteration"),
-                 path->seed);
+    stratified_init(&p->strata, surface->inverse->valid_count, (size_t)settings_number(set, "texels_per_iteration"),
+                    path->seed);
     int threads = parallel_thread_count(pool);
     p->batch = mem_calloc((size_t)threads, sizeof *p->batch);
     for (int t = 0; t < threads; t++)
@@ -20,7 +20,7 @@ void pass_init(struct pass *p, const struct surface *surface, const struct world
                                (int)settings_number(set, "cameras_per_texel"),
                                (int)settings_number(set, "samples_per_camera"), PASS_CHUNK_TEXELS);
     p->observation_capacity = p->batch[0].observation_capacity;
-    p->chunk_count = (p->chooser.stratum_count + PASS_CHUNK_TEXELS - 1) / PASS_CHUNK_TEXELS;
+    p->chunk_count = (p->strata.stratum_count + PASS_CHUNK_TEXELS - 1) / PASS_CHUNK_TEXELS;
     p->chunk = mem_calloc(p->chunk_count, sizeof *p->chunk);
     for (size_t c = 0; c < p->chunk_count; c++)
         p->chunk[c].emission = mem_array(p->observation_capacity, sizeof *p->chunk[c].emission);
@@ -46,11 +46,11 @@ struct pass_job {
 static void choose_observations(const struct pass *p, size_t chunk, uint64_t iteration, struct observation_batch *b) {
     observation_batch_clear(b);
     size_t end = (chunk + 1) * PASS_CHUNK_TEXELS;
-    for (size_t i = chunk * PASS_CHUNK_TEXELS; i < end && i < p->chooser.stratum_count; i++) {
-        size_t item = chooser_item(&p->chooser, iteration, i);
+    for (size_t i = chunk * PASS_CHUNK_TEXELS; i < end && i < p->strata.stratum_count; i++) {
+        size_t item = stratified_item(&p->strata, iteration, i);
         if (p->by_pixels)
             observation_add_pixels(b, i, iteration);
-        else if (item != CHOOSE_NONE)
+        else if (item != STRATIFIED_NONE)
             observation_add(b, p->surface.inverse->valid[item], iteration);
     }
 }

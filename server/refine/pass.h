@@ -12,7 +12,7 @@
 
 #include "common/parallel.h"
 #include "common/settings.h"
-#include "server/capture/choose.h"
+#include "server/capture/stratified.h"
 #include "server/capture/views.h"
 #include "server/refine/observation.h"
 #include "server/scene/surface.h"
@@ -37,7 +37,7 @@ struct pass {
     struct surface surface;
     const struct views *views; /* borrowed, both */
     struct parallel *pool;
-    struct chooser chooser;
+    struct stratified strata;
     bool by_pixels, one_estimate;    /* settings choose and estimates */
     struct observation_batch *batch; /* [threads of the pool] owned */
     size_t observation_capacity;     /* of a chunk */

@@ -20,23 +20,24 @@ void bake_release(struct baked *b) {
     *b = (struct baked){0};
 }
 
-static const struct look_material *material_of(const struct mesh *mesh, const struct mesh_look *look, size_t triangle) {
-    return &look->material[mesh->object_id[triangle]];
+static const struct mesh_material *material_of(const struct mesh *mesh, const struct mesh_materials *materials,
+                                               size_t triangle) {
+    return &materials->material[mesh->object_id[triangle]];
 }
 
 /* Area of a triangle in the pixels of its material's finest picture. */
-static double pixels_of(const struct mesh *mesh, const struct mesh_look *look, size_t triangle) {
-    const struct look_material *m = material_of(mesh, look, triangle);
+static double pixels_of(const struct mesh *mesh, const struct mesh_materials *materials, size_t triangle) {
+    const struct mesh_material *m = material_of(mesh, materials, triangle);
     if (!mesh->uv)
         return 0.0;
     vec2 a = mesh->uv[triangle][0], b = mesh->uv[triangle][1], c = mesh->uv[triangle][2];
     double area = 0.5 * fabs((double)(b.x - a.x) * (double)(c.y - a.y) - (double)(b.y - a.y) * (double)(c.x - a.x));
     double most = 0.0;
-    for (int q = 0; q < LOOK_QUANTITIES; q++) {
-        const struct look_map *map = &m->map[q];
+    for (int q = 0; q < MATERIAL_QUANTITIES; q++) {
+        const struct material_map *map = &m->map[q];
         if (!map->is_there)
             continue;
-        const struct image *image = &look->image[map->image].image;
+        const struct image *image = &materials->image[map->image].image;
         double turn =
             fabs((double)map->turn[0][0] * (double)map->turn[1][1] - (double)map->turn[0][1] * (double)map->turn[1][0]);
         most = fmax(most, area * turn * (double)image->width * (double)image->height);
@@ -45,12 +46,12 @@ static double pixels_of(const struct mesh *mesh, const struct mesh_look *look, s
 }
 
 /* Makes the atlas: as many texels as the pictures have pixels on the mesh, where these are finest most. */
-static enum status make_atlas(const struct mesh *mesh, const struct mesh_look *look, const struct segments *segments,
-                              struct atlas *atlas, struct error *err) {
+static enum status make_atlas(const struct mesh *mesh, const struct mesh_materials *materials,
+                              const struct segments *segments, struct atlas *atlas, struct error *err) {
     float *density = mem_array(mesh->triangle_count, sizeof *density), finest = 0.0f;
     double sum = 0.0;
     for (size_t t = 0; t < mesh->triangle_count; t++) {
-        double pixels = pixels_of(mesh, look, t), area = (double)mesh_triangle_area(mesh, t);
+        double pixels = pixels_of(mesh, materials, t), area = (double)mesh_triangle_area(mesh, t);
         density[t] = (float)sqrt(pixels / area);
         finest = fmaxf(finest, density[t]);
         sum += pixels;
@@ -71,33 +72,33 @@ static enum status make_atlas(const struct mesh *mesh, const struct mesh_look *l
 
 struct filling {
     const struct mesh *mesh;
-    const struct mesh_look *look;
+    const struct mesh_materials *materials;
     const struct inverse_uv *inverse;
     struct baked *baked;
 };
 
-static rgb value_of(const struct filling *f, const struct look_material *m, enum look_quantity quantity, rgb factor,
+static rgb value_of(const struct filling *f, const struct mesh_material *m, enum material_quantity quantity, rgb factor,
                     vec2 uv) {
-    const struct look_map *map = &m->map[quantity];
+    const struct material_map *map = &m->map[quantity];
     bool is_shown = map->is_there && isfinite(uv.x) && isfinite(uv.y); /* some faces of an OBJ have no coordinates */
-    return is_shown ? rgb_mul(factor, look_map_value(f->look, map, uv)) : factor;
+    return is_shown ? rgb_mul(factor, material_map_value(f->materials, map, uv)) : factor;
 }
 
 /* Adds a share of what the material is at a point. */
-static void add_point(const struct filling *f, size_t texel, const struct look_material *m, vec2 uv) {
+static void add_point(const struct filling *f, size_t texel, const struct mesh_material *m, vec2 uv) {
     struct baked *b = f->baked;
-    rgb base = value_of(f, m, LOOK_BASE_COLOR, m->base_color, uv);
+    rgb base = value_of(f, m, MATERIAL_BASE_COLOR, m->base_color, uv);
     const float color[3] = {base.r, base.g, base.b};
     for (int c = 0; c < 3; c++)
         b->base_color[texel][c] += clampf(color[c], 0.0f, 1.0f) / TAPS;
     if (b->gloss) {
-        float roughness = value_of(f, m, LOOK_ROUGHNESS, rgb_gray(m->roughness), uv).r;
-        float metallic = value_of(f, m, LOOK_METALLIC, rgb_gray(m->metallic), uv).r;
+        float roughness = value_of(f, m, MATERIAL_ROUGHNESS, rgb_gray(m->roughness), uv).r;
+        float metallic = value_of(f, m, MATERIAL_METALLIC, rgb_gray(m->metallic), uv).r;
         b->gloss[texel][0] += clampf(roughness, 0.0f, 1.0f) / TAPS;
         b->gloss[texel][1] += clampf(metallic, 0.0f, 1.0f) / TAPS;
     }
     if (b->emission) {
-        rgb light = value_of(f, m, LOOK_EMISSION, m->emission, uv);
+        rgb light = value_of(f, m, MATERIAL_EMISSION, m->emission, uv);
         const float radiance[3] = {light.r, light.g, light.b};
         for (int c = 0; c < 3; c++)
             b->emission[texel][c] += fmaxf(radiance[c], 0.0f) / TAPS;
@@ -122,36 +123,36 @@ static void fill_texel(void *user, size_t index, int thread) {
             float b0 = 1.0f - b1 - b2; /* from the lower left; ours from the upper left */
             uv = vec2_make(b0 * c[0].x + b1 * c[1].x + b2 * c[2].x, 1.0f - b0 * c[0].y - b1 * c[1].y - b2 * c[2].y);
         }
-        add_point(f, texel, material_of(f->mesh, f->look, triangle), uv);
+        add_point(f, texel, material_of(f->mesh, f->materials, triangle), uv);
     }
 }
 
-static bool has_map(const struct mesh_look *look, enum look_quantity quantity) {
-    for (size_t i = 0; i < look->material_count; i++)
-        if (look->material[i].map[quantity].is_there)
+static bool has_map(const struct mesh_materials *materials, enum material_quantity quantity) {
+    for (size_t i = 0; i < materials->material_count; i++)
+        if (materials->material[i].map[quantity].is_there)
             return true;
     return false;
 }
 
-enum status bake_make(const struct mesh *mesh, const struct mesh_look *look, struct parallel *pool, struct baked *b,
-                      struct error *err) {
+enum status bake_make(const struct mesh *mesh, const struct mesh_materials *materials, struct parallel *pool,
+                      struct baked *b, struct error *err) {
     struct segments segments;
     struct inverse_uv inverse;
     *b = (struct baked){0};
     segments_from_object_id(&segments, mesh);
-    enum status status = make_atlas(mesh, look, &segments, &b->atlas, err);
+    enum status status = make_atlas(mesh, materials, &segments, &b->atlas, err);
     segments_release(&segments);
     if (status != STATUS_OK)
         return status;
     size_t texels = (size_t)b->atlas.width * b->atlas.height;
     b->base_color = mem_calloc(texels, sizeof *b->base_color);
     b->part = mem_calloc(texels, sizeof *b->part);
-    if (has_map(look, LOOK_ROUGHNESS) || has_map(look, LOOK_METALLIC))
+    if (has_map(materials, MATERIAL_ROUGHNESS) || has_map(materials, MATERIAL_METALLIC))
         b->gloss = mem_calloc(texels, sizeof *b->gloss);
-    if (has_map(look, LOOK_EMISSION))
+    if (has_map(materials, MATERIAL_EMISSION))
         b->emission = mem_calloc(texels, sizeof *b->emission);
     inverse_uv_make(&inverse, &b->atlas, mesh->triangle_count, pool);
-    struct filling filling = {mesh, look, &inverse, b};
+    struct filling filling = {mesh, materials, &inverse, b};
     parallel_for(pool, inverse.valid_count, fill_texel, &filling);
     inverse_uv_release(&inverse);
     return STATUS_OK;

@@ -5,7 +5,7 @@
 
 #include "common/error.h"
 #include "common/parallel.h"
-#include "server/ingest/mesh/look.h"
+#include "server/ingest/mesh/mesh_materials.h"
 #include "server/scene/atlas.h"
 #include "server/scene/mesh.h"
 
@@ -18,10 +18,10 @@ struct baked {
 };
 
 #define BAKE_MAX_SIZE 4096 /* texels a side */
-/* Of a mesh whose object_id are the look's materials. As fine as the pictures are on it, up to BAKE_MAX_SIZE a side;
+/* Of a mesh whose object_id are numbers of `materials`. As fine as the pictures are on it, up to BAKE_MAX_SIZE a side;
  * STATUS_INPUT: the mesh is in more pieces than that holds. */
-enum status bake_make(const struct mesh *mesh, const struct mesh_look *look, struct parallel *pool, struct baked *baked,
-                      struct error *err);
+enum status bake_make(const struct mesh *mesh, const struct mesh_materials *materials, struct parallel *pool,
+                      struct baked *baked, struct error *err);
 void bake_release(struct baked *baked);
 
 #endif

@@ -8,7 +8,7 @@
 #include "common/file.h"
 #include "common/mem.h"
 #include "server/ingest/transforms.h"
-#include "server/relight/files.h"
+#include "server/relight/setting_files.h"
 #include "server/scene/coordinates.h"
 
 #define DEFAULT_PANORAMA_WIDTH 2048 /* pixels */
@@ -86,7 +86,7 @@ static char *cameras_path(const struct relight_job *job) {
         return file_join(job->outputs, "views.json");
     if (render_settings_is(job->settings, "cameras", "photographs"))
         return file_join(job->outputs, "cameras.json");
-    return files_path(job, render_settings_text(job->settings, "cameras"));
+    return setting_files_path(job, render_settings_text(job->settings, "cameras"));
 }
 
 cJSON *cameras_own(const struct relight_job *job) {

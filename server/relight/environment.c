@@ -8,7 +8,7 @@
 
 #include "common/file.h"
 #include "common/mem.h"
-#include "server/relight/files.h"
+#include "server/relight/setting_files.h"
 #include "server/render/light.h"
 
 void environment_orient(const struct image *picture, enum environment_frame frame, const struct compass *compass,
@@ -130,7 +130,7 @@ static enum status read_part(const struct relight_job *job, const struct compass
     } else if (is_found) {
         status = read_found(job, part, &picture, err);
     } else if (!render_settings_is(s, "environment", "none") && part != DISTANT_SUN) {
-        char *path = files_path(job, render_settings_text(s, "environment"));
+        char *path = setting_files_path(job, render_settings_text(s, "environment"));
         status = read_map(path, &picture, err);
         mem_free(path);
     }

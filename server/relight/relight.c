@@ -19,7 +19,7 @@
 #include "server/relight/picture.h"
 #include "server/relight/relight_plan.h"
 #include "server/relight/relit.h"
-#include "server/relight/unit.h"
+#include "server/relight/luminance_per_unit.h"
 #include "server/render/film.h"
 
 #define ROULETTE_DEPTH 5
@@ -366,7 +366,7 @@ enum status relight_run(const struct relight_job *job, const struct relight_watc
     struct relight_job resolved = *job;
     struct relight_state r = {.job = &resolved, .watch = watch ? watch : &nobody, .pool = pool};
     cJSON *settings;
-    enum status status = unit_resolve(job, r.watch, &settings, err);
+    enum status status = luminance_per_unit_resolve(job, r.watch, &settings, err);
     resolved.settings = settings;
     read_settings(&r);
     if (status == STATUS_OK)

@@ -1,4 +1,4 @@
-/* relight.h -- renders the room of a finished job in another light, from other places, with other things in it.
+/* relight.h -- renders the room of a finished job in another light, from other places, with other objects in it.
  *
  * A render is a list of pictures, numbered from 0: each view under each sun. It needs the outputs' folder of a
  * reconstruction alone, and the files that settings name. Each picture's files are complete under their final names or

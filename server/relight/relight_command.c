@@ -11,7 +11,7 @@
 #include "common/mem.h"
 #include "server/relight/cameras.h"
 #include "server/relight/denoise.h"
-#include "server/relight/files.h"
+#include "server/relight/setting_files.h"
 #include "server/relight/relight.h"
 #include "server/relight/relight_plan.h"
 
@@ -87,7 +87,7 @@ static enum status add_settings(const struct options *a, cJSON *settings, struct
 /* What the room has not that the settings name; where a file cannot be read, rendering tells it. */
 static enum status check_room(const char *outputs, const cJSON *settings, cJSON *problems) {
     const struct relight_job job = {.outputs = outputs, .settings = settings};
-    cJSON *report = files_report(&job), *cameras = cameras_own(&job);
+    cJSON *report = setting_files_report(&job), *cameras = cameras_own(&job);
     enum status status = render_settings_check_room(
         settings, report->child ? report : NULL, cJSON_GetObjectItemCaseSensitive(cameras, "frames"), problems, NULL);
     cJSON_Delete(report);

@@ -1,4 +1,4 @@
-/* relit.c -- see relit.h. The room's triangles come first, those that are taken away left out, then the things'. */
+/* relit.c -- see relit.h. The room's triangles come first, those that are taken away left out, then the objects'. */
 #include "server/relight/relit.h"
 
 #include <math.h>
@@ -7,11 +7,11 @@
 #include <string.h>
 
 #include "common/mem.h"
-#include "server/relight/added.h"
+#include "server/relight/insert_objects.h"
 #include "server/relight/environment.h"
-#include "server/relight/files.h"
+#include "server/relight/setting_files.h"
 #include "server/relight/recovered.h"
-#include "server/relight/things.h"
+#include "server/relight/virtual_objects.h"
 
 /* --- settings of segments --------------------------------------------------------------------------------------- */
 
@@ -125,7 +125,7 @@ static enum status mark_removed(const struct relight_job *job, bool *removed, si
     enum status status = STATUS_OK;
     if (*which == '\0')
         return STATUS_OK;
-    cJSON *report = files_report(job); /* for names */
+    cJSON *report = setting_files_report(job); /* for names */
     for (const char *at = which; status == STATUS_OK;) {
         size_t length = strcspn(at, ",");
         char *word = mem_strndup(at, length);
@@ -162,12 +162,12 @@ static void add_source(struct relit *r, char *name, uint32_t segment, enum dista
     r->source[r->source_count++] = (struct relit_source){name, segment, part};
 }
 
-static void list_sources(struct relit *r, size_t room_segments, const struct things *things) {
+static void list_sources(struct relit *r, size_t room_segments, const struct virtual_objects *objects) {
     for (uint32_t s = 0; s < r->segments.count; s++) {
         if (!(rgb_luminance(r->materials.emission[s]) > 0.0f))
             continue;
-        add_source(r, s < room_segments ? mem_printf("light_%u", s) : added_name(things, s - room_segments), s,
-                   DISTANT_WHOLE);
+        add_source(r, s < room_segments ? mem_printf("light_%u", s) : insert_objects_name(objects, s - room_segments),
+                   s, DISTANT_WHOLE);
     }
     if (r->distant[DISTANT_SKY].pixel)
         add_source(r, mem_strdup("sky"), LIGHT_ENVIRONMENT, DISTANT_SKY);
@@ -205,7 +205,8 @@ static void take(struct recovered *from, struct relit *r) {
 }
 
 static enum status build(const struct relight_job *job, const struct compass *compass, size_t room_segments,
-                         const struct things *things, struct parallel *pool, struct relit *r, struct error *err) {
+                         const struct virtual_objects *objects, struct parallel *pool, struct relit *r,
+                         struct error *err) {
     r->emission = mem_array(r->segments.count, sizeof *r->emission);
     memcpy(r->emission, r->materials.emission, r->segments.count * sizeof *r->emission);
     if (r->mesh.triangle_count == 0)
@@ -215,14 +216,14 @@ static enum status build(const struct relight_job *job, const struct compass *co
         status = world_init(&r->world, &r->mesh, &r->segments, &r->atlas, &r->materials, light_of(r, DISTANT_WHOLE),
                             pool, err);
     if (status == STATUS_OK)
-        list_sources(r, room_segments, things);
+        list_sources(r, room_segments, objects);
     return status;
 }
 
 enum status relit_make(const struct relight_job *job, struct mesh *mesh, const struct compass *compass,
                        struct parallel *pool, struct relit *r, struct error *err) {
     struct recovered room = {0};
-    struct things things = {0};
+    struct virtual_objects objects = {0};
     *r = (struct relit){.mesh = *mesh};
     *mesh = (struct mesh){0};
     bool *removed = NULL;
@@ -235,22 +236,22 @@ enum status relit_make(const struct relight_job *job, struct mesh *mesh, const s
     if (status == STATUS_OK)
         status = mark_removed(job, removed, room_segments, err);
     if (status == STATUS_OK)
-        status = things_read(job, compass, r->mesh.offset, pool, &things, err);
+        status = virtual_objects_read(job, compass, r->mesh.offset, pool, &objects, err);
     if (status != STATUS_OK)
         goto out;
     leave_out(&room, &r->mesh, removed);
-    status = added_put(&things, &room, &r->mesh, err);
+    status = insert_objects(&objects, &room, &r->mesh, err);
     if (status != STATUS_OK)
         goto out;
-    r->note = things.note;
-    r->note_count = things.note_count;
-    things.note = NULL;
-    things.note_count = 0;
+    r->note = objects.note;
+    r->note_count = objects.note_count;
+    objects.note = NULL;
+    objects.note_count = 0;
     take(&room, r);
-    status = build(job, compass, room_segments, &things, pool, r, err);
+    status = build(job, compass, room_segments, &objects, pool, r, err);
 out:
     mem_free(removed);
-    things_release(&things);
+    virtual_objects_release(&objects);
     recovered_release(&room);
     if (status != STATUS_OK)
         relit_release(r);

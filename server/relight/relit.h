@@ -1,4 +1,4 @@
-/* relit.h -- the room of a reconstruction as a render sees it: with other light, things taken away, changed and
+/* relit.h -- the room of a reconstruction as a render sees it: with other light, objects taken away, changed and
  * added. */
 #ifndef UNBAKE_RELIGHT_RELIT_H
 #define UNBAKE_RELIGHT_RELIT_H
@@ -14,7 +14,7 @@
 #include "server/relight/sky.h"
 #include "server/render/world.h"
 
-/* What shines: a segment of the room, a thing that was added, or distant light. */
+/* What shines: a segment of the room, a object that was added, or distant light. */
 struct relit_source {
     char *name;       /* "light_27", "lamp_1", "insert_2", "insert_2_0" (its first material), "sky", "sun"; owned */
     uint32_t segment; /* or LIGHT_ENVIRONMENT */
@@ -23,7 +23,7 @@ struct relit_source {
 
 struct relit {
     struct mesh mesh;
-    struct segments segments; /* those of the outputs, then one for each material of a thing; no names */
+    struct segments segments; /* those of the outputs, then one for each material of a object; no names */
     struct atlas atlas;       /* no charts: corners only */
     struct materials materials;
     struct world world;

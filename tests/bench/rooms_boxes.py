@@ -1,4 +1,4 @@
-"""Six furnished rooms, boxes all. Not unseen any more: constants of gloss.c, sun_find.c and measured.c were chosen on
+"""Six furnished rooms, boxes all. Not unseen any more: constants of gloss.c, sun_find.c and measurement.c were chosen on
 these rooms, too; on the last only SKY_DOUBT of solve.c was.
 
   kitchen   closed; four spots at the ceiling and a strip lamp, polished tiles, much steel

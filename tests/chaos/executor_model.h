@@ -28,7 +28,7 @@
 #define JOBS_MAX 4
 #define CLUSTER_MAX 400 /* jobs that the site ever has in one script */
 #endif
-#define ERRANDS_MAX 256
+#define COMMANDS_MAX 256
 #define WORK_REPORTS 5 /* of an attempt before it is done */
 #define FAULTS_SEC 900.0
 #define LAST_SEC 20000.0 /* by then everything must have ended */
@@ -65,10 +65,10 @@ static struct model {
     struct store *store;
     struct site site;
     struct remote *remote;
-    struct courier courier;
-    struct errand *errand[ERRANDS_MAX];
-    double errand_at[ERRANDS_MAX];
-    size_t errand_count;
+    struct command_queue commands;
+    struct site_command *command[COMMANDS_MAX];
+    double command_at[COMMANDS_MAX];
+    size_t command_count;
     struct cluster_job cluster[CLUSTER_MAX];
     size_t cluster_count;
     char last_status[1 << 18];
@@ -85,7 +85,7 @@ static inline double between(double low, double high) { return low + (high - low
 
 /* --- the site's commands --------------------------------------------------------------------- */
 
-static inline void cluster_add(const struct errand *e, double delay) {
+static inline void cluster_add(const struct site_command *e, double delay) {
     if (model.cluster_count == CLUSTER_MAX)
         return;
     struct cluster_job *c = &model.cluster[model.cluster_count];
@@ -101,7 +101,7 @@ static inline void cluster_add(const struct errand *e, double delay) {
     model.cluster_count++;
 }
 
-static inline void do_submit(struct errand *e) {
+static inline void do_submit(struct site_command *e) {
     double kind = model.is_calm ? 1.0 : chance();
     e->status = STATUS_OK;
     e->output = mem_strdup("");
@@ -121,7 +121,7 @@ static inline void do_submit(struct errand *e) {
                             : mem_printf("submitted %s\n", model.cluster[model.cluster_count - 1].id);
 }
 
-static inline void do_status(struct errand *e) {
+static inline void do_status(struct site_command *e) {
     static const char *const words[] = {"?", "PD", "R", "F"};
     struct buf text;
     double kind = model.is_calm ? 1.0 : chance();
@@ -166,7 +166,7 @@ static inline void gone(struct cluster_job *c, const char *word) {
     c->gone_word = word;
 }
 
-static inline void do_cancel(struct errand *e) {
+static inline void do_cancel(struct site_command *e) {
     e->status = happens(0.3) ? error_set(&e->err, STATUS_IO, "cancel: connection refused") : STATUS_OK;
     e->output = mem_strdup("");
     for (size_t i = 0; i < model.cluster_count && e->status == STATUS_OK; i++)
@@ -174,25 +174,25 @@ static inline void do_cancel(struct errand *e) {
             gone(&model.cluster[i], "F");
 }
 
-static inline void courier_send(struct courier *courier, struct errand *e) {
-    (void)courier;
-    CHECK(model.errand_count < ERRANDS_MAX);
+static inline void model_commands_add(struct command_queue *commands, struct site_command *e) {
+    (void)commands;
+    CHECK(model.command_count < COMMANDS_MAX);
     model.busy_until = fmax(model.busy_until, model.now) + between(0.05, happens(0.1) ? 60.0 : 2.0);
-    model.errand[model.errand_count] = e;
-    model.errand_at[model.errand_count++] = model.busy_until;
+    model.command[model.command_count] = e;
+    model.command_at[model.command_count++] = model.busy_until;
 }
 
-static inline struct errand *courier_receive(struct courier *courier) {
-    (void)courier;
-    if (model.errand_count == 0 || model.errand_at[0] > model.now)
+static inline struct site_command *model_commands_next_done(struct command_queue *commands) {
+    (void)commands;
+    if (model.command_count == 0 || model.command_at[0] > model.now)
         return NULL;
-    struct errand *e = model.errand[0];
-    model.errand_count--;
-    memmove(model.errand, model.errand + 1, model.errand_count * sizeof *model.errand);
-    memmove(model.errand_at, model.errand_at + 1, model.errand_count * sizeof *model.errand_at);
-    if (e->kind == ERRAND_SUBMIT)
+    struct site_command *e = model.command[0];
+    model.command_count--;
+    memmove(model.command, model.command + 1, model.command_count * sizeof *model.command);
+    memmove(model.command_at, model.command_at + 1, model.command_count * sizeof *model.command_at);
+    if (e->kind == SITE_COMMAND_SUBMIT)
         do_submit(e);
-    else if (e->kind == ERRAND_STATUS)
+    else if (e->kind == SITE_COMMAND_STATUS)
         do_status(e);
     else
         do_cancel(e);
@@ -357,9 +357,12 @@ static inline double model_now(void *user) {
 }
 
 static inline void daemon_begins(void) {
-    model.courier = (struct courier){.send = courier_send, .receive = courier_receive};
-    model.remote = remote_new(&(struct remote_parts){
-        .site = &model.site, .store = model.store, .courier = &model.courier, .data_dir = model.dir, .now = model_now});
+    model.commands = (struct command_queue){.add = model_commands_add, .next_done = model_commands_next_done};
+    model.remote = remote_new(&(struct remote_parts){.site = &model.site,
+                                                     .store = model.store,
+                                                     .commands = &model.commands,
+                                                     .data_dir = model.dir,
+                                                     .now = model_now});
 }
 
 static inline void hear_line(void *user, const char *line, size_t length) {
@@ -492,13 +495,13 @@ static inline void daemon_dies(void) {
         run_free(model.job[i].run);
         model.job[i].was_killed_daemon = true;
     }
-    for (size_t i = 0; i < model.errand_count; i++) {
-        struct errand *e = model.errand[i];
-        if (e->kind == ERRAND_SUBMIT && chance() < 0.5)
+    for (size_t i = 0; i < model.command_count; i++) {
+        struct site_command *e = model.command[i];
+        if (e->kind == SITE_COMMAND_SUBMIT && chance() < 0.5)
             cluster_add(e, between(0.0, 5.0));
-        errand_free(e);
+        site_command_free(e);
     }
-    model.errand_count = 0;
+    model.command_count = 0;
     remote_free(model.remote);
     for (size_t i = 0; i < model.cluster_count; i++) { /* its connections break */
         struct cluster_job *c = &model.cluster[i];
@@ -562,7 +565,7 @@ static inline void run_script(uint64_t seed) {
     model.random = rng_mix64(seed) >> 1;
     model.now = model.busy_until = 0.0;
     model.is_calm = false;
-    model.cluster_count = model.errand_count = model.running = 0;
+    model.cluster_count = model.command_count = model.running = 0;
     model.last_status[0] = '\0';
     model.job_count = 1 + (size_t)(chance() * JOBS_MAX) % JOBS_MAX;
     for (size_t i = 0; i < model.job_count; i++)
@@ -583,8 +586,8 @@ static inline void run_script(uint64_t seed) {
             gone(&model.cluster[i], "F");
     for (size_t i = 0; i < model.job_count; i++)
         run_free(model.job[i].run);
-    for (size_t i = 0; i < model.errand_count; i++)
-        errand_free(model.errand[i]);
+    for (size_t i = 0; i < model.command_count; i++)
+        site_command_free(model.command[i]);
     remote_free(model.remote);
     for (size_t i = 0; i < model.job_count && all_over(); i++)
         OK(store_job_delete(model.store, model.job[i].id, &err));

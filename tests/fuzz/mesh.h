@@ -4,7 +4,7 @@
 #define UNBAKE_TESTS_FUZZ_MESH_H
 
 #include "common/error.h"
-#include "server/ingest/mesh/look.h"
+#include "server/ingest/mesh/mesh_materials.h"
 #include "server/scene/mesh.h"
 #include "tests/fuzz/fuzz.h"
 
@@ -32,17 +32,18 @@ static inline void must_be_mesh(enum status status, struct mesh *mesh, struct er
 
 /* Of a reader that reads materials, too: each triangle has one, each vertex a place in its pictures, which can be
  * looked up. Releases both. */
-static inline void must_be_look(enum status status, struct mesh *mesh, struct mesh_look *look, struct error *err) {
+static inline void must_be_materials(enum status status, struct mesh *mesh, struct mesh_materials *materials,
+                                     struct error *err) {
     for (size_t i = 0; status == STATUS_OK && i < mesh->triangle_count; i++) {
-        MUST(mesh->object_id[i] >= 0 && (uint64_t)mesh->object_id[i] < look->material_count);
-        const struct look_material *m = &look->material[mesh->object_id[i]];
-        for (int q = 0; q < LOOK_QUANTITIES; q++)
+        MUST(mesh->object_id[i] >= 0 && (uint64_t)mesh->object_id[i] < materials->material_count);
+        const struct mesh_material *m = &materials->material[mesh->object_id[i]];
+        for (int q = 0; q < MATERIAL_QUANTITIES; q++)
             if (m->map[q].is_there && mesh->uv)
-                sink = look_map_value(look, &m->map[q], mesh->uv[i][0]).r;
+                sink = material_map_value(materials, &m->map[q], mesh->uv[i][0]).r;
         MUST(m->roughness >= 0.0f && m->roughness <= 1.0f && m->metallic >= 0.0f && m->metallic <= 1.0f);
         MUST(m->specular >= 0.0f && m->specular <= 1.0f && rgb_max(m->base_color) <= 1.0f);
     }
-    look_release(look);
+    mesh_materials_release(materials);
     must_be_mesh(status, mesh, err);
 }
 

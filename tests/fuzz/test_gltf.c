@@ -12,9 +12,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     for (size_t i = 0; status == STATUS_OK && i < mesh.triangle_count; i++)
         MUST(!mesh.object_id || mesh.object_id[i] >= 0);
     must_be_mesh(status, &mesh, &err);
-    struct mesh_look look = {0};
-    status = gltf_parse(data, size, "case", NULL, 100000, &mesh, &look, NULL, &err);
-    must_be_look(status, &mesh, &look, &err);
+    struct mesh_materials materials = {0};
+    status = gltf_parse(data, size, "case", NULL, 100000, &mesh, &materials, NULL, &err);
+    must_be_materials(status, &mesh, &materials, &err);
     return 0;
 }
 

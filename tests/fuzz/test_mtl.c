@@ -4,20 +4,20 @@
 #include "tests/fuzz/fuzz.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
-    struct mesh_look look = {0};
+    struct mesh_materials materials = {0};
     struct error err = {.message = ""};
     bool found[2] = {false, false};
-    look_add(&look, "a");
-    look_add(&look, "b c");
-    enum status status = mtl_read("case", (const char *)data, size, NULL, &look, found, &err);
+    mesh_materials_add(&materials, "a");
+    mesh_materials_add(&materials, "b c");
+    enum status status = mtl_read("case", (const char *)data, size, NULL, &materials, found, &err);
     MUST(status == STATUS_OK || (status == STATUS_INPUT && err.message[0] != '\0'));
-    for (size_t i = 0; i < look.material_count && status == STATUS_OK; i++) {
-        const struct look_material *m = &look.material[i];
-        MUST(m->is_own == found[i] && !m->map[LOOK_BASE_COLOR].is_there);
+    for (size_t i = 0; i < materials.material_count && status == STATUS_OK; i++) {
+        const struct mesh_material *m = &materials.material[i];
+        MUST(m->is_own == found[i] && !m->map[MATERIAL_BASE_COLOR].is_there);
         MUST(m->roughness >= 0.0f && m->roughness <= 1.0f && m->metallic >= 0.0f && m->metallic <= 1.0f);
         MUST(m->specular >= 0.0f && m->specular <= 1.0f && rgb_max(m->base_color) <= 1.0f && m->emission.r >= 0.0f);
     }
-    look_release(&look);
+    mesh_materials_release(&materials);
     return 0;
 }
 

@@ -11,9 +11,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     for (size_t i = 0; status == STATUS_OK && i < mesh.triangle_count; i++)
         MUST(!mesh.object_id || (mesh.object_id[i] >= 0 && mesh.object_id[i] <= (int64_t)mesh.face_count));
     must_be_mesh(status, &mesh, &err);
-    struct mesh_look look = {0};
-    status = obj_parse(data, size, "case", NULL, 100000, &mesh, &look, NULL, &err);
-    must_be_look(status, &mesh, &look, &err);
+    struct mesh_materials materials = {0};
+    status = obj_parse(data, size, "case", NULL, 100000, &mesh, &materials, NULL, &err);
+    must_be_materials(status, &mesh, &materials, &err);
     return 0;
 }
 

@@ -1,7 +1,7 @@
 /* detail.h: of paint about as fine as the photographs' pixels less is lost than by the mean of what they show, on any
  * number of threads; noise is not taken for it; none comes out darker than black; what one half of the photographs
  * alone tells stays; and pixels of little worth are counted as exactly as others. */
-#include "server/capture/halves.h"
+#include "server/capture/split_half.h"
 #include "server/material/detail.h"
 #include "server/material/divide.h"
 #include "server/scene/surface.h"
@@ -18,9 +18,9 @@
 #define WHITE 2.0f /* what a white surface would send out: more than the brightest paint */
 
 /* The mean over the photographs, as divide.h takes it. */
-static struct measured mean_of(const struct painted *room, const struct surface_point *at) {
+static struct measurement mean_of(const struct painted *room, const struct surface_point *at) {
     struct robust_sample look[LOOKS_MOST];
-    struct measured m = {.weight = 0.0f};
+    struct measurement m = {.weight = 0.0f};
     rgb sum = {0.0f, 0.0f, 0.0f}, noise = sum;
     size_t count = 0;
     for (uint32_t t = 0; t < room->views.train_count; t++) {
@@ -38,7 +38,7 @@ static struct measured mean_of(const struct painted *room, const struct surface_
     }
     if (!(m.weight > 0.0f))
         return m;
-    halves_draw(look, count, &noise);
+    split_half_draw(look, count, &noise);
     sum = rgb_scale(sum, 1.0f / m.weight);
     for (int c = 0; c < 3; c++) {
         m.value[c] = image_half_from_float((&sum.r)[c]);
@@ -61,13 +61,13 @@ static rgb truth_of(const struct painted *room, uint32_t texel) {
 }
 
 /* Root of the mean square error over measured texels. */
-static double error_of(const struct painted *room, const struct measured *measured) {
+static double error_of(const struct painted *room, const struct measurement *measured) {
     double errors = 0.0, count = 0.0;
     for (size_t i = 0; i < room->inverse.valid_count; i++) {
         uint32_t texel = room->inverse.valid[i];
         if (!(measured[texel].weight > 0.0f))
             continue;
-        rgb off = rgb_sub(measured_value(&measured[texel]), truth_of(room, texel));
+        rgb off = rgb_sub(measurement_value(&measured[texel]), truth_of(room, texel));
         errors += (double)(off.g * off.g);
         count += 1.0;
     }
@@ -78,7 +78,7 @@ static double error_of(const struct painted *room, const struct measured *measur
 struct capture {
     struct painted room;
     struct reconstruction r;
-    struct measured *measured;
+    struct measurement *measured;
     uint16_t (*white)[3];
     size_t texels;
 };
@@ -101,7 +101,7 @@ static void capture_init(struct capture *s, bool tiles, int threads, float offse
         struct surface_point at;
         if (surface_at_texel(&s->room.scene.mesh, &s->r.atlas, &s->r.inverse, texel, &at))
             s->measured[texel] = mean_of(&s->room, &at);
-        rgb_to_half(s->measured[texel].value, rgb_add(measured_value(&s->measured[texel]), rgb_gray(offset)));
+        rgb_to_half(s->measured[texel].value, rgb_add(measurement_value(&s->measured[texel]), rgb_gray(offset)));
         rgb_to_half(s->white[texel], rgb_gray(WHITE));
     }
 }
@@ -181,11 +181,11 @@ static void test_black(void) {
     struct capture s;
     size_t black = 0;
     capture_init(&s, true, 2, -0.2f);
-    struct measured *before = mem_array(s.texels, sizeof *before);
+    struct measurement *before = mem_array(s.texels, sizeof *before);
     memcpy(before, s.measured, s.texels * sizeof *before);
     find(&s, &s.room.views);
     for (size_t i = 0; i < s.texels; i++) {
-        float value = measured_value(&s.measured[i]).g, start = measured_value(&before[i]).g;
+        float value = measurement_value(&s.measured[i]).g, start = measurement_value(&before[i]).g;
         CHECK(value >= fminf(start, 0.0f) - 1e-4f);
         black += start > 0.02f && fabsf(value) < 1e-4f;
     }
@@ -200,7 +200,7 @@ static size_t changed_by(uint32_t count) {
     struct capture s;
     size_t changed = 0;
     capture_init(&s, true, 2, 0.0f);
-    struct measured *before = mem_array(s.texels, sizeof *before);
+    struct measurement *before = mem_array(s.texels, sizeof *before);
     memcpy(before, s.measured, s.texels * sizeof *before);
     struct views few = s.room.views;
     few.train_count = count;
@@ -216,7 +216,7 @@ static size_t changed_by(uint32_t count) {
  * split. */
 static void test_few(void) {
     CHECK(changed_by(1) == 0);
-    CHECK(halves_of(0, 0) == halves_of(1, 0) && halves_of(0, 1) != halves_of(1, 1));
+    CHECK(split_half_of(0, 0) == split_half_of(1, 0) && split_half_of(0, 1) != split_half_of(1, 1));
     size_t changed = changed_by(2);
     printf("two photographs move %zu texels\n", changed);
     CHECK(changed > 20);

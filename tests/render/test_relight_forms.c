@@ -5,7 +5,7 @@
 
 #include "common/file.h"
 #include "common/sha256.h"
-#include "server/relight/things.h"
+#include "server/relight/virtual_objects.h"
 #include "server/render/bsdf.h"
 #include "tests/check.h"
 #include "tests/relit_room.h"
@@ -163,7 +163,7 @@ static void test_lamps(void) {
                           "100,\"lamp.1.lumen\":39.26991");
     CHECK_THAT(fabs(found / area - 1.0) < 0.01, "lumen: %g, not %g", found, area);
     test_unit(dir, area);
-    CHECK_NEAR(things_spot_flux((struct emission_cone){0.5f, 0.5f}), PI, 1e-6);
+    CHECK_NEAR(virtual_objects_spot_flux((struct emission_cone){0.5f, 0.5f}), PI, 1e-6);
     relit_remove(dir);
 }
 

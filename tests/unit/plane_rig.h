@@ -121,8 +121,8 @@ static inline rgb plane_paint_one(void *user, vec3 place) {
 
 /* Base colour at the middle texel, without highlights, as `probes` have the light; *divide stays for more, its
  * `measured` is to be freed. *typical is to outlive it. */
-static inline const struct measured *plane_rig_divide(struct plane_rig *rig, const struct probes *probes,
-                                                      float *typical, struct divide *divide) {
+static inline const struct measurement *plane_rig_divide(struct plane_rig *rig, const struct probes *probes,
+                                                         float *typical, struct divide *divide) {
     static const uint32_t texel = PLANE_MIDDLE;
     *typical = 0.5f;
     *divide = inputs_of_divide(&rig->r, &rig->views, probes, NULL);

@@ -2,7 +2,7 @@
  * row names goes, and nothing else; folders of an older version become folders of attempts, wherever that is
  * interrupted. Calls of the system fail, one after the other. */
 #include "server/data/attempt_folder.h"
-#include "server/data/attempt_tidy.h"
+#include "server/data/attempt_cleanup.h"
 
 #include "server/data/layout.h"
 #include "server/store/internal.h"
@@ -102,7 +102,7 @@ static void test_tidy(void) {
     put_in(id, "worker.log");
     char *link = mem_printf("%s/jobs/%lld/attempt-1/out/link", dir, (long long)id);
     CHECK(symlink(dir, link) == 0); /* is removed, not followed */
-    OK(attempt_tidy(dir, store, id, 1, &err));
+    OK(attempt_cleanup(dir, store, id, 1, &err));
     CHECK(has(id, "attempt-1/out/a.exr") && has(id, "attempt-1/out/preview/b.png") && has(id, "worker.log"));
     CHECK(!has(id, "attempt-1/out/preview/c.png") && !has(id, "attempt-1/out/deep") && access(link, F_OK) != 0);
     CHECK(is_there("state.db"));
@@ -113,17 +113,17 @@ static void test_tidy(void) {
     announce(id, 2, "a.exr");
     put_in(id, "attempt-2/out/a.exr");
     put_in(id, "attempt-2/out/preview/b.png");
-    OK(attempt_tidy(dir, store, id, 2, &err));
+    OK(attempt_cleanup(dir, store, id, 2, &err));
     CHECK(!has(id, "attempt-1/out/a.exr") && has(id, "attempt-1/out/preview/b.png"));
     CHECK(has(id, "attempt-2/out/a.exr") && !has(id, "attempt-2/out/preview/b.png"));
     put_in(id, "attempt-2/out/preview/b.png");
     announce(id, 2, "preview/b.png");
-    OK(attempt_tidy(dir, store, id, 2, &err));
+    OK(attempt_cleanup(dir, store, id, 2, &err));
     CHECK(!has(id, "attempt-1") && has(id, "attempt-2/out/preview/b.png"));
     /* One that has only a checkpoint stays, for the next attempt. */
     put_in(id, "attempt-3/checkpoint/checkpoint.db");
     put_in(id, "attempt-4/job.json");
-    OK(attempt_tidy(dir, store, id, 2, &err));
+    OK(attempt_cleanup(dir, store, id, 2, &err));
     CHECK(has(id, "attempt-3/checkpoint/checkpoint.db") && !has(id, "attempt-4"));
 }
 

@@ -20,7 +20,7 @@ static const float left[WALLS] = {0, 1, 2, 20, 21, 22};
 static vec3 position[WALLS * 4];
 static uint32_t indices[WALLS * 2][3], of_triangle[WALLS * 2];
 static vec2 corner[WALLS * 2][3];
-static struct measured measured[WALLS * SIDE * SIDE];
+static struct measurement measured[WALLS * SIDE * SIDE];
 
 static void make_walls(void) {
     for (uint32_t w = 0; w < WALLS; w++) {
@@ -43,7 +43,7 @@ static void show_from(uint32_t from, uint32_t wall, float value, float mixing) {
     for (uint32_t i = wall * SIDE * SIDE + from; i < (wall + 1) * SIDE * SIDE; i++) {
         uint16_t half = image_half_from_float(value);
         measured[i] =
-            (struct measured){.weight = 1.0f, .value = {half, half, half}, .mixing = image_half_from_float(mixing)};
+            (struct measurement){.weight = 1.0f, .value = {half, half, half}, .mixing = image_half_from_float(mixing)};
     }
 }
 
@@ -71,12 +71,12 @@ static void check_walls(const struct surface *surface, const bool *is_emitter, s
 /* Its own mean counts with the square of the share of its texels that is known: of one black texel among 1024, beside a
  * white wall, with .325^2 / (1 + .325^2) and not .325 / 1.325. (It is none that the grids take in.) */
 static void check_own_share(const struct surface *surface, const bool *is_emitter, struct parallel *pool) {
-    measured[HIDDEN * SIDE * SIDE + 1] = (struct measured){.weight = 1.0f};
+    measured[HIDDEN * SIDE * SIDE + 1] = (struct measurement){.weight = 1.0f};
     CHECK((HIDDEN * SIDE * SIDE + 1) % 3 != 0);
     double share = 1.0 / 1025.0 / 0.003, part = share * share / (1.0 + share * share);
     struct color_prior *prior = color_priors(surface, is_emitter, measured, pool);
     float beside = prior[HIDDEN].mean.g;
-    measured[HIDDEN * SIDE * SIDE + 1] = (struct measured){0};
+    measured[HIDDEN * SIDE * SIDE + 1] = (struct measurement){0};
     mem_free(prior);
     prior = color_priors(surface, is_emitter, measured, pool);
     CHECK_NEAR(beside / prior[HIDDEN].mean.g, 1.0 - part, 0.01);

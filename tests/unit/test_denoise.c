@@ -18,7 +18,7 @@ static const struct atlas atlas = {
     .width = WIDTH, .height = HEIGHT, .chart_count = 2, .chart_of_triangle = chart_of_triangle, .corner = corner};
 static struct inverse_uv inverse = {.width = WIDTH, .height = HEIGHT, .triangle = triangle, .valid = valid};
 
-static struct measured *measured;
+static struct measurement *measured;
 static struct color_prior prior[2];
 static struct texture out;
 static uint16_t deviation[TEXELS];
@@ -40,8 +40,8 @@ static float truth(uint32_t x, uint32_t y) {
 }
 
 static void set(uint32_t x, uint32_t y, float value, float noise, float mixing) {
-    struct measured *m = &measured[y * WIDTH + x];
-    *m = (struct measured){.weight = 1.0f, .mixing = image_half_from_float(mixing)};
+    struct measurement *m = &measured[y * WIDTH + x];
+    *m = (struct measurement){.weight = 1.0f, .mixing = image_half_from_float(mixing)};
     for (int c = 0; c < 3; c++) {
         m->value[c] = image_half_from_float(value);
         m->noise[c] = image_half_from_float(noise);
@@ -148,7 +148,7 @@ static void test_holes(void) {
     measure();
     for (uint32_t y = 40; y < 60; y++)
         for (uint32_t x = 40; x < 60; x++)
-            measured[y * WIDTH + x] = (struct measured){0};
+            measured[y * WIDTH + x] = (struct measurement){0};
     filter();
     CHECK_THAT(error_of(40, 60, 40, 60) < 0.3 * (double)DEVIATION, "%.4f", error_of(40, 60, 40, 60));
     texture_release(&out);
@@ -159,7 +159,7 @@ static void test_prior(void) {
     measure();
     for (uint32_t y = 0; y < HEIGHT; y++)
         for (uint32_t x = 0; x < WIDTH / 2; x++)
-            measured[y * WIDTH + x] = (struct measured){0};
+            measured[y * WIDTH + x] = (struct measurement){0};
     filter();
     CHECK_NEAR(out.texel[64 * WIDTH + WIDTH / 2 - 2][0], 0.5, 1e-6);
     texture_release(&out);

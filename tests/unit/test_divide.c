@@ -83,8 +83,8 @@ static void test_base_color(enum faults faults) {
         probes.probe[i].light.noise = light_noise;
     }
     struct divide divide;
-    const struct measured *m = plane_rig_divide(&rig, &probes, &typical, &divide);
-    rgb found = measured_value(m), noise = rgb_from_half(m->noise);
+    const struct measurement *m = plane_rig_divide(&rig, &probes, &typical, &divide);
+    rgb found = measurement_value(m), noise = rgb_from_half(m->noise);
     CHECK(m->weight > 0.0f);
     /* What all photographs share: the error of the light that arrives, as a share of it. */
     rgb arrives = rgb_scale(flux, to_light().z), white, wanted_white = white_towards((vec3){0, 0, 1});
@@ -116,7 +116,7 @@ static void test_bound(void) {
     for (size_t i = 0; i < probes.count; i++)
         irradiance_add(&probes.probe[i].light, (vec3){0, 0, 1}, to_light(), flux);
     struct divide divide;
-    rgb found = measured_value(plane_rig_divide(&rig, &probes, &typical, &divide));
+    rgb found = measurement_value(plane_rig_divide(&rig, &probes, &typical, &divide));
     CHECK_NEAR(found.r, base_color.r, 0.01f * base_color.r);
     CHECK_NEAR(found.g, base_color.g, 0.01f * base_color.g);
     float middle = sqrtf(base_color.b * 0.85f); /* of the range from the bound, which is what is stored, to white */
@@ -134,8 +134,8 @@ static void test_nothing(void) {
     photograph_plane(&rig, NONE);
     probes_init(&probes, 8, &rig.scene.mesh, &rig.r.atlas, &rig.r.inverse, &rig.r.fused);
     struct divide divide;
-    const struct measured *m = plane_rig_divide(&rig, &probes, &typical, &divide);
-    rgb found = measured_value(m);
+    const struct measurement *m = plane_rig_divide(&rig, &probes, &typical, &divide);
+    rgb found = measurement_value(m);
     CHECK(isfinite(found.r) && isfinite(found.g) && isfinite(found.b) && isfinite(m->weight));
     rig.r.is_emitter[0] = true;
     divide_texels(&divide, &(uint32_t){PLANE_MIDDLE}, 1);

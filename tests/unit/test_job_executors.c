@@ -1,7 +1,7 @@
 /* test_job_executors.c -- where jobs run: whose turn it is when some places are full, and which place a job gets. */
 #include <string.h>
 
-#include "server/job/lanes.h"
+#include "server/job/dispatch.h"
 #include "server/store/remote.h"
 #include "tests/unit/store_rig.h"
 
@@ -120,15 +120,15 @@ static void play_round(struct store *store, bool has_slurm) {
     const struct scheduler_config config = {
         .executor = &here, .max_running = 1, .places = places, .place_count = has_slurm ? 2 : 1};
     struct counters counters = {0};
-    struct lanes lanes;
-    lanes_init(&lanes, &config, store, &counters);
-    lanes.slot = mem_calloc(lanes.job_slots, sizeof *lanes.slot);
-    for (size_t i = 0; i < lanes.job_slots; i++)
-        lanes.slot[i] = (struct attempt){.phase = ATTEMPT_ENDED, .executor = places[i % 2]};
-    OK(lanes_start(&lanes, &err));
-    OK(lanes_start(&lanes, &err));
-    mem_free(lanes.slot);
-    lanes_release(&lanes);
+    struct dispatch dispatch;
+    dispatch_init(&dispatch, &config, store, &counters);
+    dispatch.slot = mem_calloc(dispatch.job_slots, sizeof *dispatch.slot);
+    for (size_t i = 0; i < dispatch.job_slots; i++)
+        dispatch.slot[i] = (struct attempt){.phase = ATTEMPT_ENDED, .executor = places[i % 2]};
+    OK(dispatch_start(&dispatch, &err));
+    OK(dispatch_start(&dispatch, &err));
+    mem_free(dispatch.slot);
+    dispatch_release(&dispatch);
 }
 
 /* A job whose executor was removed from the configuration says why it waits, until it is there again. */

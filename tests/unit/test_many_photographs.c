@@ -96,8 +96,8 @@ static void test_divide(uint32_t count) {
         irradiance_add(&probes.probe[i].light, (vec3){0, 0, 1}, (vec3){0, 0, 1}, rgb_gray((float)PI));
     float typical;
     struct divide divide;
-    const struct measured *m = plane_rig_divide(&rig, &probes, &typical, &divide);
-    rgb found = measured_value(m);
+    const struct measurement *m = plane_rig_divide(&rig, &probes, &typical, &divide);
+    rgb found = measurement_value(m);
     CHECK_THAT(fabsf(found.r - near_color.r) < 0.05f, "of %u photographs: %g", count, (double)found.r);
     mem_free(divide.measured);
     probes_release(&probes);

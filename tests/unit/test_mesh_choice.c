@@ -4,7 +4,7 @@
 
 #include "common/file.h"
 #include "common/mem.h"
-#include "server/ingest/applied.h"
+#include "server/ingest/applied_transform.h"
 #include "tests/check.h"
 
 static char dir[64]; /* in memory where possible: writing syncs the file system */
@@ -88,7 +88,7 @@ static void test_undo(void) {
                        .applied = {{0, -1, 0, 1}, {1, 0, 0, 2}, {0, 0, 1, 3}},
                        .applied_scale = 2.0};
     const struct exact_pose stored = frame.world_from_camera;
-    applied_settle(&t, "transforms.json", "mesh.ply", NULL, &f);
+    applied_transform_settle(&t, "transforms.json", "mesh.ply", NULL, &f);
     CHECK(t.has_applied && f.warning_count == 1 && strstr(f.warning[0], "needs coordinates=capture"));
     /* As the user says, or the check of fit finds; and back. */
     CHECK(t.other_count == 1 && frames_settle_coordinates(&t, "capture", NULL, NULL) == STATUS_OK);
@@ -103,7 +103,7 @@ static void test_undo(void) {
     CHECK_THAT(strstr(err.message, "only \"file\", \"capture\""), "%s", err.message);
     t.other_count = 0;
     /* By the mesh's name; it may be wrong, so the file's are known. */
-    applied_settle(&t, "transforms.json", "a/scene_dense_mesh.ply", NULL, &f);
+    applied_transform_settle(&t, "transforms.json", "a/scene_dense_mesh.ply", NULL, &f);
     CHECK(!t.has_applied && f.warning_count == 2 && strstr(f.warning[1], "were turned back"));
     check_undone(&frame.world_from_camera);
     CHECK(t.other_count == 1 && frames_settle_coordinates(&t, "file", NULL, NULL) == STATUS_OK);
@@ -111,7 +111,7 @@ static void test_undo(void) {
         CHECK_NEAR(frame.world_from_camera.translation[i], stored.translation[i], 1e-12);
     t.has_applied = true;
     t.applied[2][2] = -1;
-    applied_undo(&t, "transforms.json", "", &f);
+    applied_transform_undo(&t, "transforms.json", "", &f);
     char *problems = json_text(f.problems);
     CHECK_THAT(strstr(problems, "mirrors space") != NULL, "%s", problems);
     mem_free(problems);

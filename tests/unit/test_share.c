@@ -6,7 +6,7 @@
 
 #include "server/job/worker_messages.h"
 #include "server/job/housekeeping.h"
-#include "server/job/measure.h"
+#include "server/job/disk_usage.h"
 #include "server/job/outcome.h"
 #include "server/worker/progress.h"
 #include "tests/unit/fault_rig.h"
@@ -201,7 +201,7 @@ static void test_job(void) {
     housekeeping_run(&with, store);
     CHECK(lift() && disk_of(id) == -1);
     CHECK(kept_by(ALICE) == before + 64 * KIB); /* its outputs, as they were announced */
-    measure_unknown(&config, store);
+    disk_usage_enter_unknown(&config, store);
     CHECK(disk_of(id) == size_of(folder));
 
     /* A disk that is too full to enter anything gets its room. */
@@ -297,7 +297,7 @@ static void test_killed(void) {
     store_close(store); /* and killed again */
     OK(store_open(&store, dir, &err));
     OK(store_reconcile(store, NULL, 0, &requeued, &err));
-    measure_unknown(&config, store);
+    disk_usage_enter_unknown(&config, store);
     CHECK(requeued == 0 && disk_of(id) == size_of(folder) && disk_of(id) >= (512 + 128 + 64) * KIB);
     CHECK(kept_by(BOB) == before + disk_of(id));
     OK(store_job_delete(store, id, &err));
@@ -319,7 +319,7 @@ static void test_many(void) {
     }
     log_forget();
     strike_system("fstatat", 50, false);
-    measure_unknown(&config, store);
+    disk_usage_enter_unknown(&config, store);
     CHECK(lift());
     for (int i = 0; i < 150; i++) {
         unknown += disk_of(ids[i]) == -1;
@@ -327,12 +327,12 @@ static void test_many(void) {
     }
     CHECK(unknown == 1 && log_count("of the disk is not known: ") == 1);
     strike_sql("OFFSET", 1, false);
-    measure_unknown(&config, store);
+    disk_usage_enter_unknown(&config, store);
     CHECK(lift() && log_count("is not known of all: ") == 1);
     strike_sql("UPDATE jobs SET disk_bytes", 1, false);
-    measure_unknown(&config, store);
+    disk_usage_enter_unknown(&config, store);
     CHECK(lift() && log_count("is not known of all: ") == 2);
-    measure_unknown(&config, store);
+    disk_usage_enter_unknown(&config, store);
     for (int i = 0; i < 150; i++) {
         CHECK(disk_of(ids[i]) >= 4 * KIB);
         OK(store_job_delete(store, ids[i], &err));

@@ -9,7 +9,7 @@
 #include "common/file.h"
 #include "common/mem.h"
 #include "server/executor/command.h"
-#include "server/executor/listed.h"
+#include "server/executor/job_status.h"
 #include "tests/check.h"
 
 static struct error err;
@@ -91,19 +91,19 @@ static void test_filled(void) {
     mem_free(wanted);
 
     /* Of one name the liveliest; others' jobs are left out; what only looks strange is not garbage, all of it is. */
-    struct listed_jobs jobs;
-    CHECK(listed_read(&jobs, &site,
-                      "noise\n7|unbake-1-2-ab|F|gone\n 8|unbake-1-2-ab|PD|Priority, of others \n9|mine|R|\n"));
-    CHECK(jobs.count == 2 && !listed_find(&jobs, "mine") && !listed_find(&jobs, "unbake-1-2-a"));
-    const struct listed *found = listed_find(&jobs, "unbake-1-2-ab");
+    struct job_status_list jobs;
+    CHECK(job_status_parse(&jobs, &site,
+                           "noise\n7|unbake-1-2-ab|F|gone\n 8|unbake-1-2-ab|PD|Priority, of others \n9|mine|R|\n"));
+    CHECK(jobs.count == 2 && !job_status_find(&jobs, "mine") && !job_status_find(&jobs, "unbake-1-2-a"));
+    const struct job_status *found = job_status_find(&jobs, "unbake-1-2-ab");
     CHECK(found && found->state == SITE_WAITING);
     CHECK_STRING(found ? found->id : "", "8");
     CHECK_STRING(found ? found->reason : "", "Priority, of others");
-    listed_release(&jobs);
-    CHECK(!listed_read(&jobs, &site, "slurm_load_jobs error: Unable to contact\n") && jobs.count == 0);
-    listed_release(&jobs);
-    CHECK(listed_read(&jobs, &site, "") && jobs.count == 0);
-    listed_release(&jobs);
+    job_status_release(&jobs);
+    CHECK(!job_status_parse(&jobs, &site, "slurm_load_jobs error: Unable to contact\n") && jobs.count == 0);
+    job_status_release(&jobs);
+    CHECK(job_status_parse(&jobs, &site, "") && jobs.count == 0);
+    job_status_release(&jobs);
     site_release(&site);
 }
 

@@ -13,7 +13,7 @@
 #include "server/http/jobs/job_reply.h"
 #include "server/http/limits.h"
 #include "server/http/whole_body.h"
-#include "server/job/measure.h"
+#include "server/job/disk_usage.h"
 #include "server/store/job_files.h"
 #include "server/transport/problem.h"
 #include "server/uploads/upload.h"
@@ -53,7 +53,7 @@ static enum status put_in_place(struct api *api, struct request *r, int64_t id, 
     }
     struct error unmeasured; /* a size that is not known is measured later */
     if (status == STATUS_OK)
-        (void)measure_job(api->store, id, dir, &unmeasured);
+        (void)disk_usage_enter_job(api->store, id, dir, &unmeasured);
     mem_free(path);
     mem_free(folder);
     mem_free(dir);

@@ -9,7 +9,7 @@
 #include "common/mem.h"
 #include "server/ingest/mesh/gltf_extensions.h"
 #include "server/ingest/mesh/gltf_file.h"
-#include "server/ingest/mesh/gltf_look.h"
+#include "server/ingest/mesh/gltf_materials.h"
 #include "server/ingest/mesh/gltf_node.h"
 #include "server/ingest/mesh/gltf_objects.h"
 #include "server/ingest/mesh/gltf_primitive.h"
@@ -25,7 +25,7 @@ struct gltf_reader {
     bool *shown;   /* [images] whether one is a base colour; owned */
     int image_count;
     size_t skinned_count, hidden_count; /* nodes */
-    struct mesh_look *look;             /* NULL: materials are not read */
+    struct mesh_materials *materials;   /* NULL: materials are not read */
     bool *is_used;                      /* [materials + 1] whether a primitive has the material; owned */
     struct error *err;
 };
@@ -34,13 +34,13 @@ struct gltf_reader {
 
 /* Of a primitive with that material, -1: none, where materials are read. */
 static enum status use_material(struct gltf_reader *r, const char *where, double material) {
-    size_t count = gltf_look_count(&r->file), number = material >= 0.0 ? (size_t)material : count;
+    size_t count = gltf_materials_count(&r->file), number = material >= 0.0 ? (size_t)material : count;
     if (!(material < (double)count) || (material >= 0.0 && material != floor(material)))
         return error_set(r->err, STATUS_INPUT, "%s: the material of %s is none of the %zu", r->file.name, where, count);
     r->is_used[number] = true;
     r->surface.object_id = (int64_t)number;
     r->surface.uv_set = -1;
-    return number < count ? gltf_look_uv_set(&r->file, number, &r->surface.uv_set, r->err) : STATUS_OK;
+    return number < count ? gltf_materials_uv_set(&r->file, number, &r->surface.uv_set, r->err) : STATUS_OK;
 }
 
 /* Each change of material within the node starts an object. */
@@ -67,7 +67,7 @@ static enum status add_mesh(struct gltf_reader *r, size_t node, size_t mesh, con
         int picture = gltf_uv_picture(&r->file, item);
         if (picture >= 0 && picture < r->image_count)
             r->shown[picture] = true;
-        if (r->look)
+        if (r->materials)
             status = use_material(r, where, number);
         if (status == STATUS_OK)
             status = gltf_surface_add(&r->surface, item, where, (int)kind, t);
@@ -203,11 +203,11 @@ static void take_notes(struct gltf_reader *r) {
                    r->surface.no_uv_count);
     if (r->hidden_count > 0)
         faces_note(report, "%zu nodes are hidden and were left out", r->hidden_count);
-    if (r->look && r->surface.colored_count > 0)
+    if (r->materials && r->surface.colored_count > 0)
         faces_note(report, "%zu primitives have colours of their vertices, which were left out",
                    r->surface.colored_count);
-    if (r->look)
-        look_note(r->look, report);
+    if (r->materials)
+        mesh_materials_note(r->materials, report);
 }
 
 static void finish(struct gltf_reader *r) {
@@ -219,7 +219,7 @@ static void finish(struct gltf_reader *r) {
         mem_free(mesh->normal);
         mesh->normal = NULL;
     }
-    if (!r->look)
+    if (!r->materials)
         gltf_objects_settle(&r->objects, mesh, &surface->faces->report);
     for (int i = 0; i < r->image_count; i++)
         mesh->picture_count += r->shown[i];
@@ -227,25 +227,26 @@ static void finish(struct gltf_reader *r) {
 }
 
 enum status gltf_parse(const void *data, size_t size, const char *name, const char *folder, size_t triangle_limit,
-                       struct mesh *mesh, struct mesh_look *look, struct faces_report *report, struct error *err) {
+                       struct mesh *mesh, struct mesh_materials *materials, struct faces_report *report,
+                       struct error *err) {
     *mesh = (struct mesh){0};
-    struct gltf_reader r = {.look = look, .err = err};
-    r.surface = (struct gltf_surface){.file = &r.file, .mesh = mesh, .is_look = look != NULL, .err = err};
+    struct gltf_reader r = {.materials = materials, .err = err};
+    r.surface = (struct gltf_surface){.file = &r.file, .mesh = mesh, .with_materials = materials != NULL, .err = err};
     r.surface.faces = faces_new(mesh, name, triangle_limit, true);
     enum status status = gltf_file_open(&r.file, data, size, name, folder, err);
     if (status == STATUS_OK)
         status = gltf_extensions_check(&r.file, err);
     if (status == STATUS_OK) {
         gltf_objects_init(&r.objects, &r.file);
-        r.is_used = mem_calloc(gltf_look_count(&r.file) + 1, sizeof *r.is_used);
+        r.is_used = mem_calloc(gltf_materials_count(&r.file) + 1, sizeof *r.is_used);
         r.image_count = cJSON_GetArraySize(cJSON_GetObjectItemCaseSensitive(r.file.json, "images"));
         r.shown = mem_calloc((size_t)r.image_count + 1, sizeof *r.shown);
         status = read_scene(&r);
     }
     if (status == STATUS_OK && mesh->triangle_count == 0)
         status = error_set(err, STATUS_INPUT, "%s has no triangles in its scene", name);
-    if (status == STATUS_OK && look)
-        status = gltf_look_read(&r.file, r.is_used, look, err);
+    if (status == STATUS_OK && materials)
+        status = gltf_materials_read(&r.file, r.is_used, materials, err);
     if (status == STATUS_OK)
         finish(&r);
     else

@@ -13,13 +13,14 @@
 
 #include "common/error.h"
 #include "server/ingest/mesh/faces.h"
-#include "server/ingest/mesh/look.h"
+#include "server/ingest/mesh/mesh_materials.h"
 #include "server/scene/mesh.h"
 
-/* As ply_parse; `folder` contains the file's external buffers, NULL: none are allowed.
- * With `look`, which may be NULL: materials, too; mesh->object_id are then their numbers in *look. It is the caller's
- * (look_release), also after a failure. */
+/* As ply_parse; `folder` contains the file's external buffers, NULL: none are allowed. With `materials`, which may be
+ * NULL: materials, too; mesh->object_id are then their numbers in *materials. It is the caller's
+ * (mesh_materials_release), also after a failure. */
 enum status gltf_parse(const void *data, size_t size, const char *name, const char *folder, size_t triangle_limit,
-                       struct mesh *mesh, struct mesh_look *look, struct faces_report *report, struct error *err);
+                       struct mesh *mesh, struct mesh_materials *materials, struct faces_report *report,
+                       struct error *err);
 
 #endif

@@ -117,9 +117,9 @@ static enum status open_uv(struct gltf_surface *r, const cJSON *object, struct p
     size_t count = p->position.count;
     const cJSON *attributes = cJSON_GetObjectItemCaseSensitive(object, "attributes");
     r->colored_count += cJSON_GetObjectItemCaseSensitive(attributes, "COLOR_0") != NULL;
-    if (!r->is_look) /* geometry does not need them */
+    if (!r->with_materials) /* geometry does not need them */
         r->no_uv_count += gltf_uv_open(&p->uv, r->file, object, p->where, count, NULL) != STATUS_OK;
-    if (!r->is_look || r->uv_set < 0)
+    if (!r->with_materials || r->uv_set < 0)
         return STATUS_OK;
     enum status status = gltf_uv_open_set(&p->uv, r->file, object, r->uv_set, p->where, count, r->err);
     if (status == STATUS_OK && !p->uv.is_there)

@@ -23,7 +23,7 @@ struct gltf_surface {
     size_t no_uv_count;   /* primitives whose texture coordinates are damaged, which are left out */
     size_t colored_count; /* primitives with colours of their vertices */
     int64_t object_id;    /* of the triangles being added */
-    bool is_look;         /* texture coordinates are those of uv_set as the file has them, and must be there: */
+    bool with_materials;  /* texture coordinates are those of uv_set as the file has them, and must be there: */
     int uv_set;           /* which the pictures of the primitive's material use; -1: it has none */
     struct error *err;
 };

@@ -13,16 +13,16 @@
 #include "server/ingest/mesh/positions.h"
 
 typedef enum status mesh_parser(const void *data, size_t size, const char *name, const char *folder,
-                                size_t triangle_limit, struct mesh *mesh, struct mesh_look *look,
+                                size_t triangle_limit, struct mesh *mesh, struct mesh_materials *materials,
                                 struct faces_report *report, struct error *err);
 
 /* A PLY says nothing of its surfaces. */
 static enum status parse_ply(const void *data, size_t size, const char *name, const char *folder, size_t triangle_limit,
-                             struct mesh *mesh, struct mesh_look *look, struct faces_report *report,
+                             struct mesh *mesh, struct mesh_materials *materials, struct faces_report *report,
                              struct error *err) {
     (void)folder;
     enum status status = ply_parse(data, size, name, triangle_limit, mesh, report, err);
-    if (look) {
+    if (materials) {
         mem_free(mesh->object_id);
         mesh->object_id = NULL;
     }
@@ -51,7 +51,7 @@ static const struct mesh_format *format_of(const char *name) {
 bool mesh_file_is_known(const char *name) { return format_of(name) != NULL; }
 
 static enum status read_mesh(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
-                             struct mesh_look *look, struct faces_report *report, struct error *err) {
+                             struct mesh_materials *materials, struct faces_report *report, struct error *err) {
     const struct mesh_format *format = format_of(name);
     const char *slash = strrchr(path, '/');
     char *folder = slash ? mem_strndup(path, (size_t)(slash - path)) : mem_strdup(".");
@@ -60,7 +60,7 @@ static enum status read_mesh(const char *path, const char *name, size_t triangle
     *mesh = (struct mesh){0};
     enum status status = mapping_open(&file, path, name, format->kind, err);
     if (status == STATUS_OK)
-        status = format->parse(file.data, file.size, name, folder, triangle_limit, mesh, look, report, err);
+        status = format->parse(file.data, file.size, name, folder, triangle_limit, mesh, materials, report, err);
     mapping_close(&file);
     mem_free(folder);
     return status;
@@ -71,10 +71,10 @@ enum status mesh_file_read(const char *path, const char *name, size_t triangle_l
     return read_mesh(path, name, triangle_limit, mesh, NULL, report, err);
 }
 
-enum status mesh_file_read_look(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
-                                struct mesh_look *look, struct faces_report *report, struct error *err) {
-    *look = (struct mesh_look){0};
-    return read_mesh(path, name, triangle_limit, mesh, look, report, err);
+enum status mesh_file_read_materials(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
+                                     struct mesh_materials *materials, struct faces_report *report, struct error *err) {
+    *materials = (struct mesh_materials){0};
+    return read_mesh(path, name, triangle_limit, mesh, materials, report, err);
 }
 
 static void warn_of_place(const char *name, const struct mesh *mesh, const struct faces_report *report,

@@ -8,7 +8,7 @@
 
 #include "common/error.h"
 #include "server/ingest/mesh/faces.h"
-#include "server/ingest/mesh/look.h"
+#include "server/ingest/mesh/mesh_materials.h"
 #include "server/ingest/findings.h"
 #include "server/scene/mesh.h"
 
@@ -22,10 +22,10 @@ enum status mesh_file_read(const char *path, const char *name, size_t triangle_l
                            struct faces_report *report, struct error *err);
 
 /* The same with what the file says of its surfaces: mesh->object_id are numbers of materials and mesh->uv are as the
- * file has them, without transforms of pictures. A PLY says nothing: no material, and no object_id. The look is the
- * caller's (look_release), also after a failure. */
-enum status mesh_file_read_look(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
-                                struct mesh_look *look, struct faces_report *report, struct error *err);
+ * file has them, without transforms of pictures. A PLY says nothing: no material, and no object_id. The materials is
+ * the caller's (mesh_materials_release), also after a failure. */
+enum status mesh_file_read_materials(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
+                                     struct mesh_materials *materials, struct faces_report *report, struct error *err);
 
 /* Warns of what was left out or changed: by the reader (report) and by mesh_check (check). */
 void mesh_file_warn(const char *name, const struct mesh *mesh, const struct faces_report *report,

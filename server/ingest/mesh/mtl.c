@@ -11,9 +11,9 @@
 
 struct mtl_reader {
     const char *name, *folder;
-    struct mesh_look *look;
+    struct mesh_materials *materials;
     bool *found;
-    struct look_material *current;                         /* NULL: one that no face uses */
+    struct mesh_material *current;                         /* NULL: one that no face uses */
     bool has_color, has_roughness, has_specular, is_matte; /* of it; matte: illum 0 or 1 */
     struct error *err;
 };
@@ -57,7 +57,7 @@ static enum status read_number(const struct mtl_reader *r, const char *line, con
 
 /* Takes the options before a picture's name: -o and -s move and scale, -clamp; others that change nothing here are
  * skipped. False: one is not known. */
-static bool read_options(const char **text, struct look_map *map) {
+static bool read_options(const char **text, struct material_map *map) {
     static const struct {
         const char *option;
         int most; /* arguments */
@@ -68,7 +68,7 @@ static bool read_options(const char **text, struct look_map *map) {
         bool is_move = after(*text, "-o") != NULL, is_size = after(*text, "-s") != NULL, known = true;
         if (rest) {
             for (int i = 0; i < 2; i++)
-                map->wrap[i] = strncasecmp(rest, "on", 2) == 0 ? LOOK_CLAMP : LOOK_REPEAT;
+                map->wrap[i] = strncasecmp(rest, "on", 2) == 0 ? MATERIAL_WRAP_CLAMP : MATERIAL_WRAP_REPEAT;
             *text = rest + strcspn(rest, " \t");
         } else if (is_move || is_size) {
             *text += 2;
@@ -100,12 +100,13 @@ static bool read_options(const char **text, struct look_map *map) {
     return true;
 }
 
-static enum status read_map(const struct mtl_reader *r, const char *line, const char *text, enum look_quantity quantity,
-                            int channel) {
-    struct look_map map = {.is_there = true, .channel = channel};
+static enum status read_map(const struct mtl_reader *r, const char *line, const char *text,
+                            enum material_quantity quantity, int channel) {
+    struct material_map map = {.is_there = true, .channel = channel};
     if (!read_options(&text, &map) || !*text)
         return bad_line(r, line);
-    enum status status = look_read_image(r->look, r->folder, r->name, text, channel < 0, &map.image, r->err);
+    enum status status =
+        mesh_materials_read_image(r->materials, r->folder, r->name, text, channel < 0, &map.image, r->err);
     if (status == STATUS_OK)
         r->current->map[quantity] = map;
     return status;
@@ -114,16 +115,16 @@ static enum status read_map(const struct mtl_reader *r, const char *line, const 
 /* --- lines ---------------------------------------------------------------------------------------- */
 
 static void end_material(struct mtl_reader *r) {
-    struct look_material *m = r->current;
+    struct mesh_material *m = r->current;
     if (!m)
         return;
-    if (m->map[LOOK_BASE_COLOR].is_there && (!r->has_color || rgb_is_black(m->base_color)))
+    if (m->map[MATERIAL_BASE_COLOR].is_there && (!r->has_color || rgb_is_black(m->base_color)))
         m->base_color = rgb_gray(1.0f);
-    if (m->map[LOOK_EMISSION].is_there && rgb_is_black(m->emission))
+    if (m->map[MATERIAL_EMISSION].is_there && rgb_is_black(m->emission))
         m->emission = rgb_gray(1.0f);
-    if (m->map[LOOK_ROUGHNESS].is_there && !r->has_roughness)
+    if (m->map[MATERIAL_ROUGHNESS].is_there && !r->has_roughness)
         m->roughness = 1.0f;
-    if (m->map[LOOK_METALLIC].is_there && m->metallic == 0.0f)
+    if (m->map[MATERIAL_METALLIC].is_there && m->metallic == 0.0f)
         m->metallic = 1.0f;
     if (r->is_matte && !r->has_specular)
         m->specular = 0.0f;
@@ -136,9 +137,9 @@ static void begin_material(struct mtl_reader *r, const char *name) {
     end_material(r);
     r->current = NULL;
     r->has_color = r->has_roughness = r->has_specular = r->is_matte = false;
-    for (size_t i = 0; i < r->look->material_count; i++)
-        if (!r->found[i] && strcmp(r->look->material[i].name, name) == 0) {
-            r->current = &r->look->material[i];
+    for (size_t i = 0; i < r->materials->material_count; i++)
+        if (!r->found[i] && strcmp(r->materials->material[i].name, name) == 0) {
+            r->current = &r->materials->material[i];
             r->found[i] = r->current->is_own = true;
             return;
         }
@@ -150,7 +151,7 @@ static enum status read_specular(struct mtl_reader *r, const char *line, const c
     if (status != STATUS_OK)
         return status;
     if (rgb_max(color) > 1.01f * rgb_luminance(color))
-        look_leave_out(r->look, "colour of Ks");
+        mesh_materials_leave_out(r->materials, "colour of Ks");
     r->current->specular = clampf(rgb_luminance(color), 0.0f, 1.0f);
     r->has_specular = r->current->specular > 0.0f;
     return STATUS_OK;
@@ -171,7 +172,7 @@ static enum status read_opacity(struct mtl_reader *r, const char *line, const ch
         text += 5 + strspn(text + 5, " \t");
     enum status status = read_number(r, line, text, &value);
     if (status == STATUS_OK && value != opaque)
-        look_leave_out(r->look, "transparency");
+        mesh_materials_leave_out(r->materials, "transparency");
     return status;
 }
 
@@ -181,7 +182,7 @@ static enum status read_line(struct mtl_reader *r, const char *line) {
         {"map_Bump", "bump maps"}, {"bump", "bump maps"},     {"norm", "normal maps"}, {"disp", "displacement"},
         {"decal", "decals"},       {"map_d", "transparency"}, {"map_Ks", "map_Ks"},    {"map_Ns", "map_Ns"},
         {"Ps", "sheen"},           {"Pc", "clearcoat"},       {"aniso", "anisotropy"}, {"refl", "reflection maps"}};
-    struct look_material *m = r->current;
+    struct mesh_material *m = r->current;
     const char *text;
     if ((text = after(line, "newmtl")) != NULL) {
         begin_material(r, text);
@@ -214,22 +215,22 @@ static enum status read_line(struct mtl_reader *r, const char *line) {
         return STATUS_OK;
     }
     if ((text = after(line, "map_Kd")) != NULL)
-        return read_map(r, line, text, LOOK_BASE_COLOR, -1);
+        return read_map(r, line, text, MATERIAL_BASE_COLOR, -1);
     if ((text = after(line, "map_Ke")) != NULL)
-        return read_map(r, line, text, LOOK_EMISSION, -1);
+        return read_map(r, line, text, MATERIAL_EMISSION, -1);
     if ((text = after(line, "map_Pr")) != NULL)
-        return read_map(r, line, text, LOOK_ROUGHNESS, 0);
+        return read_map(r, line, text, MATERIAL_ROUGHNESS, 0);
     if ((text = after(line, "map_Pm")) != NULL)
-        return read_map(r, line, text, LOOK_METALLIC, 0);
+        return read_map(r, line, text, MATERIAL_METALLIC, 0);
     for (size_t i = 0; i < sizeof unread / sizeof *unread; i++)
         if (after(line, unread[i][0]))
-            look_leave_out(r->look, unread[i][1]);
+            mesh_materials_leave_out(r->materials, unread[i][1]);
     return STATUS_OK;
 }
 
-enum status mtl_read(const char *name, const char *text, size_t length, const char *folder, struct mesh_look *look,
-                     bool *found, struct error *err) {
-    struct mtl_reader r = {.name = name, .folder = folder, .look = look, .found = found, .err = err};
+enum status mtl_read(const char *name, const char *text, size_t length, const char *folder,
+                     struct mesh_materials *materials, bool *found, struct error *err) {
+    struct mtl_reader r = {.name = name, .folder = folder, .materials = materials, .found = found, .err = err};
     const char *end = text + length;
     char *line;
     enum status status = STATUS_OK;

@@ -5,11 +5,11 @@
 #ifndef UNBAKE_INGEST_MESH_MTL_H
 #define UNBAKE_INGEST_MESH_MTL_H
 
-#include "server/ingest/mesh/look.h"
+#include "server/ingest/mesh/mesh_materials.h"
 
-/* Reads text[length], any bytes, into the materials of `look` that have the names; found[material_count] says which.
- * Pictures are below `folder`. `name` is the file's, for messages. */
-enum status mtl_read(const char *name, const char *text, size_t length, const char *folder, struct mesh_look *look,
-                     bool *found, struct error *err);
+/* Reads text[length], any bytes, into the materials of `materials` that have the names; found[material_count] says
+ * which. Pictures are below `folder`. `name` is the file's, for messages. */
+enum status mtl_read(const char *name, const char *text, size_t length, const char *folder,
+                     struct mesh_materials *materials, bool *found, struct error *err);
 
 #endif

@@ -9,7 +9,7 @@
 #include "common/mem.h"
 #include "server/ingest/mesh/intern.h"
 #include "server/ingest/mapping.h"
-#include "server/ingest/mesh/obj_look.h"
+#include "server/ingest/mesh/obj_materials.h"
 #include "server/ingest/mesh/obj_objects.h"
 #include "server/ingest/mesh/positions.h"
 
@@ -33,7 +33,7 @@ struct obj_reader {
     uint32_t (*pair)[2]; /* [pairs.count]; owned */
     size_t pair_capacity;
     struct obj_objects objects;
-    struct mesh_look *look; /* NULL: materials are not read */
+    struct mesh_materials *materials; /* NULL: materials are not read */
     struct error *err;
 };
 
@@ -273,8 +273,8 @@ static enum status finish(struct obj_reader *r, struct mesh *mesh) {
         mesh->normal[v] = vec3_make((float)n[0], (float)n[1], (float)n[2]);
     }
     positions_settle(&vertices, mesh);
-    if (r->look)
-        return obj_look_settle(&r->objects, r->name, r->folder, mesh, r->look, &r->faces->report, r->err);
+    if (r->materials)
+        return obj_materials_settle(&r->objects, r->name, r->folder, mesh, r->materials, &r->faces->report, r->err);
     obj_objects_settle(&r->objects, r->folder, mesh, &r->faces->report);
     return STATUS_OK;
 }
@@ -289,13 +289,14 @@ static enum status check_whole(const struct obj_reader *r) {
 }
 
 enum status obj_parse(const void *data, size_t size, const char *name, const char *folder, size_t triangle_limit,
-                      struct mesh *mesh, struct mesh_look *look, struct faces_report *report, struct error *err) {
+                      struct mesh *mesh, struct mesh_materials *materials, struct faces_report *report,
+                      struct error *err) {
     *mesh = (struct mesh){0};
     if (size > MAX_BYTES)
         return error_set(err, STATUS_LIMIT, "%s is larger than %zu bytes", name, MAX_BYTES);
     struct obj_reader *r = mem_calloc(1, sizeof *r);
     *r = (struct obj_reader){
-        .name = name, .folder = folder, .data = data, .size = size, .next_line = 1, .look = look, .err = err};
+        .name = name, .folder = folder, .data = data, .size = size, .next_line = 1, .materials = materials, .err = err};
     r->faces = faces_new(mesh, name, triangle_limit, true);
     intern_init(&r->pairs);
     obj_objects_init(&r->objects);

@@ -14,14 +14,14 @@
 
 #include "common/error.h"
 #include "server/ingest/mesh/faces.h"
-#include "server/ingest/mesh/look.h"
+#include "server/ingest/mesh/mesh_materials.h"
 #include "server/scene/mesh.h"
 
-/* As ply_parse; `folder` has the file's library of materials, NULL: none. Damage is STATUS_INPUT with the line
- * of the file.
- * With `look`, which may be NULL: materials, too; mesh->object_id are then their numbers in *look. It is the caller's
- * (look_release), also after a failure. */
+/* As ply_parse; `folder` has the file's library of materials, NULL: none. Damage is STATUS_INPUT with the line of the
+ * file. With `materials`, which may be NULL: materials, too; mesh->object_id are then their numbers in *materials. It
+ * is the caller's (mesh_materials_release), also after a failure. */
 enum status obj_parse(const void *data, size_t size, const char *name, const char *folder, size_t triangle_limit,
-                      struct mesh *mesh, struct mesh_look *look, struct faces_report *report, struct error *err);
+                      struct mesh *mesh, struct mesh_materials *materials, struct faces_report *report,
+                      struct error *err);
 
 #endif

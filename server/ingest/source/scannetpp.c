@@ -9,7 +9,7 @@
 #include <string.h>
 
 #include "common/mem.h"
-#include "server/ingest/applied.h"
+#include "server/ingest/applied_transform.h"
 #include "server/ingest/path.h"
 #include "server/ingest/source/photo_folder.h"
 #include "server/ingest/source/transforms_file.h"
@@ -68,7 +68,7 @@ static enum status read(const struct source_place *place, struct frames *t, stru
     t->has_applied = true;
     t->applied_scale = 1.0;
     memcpy(t->applied, applied, sizeof applied);
-    applied_undo(t, place->found, "ScanNet++'s mesh has others", f);
+    applied_transform_undo(t, place->found, "ScanNet++'s mesh has others", f);
     mem_free(folder);
     return status;
 }
