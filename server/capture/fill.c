@@ -3,6 +3,7 @@
 
 #include <math.h>
 #include <stddef.h>
+#include <string.h>
 
 #include "common/cholesky_band.h"
 #include "common/mem.h"
@@ -13,6 +14,7 @@
  * a sun is not to be spread over what is unknown. */
 #define LUMINANCE_LIMIT 4.0 /* +25 %: no change */
 #define DARKEST 1e-3        /* of it: values below count as so bright, since logarithms are propagated */
+#define MOST_LOG 80.0f      /* e^88 is the greatest float; anything beyond the limits does */
 #define SWEEPS 32           /* of Gauss-Seidel after pull-push: smooths its blocks over 32 pixels; +25 %: no change */
 /* Weight of the pull of neighbouring rows to each other over that of a pixel: decides only where no row is known. */
 #define ROWS_ALIKE 1e-3
@@ -36,14 +38,18 @@ static double typical_luminance(const struct image *map, const struct image *kno
     return (sum / weight) * (sum / weight);
 }
 
-/* The logarithm of a colour that is clamped to a luminance. */
-static rgb below_limit(const struct image *map, size_t pixel, double limit) {
-    const float *p = map->pixel + 3 * pixel;
-    rgb color = rgb_make(p[0], p[1], p[2]);
+/* A colour within the limits of what is propagated. */
+static rgb within_limits(rgb color, double limit) {
     double luminance = (double)rgb_luminance(color);
     float scale = luminance > limit ? (float)(limit / luminance) : 1.0f, least = (float)(limit * DARKEST);
-    return rgb_make(logf(fmaxf(scale * color.r, least)), logf(fmaxf(scale * color.g, least)),
-                    logf(fmaxf(scale * color.b, least)));
+    return rgb_make(fmaxf(scale * color.r, least), fmaxf(scale * color.g, least), fmaxf(scale * color.b, least));
+}
+
+/* The logarithm of a known colour. */
+static rgb log_color(const struct image *map, size_t pixel, double limit) {
+    const float *p = map->pixel + 3 * pixel;
+    rgb color = within_limits(rgb_make(p[0], p[1], p[2]), limit);
+    return rgb_make(logf(color.r), logf(color.g), logf(color.b));
 }
 
 /* --- the profile -------------------------------------------------------------------------------------- */
@@ -76,12 +82,12 @@ static void add_pixel(struct profile *p, const struct image *map, const struct i
     double anchor = 1.0 / ((double)p->height * (double)p->height);
     if (!(known->pixel[i * channels] > 0.0f))
         return;
-    rgb color = below_limit(map, i, limit);
+    rgb color = log_color(map, i, limit);
     p->matrix[row][1] += anchor;
     for (size_t c = 0; c < 3; c++)
         p->right[c * p->height + row] += anchor * (double)(&color.r)[c];
     if (row + 1 < p->height && known->pixel[below * channels] > 0.0f) {
-        rgb differs = rgb_sub(below_limit(map, below, limit), color);
+        rgb differs = rgb_sub(log_color(map, below, limit), color);
         pull_to_each_other(p, row, 1.0, &differs.r);
     }
 }
@@ -125,7 +131,7 @@ static void start_finest(struct fill_level *l, const struct image *map, const st
     for (size_t i = 0; i < (size_t)l->width * l->height; i++) {
         if (!(known->pixel[i * known->channel_count] > 0.0f))
             continue;
-        rgb differs = rgb_sub(below_limit(map, i, limit), row_color[i / l->width]);
+        rgb differs = rgb_sub(log_color(map, i, limit), row_color[i / l->width]);
         for (int c = 0; c < 3; c++)
             l->value[i][c] = (&differs.r)[c];
         l->value[i][3] = 1.0f;
@@ -226,6 +232,15 @@ static void fill_coarsest(struct fill_level *l) {
     }
 }
 
+/* Where each row shows little, the ratios of rows add up to a profile without bounds: what is seen through the gaps of
+ * a scan made a sky of 360,000 times the light that is seen, within limits it is as bright as what is seen. */
+static void fill_pixel(struct image *map, size_t i, const float difference[4], rgb row, double limit) {
+    rgb color = rgb_make(expf(fminf(difference[0] + row.r, MOST_LOG)), expf(fminf(difference[1] + row.g, MOST_LOG)),
+                         expf(fminf(difference[2] + row.b, MOST_LOG)));
+    color = within_limits(color, limit);
+    memcpy(map->pixel + 3 * i, &color, 3 * sizeof(float));
+}
+
 void fill_sphere(struct image *map, const struct image *known) {
     struct fill_level level[32];
     int count = 1;
@@ -243,8 +258,8 @@ void fill_sphere(struct image *map, const struct image *known) {
         diffuse(&level[0]);
     }
     for (size_t i = 0; i < (size_t)map->width * map->height; i++)
-        for (size_t c = 0; c < 3 && level[0].value[i][3] < 1.0f; c++)
-            map->pixel[3 * i + c] = expf(level[0].value[i][c] + (&row_color[i / map->width].r)[c]);
+        if (level[0].value[i][3] < 1.0f)
+            fill_pixel(map, i, level[0].value[i], row_color[i / map->width], limit);
     for (int i = 0; i < count; i++) {
         mem_free(level[i].value);
         mem_free(level[i].angle);

@@ -109,9 +109,35 @@ static void check_sides(void) {
     image_release(&known);
 }
 
+/* What is seen through the gaps of a scan: two pixels a column, the lower one half as bright again, each pair two rows
+ * below and a column beside the last. Ratios of rows come to 1.5^40; nothing is brighter than 1.5. */
+static void check_gaps(void) {
+    static const char *const channels[] = {"count"};
+    struct image map, known;
+    float brightest = 0.0f;
+    image_init_rgb(&map, WIDTH, HEIGHT);
+    image_init(&known, WIDTH, HEIGHT, 1, channels);
+    for (size_t y = 10; y < 51; y++) {
+        for (size_t k = 0; k < 2; k++) {
+            size_t i = (y + k) * WIDTH + 2 * y;
+            known.pixel[i] = 1.0f;
+            for (size_t c = 0; c < 3; c++)
+                map.pixel[3 * i + c] = k ? 1.5f : 1.0f;
+        }
+    }
+    fill_sphere(&map, &known);
+    for (size_t i = 0; i < 3 * WIDTH * HEIGHT; i++)
+        brightest = fmaxf(brightest, map.pixel[i]);
+    printf("around gaps that show 1 to 1.5: up to %.2f\n", (double)brightest);
+    CHECK_THAT(brightest < 6.1f, "%g", (double)brightest);
+    image_release(&map);
+    image_release(&known);
+}
+
 int main(void) {
     check_angles();
     check_horizon();
     check_sides();
+    check_gaps();
     return check_result();
 }
