@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "client/retention.h"
-#include "common/mem.h"
 #include "common/nearest.h"
 
 const struct command_option collection_options[] = {

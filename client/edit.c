@@ -1,11 +1,9 @@
 /* edit.c -- `edit` and `extend`: change a job's attributes and limits. */
-#include <stdlib.h>
 #include <string.h>
 
 #include "client/commands.h"
 #include "client/new_job.h"
 #include "client/retention.h"
-#include "common/mem.h"
 
 const struct command_option edit_options[] = {
     {"name", 'n', OPTION_TEXT, "NAME", "what people will call the job"},

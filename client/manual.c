@@ -4,7 +4,6 @@
 
 #include "client/commands.h"
 #include "common/manual.h"
-#include "common/protocol.h"
 #include "common/reading.h"
 #include "common/render_settings.h"
 #include "common/settings.h"

@@ -1,7 +1,6 @@
 /* open.c -- `open`: the page of a job, or the server's, in a browser. */
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "client/commands.h"
 #include "client/format.h"

@@ -13,7 +13,6 @@
 #include "client/commands.h"
 #include "client/meter.h"
 #include "client/new_job.h"
-#include "common/file.h"
 #include "common/mem.h"
 #include "common/protocol.h"
 #include "common/render_settings.h"

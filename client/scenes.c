@@ -8,7 +8,6 @@
 #include "client/table.h"
 #include "client/view.h"
 #include "common/mem.h"
-#include "common/protocol.h"
 
 static void print_scenes(struct client *c, const cJSON *items) {
     static const char *const headings[] = {"scene", "state", "?fit", "~>size", ">age", "~>expires", "~?owner", "name"};

@@ -12,7 +12,6 @@
 #ifndef UNBAKE_CLIENT_SERVERS_H
 #define UNBAKE_CLIENT_SERVERS_H
 
-#include <stdbool.h>
 #include <stddef.h>
 
 #include "common/options.h"

@@ -6,7 +6,6 @@
  *
  * Tiles are decoded in this thread: photographs are read in parallel already. libheif 1.16 and later opens its decoders
  * by dlopen, within the system's library folders, which the worker's sandbox leaves readable. */
-#include <stdio.h>
 #include <string.h>
 
 #include <libheif/heif.h>

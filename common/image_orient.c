@@ -1,5 +1,4 @@
 /* image_orient.c -- turns a picture as its EXIF orientation says (CIPA DC-008, 4.6.5.1). */
-#include <stdlib.h>
 #include <string.h>
 
 #include "common/image.h"

@@ -1,7 +1,6 @@
 /* options.c -- see options.h. */
 #include "common/options.h"
 
-#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -3,7 +3,6 @@
 
 #include <string.h>
 
-#include "common/mem.h"
 #include "server/admin/commands.h"
 #include "server/check/check_command.h"
 #include "server/demo/demo_command.h"

@@ -5,7 +5,6 @@
 #define UNBAKE_SERVER_INVOCATION_H
 
 #include <stdbool.h>
-#include <stddef.h>
 
 #include "server/arguments.h"
 #include "server/config.h"

@@ -4,7 +4,6 @@
 #include <string.h>
 
 #include "common/manual.h"
-#include "common/protocol.h"
 #include "server/commands.h"
 
 static void page_8(void) {

@@ -1,8 +1,6 @@
 /* environment.c -- see environment.h. */
 #include "server/capture/environment.h"
 
-#include <math.h>
-
 #include "common/mem.h"
 #include "common/quantile.h"
 #include "server/capture/fill.h"

@@ -5,7 +5,6 @@
 #define UNBAKE_CAPTURE_TRIANGLE_LIGHT_H
 
 #include <stdbool.h>
-#include <stddef.h>
 
 #include "common/parallel.h"
 #include "server/capture/views.h"

@@ -1,8 +1,6 @@
 /* fit.c -- see fit.h. The constants were chosen on the demo room, redkitchen and the room staircase2. */
 #include "server/check/fit.h"
 
-#include <math.h>
-
 #include "common/mem.h"
 
 /* Standard deviations of the score for wrong poses. Among some 2,000 hypotheses the best wrong one reaches 3.5 by

@@ -1,7 +1,6 @@
 /* hypothesis.c -- see hypothesis.h. */
 #include "server/check/hypothesis.h"
 
-#include <stdio.h>
 #include <string.h>
 
 #include "common/buf.h"

@@ -2,7 +2,6 @@
 #include "server/check/overlay.h"
 
 #include <math.h>
-#include <stdlib.h>
 
 #include "common/mem.h"
 #include "common/quantile.h"

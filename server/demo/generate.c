@@ -1,7 +1,6 @@
 /* generate.c -- see generate.h. */
 #include "server/demo/generate.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 

@@ -4,7 +4,6 @@
 #include <assert.h>
 #include <string.h>
 
-#include "common/mem.h"
 #include "server/demo/paint.h"
 
 /* Metres; radiance 1 stands for an emitter, whose emission room_init sets. */

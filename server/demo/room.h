@@ -6,7 +6,6 @@
 #ifndef UNBAKE_DEMO_ROOM_H
 #define UNBAKE_DEMO_ROOM_H
 
-#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 

@@ -4,8 +4,6 @@
 #ifndef UNBAKE_EXECUTOR_COMMAND_QUEUE_H
 #define UNBAKE_EXECUTOR_COMMAND_QUEUE_H
 
-#include <stdbool.h>
-
 #include "common/error.h"
 
 enum site_command_kind { SITE_COMMAND_SUBMIT, SITE_COMMAND_STATUS, SITE_COMMAND_CANCEL };

@@ -1,7 +1,6 @@
 /* job_status.c -- see job_status.h. */
 #include "server/executor/job_status.h"
 
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 

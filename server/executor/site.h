@@ -12,7 +12,6 @@
 #define UNBAKE_EXECUTOR_SITE_H
 
 #include <stdbool.h>
-#include <stddef.h>
 #include <stdint.h>
 
 #include "common/buf.h"

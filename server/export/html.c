@@ -2,7 +2,6 @@
 #include "server/export/html.h"
 
 #include <math.h>
-#include <stdint.h>
 #include <string.h>
 
 #include "common/base64.h"

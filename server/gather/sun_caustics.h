@@ -7,7 +7,6 @@
 #ifndef UNBAKE_GATHER_SUN_CAUSTICS_H
 #define UNBAKE_GATHER_SUN_CAUSTICS_H
 
-#include <stdbool.h>
 #include <stdint.h>
 
 #include "common/parallel.h"

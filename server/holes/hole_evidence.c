@@ -1,7 +1,6 @@
 /* hole_evidence.c -- see hole_evidence.h. */
 #include "server/holes/hole_evidence.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 #include "common/mem.h"

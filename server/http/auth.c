@@ -8,7 +8,6 @@
 
 #include "common/clock.h"
 #include "common/log.h"
-#include "common/mem.h"
 #include "server/http/auth_throttle.h"
 #include "server/http/route.h"
 #include "server/net/address.h"

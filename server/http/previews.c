@@ -5,7 +5,6 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "common/mem.h"
 #include "server/data/work_file.h"
 #include "server/http/auth.h"
 #include "server/http/file_reply.h"

@@ -2,7 +2,6 @@
 #include "server/http/readiness.h"
 
 #include <stdbool.h>
-#include <stdio.h>
 #include <string.h>
 #include <time.h>
 #include <unistd.h>

@@ -2,7 +2,6 @@
 #ifndef UNBAKE_HTTP_SPACE_H
 #define UNBAKE_HTTP_SPACE_H
 
-#include <stdbool.h>
 #include <stdint.h>
 
 #include "server/http/api.h"

@@ -1,21 +1,15 @@
 /* system.c -- the root, health, metrics, version, settings, API description. */
-#include <stdio.h>
 #include <string.h>
-#include <unistd.h>
 
-#include "common/file.h"
-#include "common/mem.h"
 #include "common/protocol.h"
 #include "common/render_settings.h"
 #include "common/settings.h"
-#include "server/events/hub.h"
 #include "server/http/embedded.h"
 #include "server/http/handlers.h"
 #include "server/http/limits.h"
 #include "server/http/page.h"
 #include "server/http/readiness.h"
 #include "server/net/field.h"
-#include "server/transport/listener.h"
 #include "server/transport/problem.h"
 
 /* The web page for browsers (Accept names text/html); links for others. */

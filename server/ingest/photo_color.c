@@ -4,7 +4,6 @@
 #include <string.h>
 
 #include "common/buf.h"
-#include "common/mem.h"
 
 /* Share of pixels outside of Rec. 709 above which there is a warning. */
 #define OUTSIDE_SHARE 1e-3

@@ -2,7 +2,6 @@
 #include "server/ingest/photo_pixels.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "common/file.h"

@@ -5,7 +5,6 @@
 #include <math.h>
 #include <pthread.h>
 #include <stdbool.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "common/file.h"

@@ -1,7 +1,6 @@
 /* checks.c -- see checks.h. */
 #include "server/job/checks.h"
 
-#include <stdio.h>
 #include <string.h>
 
 #include "common/mem.h"

@@ -6,8 +6,6 @@
 #ifndef UNBAKE_JOB_FIT_H
 #define UNBAKE_JOB_FIT_H
 
-#include <stdbool.h>
-
 #include "common/error.h"
 #include "common/json.h"
 

@@ -4,7 +4,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "common/mem.h"
 #include "common/render_settings.h"
 #include "server/data/attempt_folder.h"
 #include "server/job/fit.h"

@@ -9,7 +9,6 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "common/protocol.h"
-#include "server/data/attempt_folder.h"
 #include "server/data/layout.h"
 #include "server/data/trash.h"
 #include "server/job/worker_log.h"

@@ -8,7 +8,6 @@
 #define UNBAKE_MATERIAL_SPECULAR_POINTS_H
 
 #include <stdbool.h>
-#include <stddef.h>
 
 #include "common/parallel.h"
 #include "server/material/specular_misfit.h"

@@ -5,7 +5,6 @@
 #ifndef UNBAKE_NET_TLS_H
 #define UNBAKE_NET_TLS_H
 
-#include <stdbool.h>
 #include <stddef.h>
 
 #include "common/error.h"

@@ -1,7 +1,6 @@
 /* link.c -- see link.h: the claim, reports, the end, the lease. */
 #include "server/node/link.h"
 
-#include <errno.h>
 #include <math.h>
 #include <poll.h>
 #include <stdio.h>

@@ -6,7 +6,6 @@
 #define UNBAKE_REFINE_ADAM_H
 
 #include <stddef.h>
-#include <stdint.h>
 
 struct adam {
     size_t count; /* entries */

@@ -1,8 +1,6 @@
 /* comparison.c -- see comparison.h. */
 #include "server/refine/comparison.h"
 
-#include <math.h>
-
 /* Added to the expected radiance in denominators, part of the median radiance: darker places show as much of
  * a lens's stray light. */
 #define DIFFERENCE_FLOOR 0.003f /* +25 %: 0 dB */

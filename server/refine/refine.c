@@ -1,8 +1,6 @@
 /* refine.c -- see refine.h. */
 #include "server/refine/refine.h"
 
-#include <math.h>
-
 #include "common/mem.h"
 #include "server/refine/correction.h"
 #include "server/refine/comparison.h"

@@ -4,8 +4,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "common/file.h"
-#include "common/mem.h"
 #include "server/relight/setting_files.h"
 
 #define NAME "luminance_per_unit"

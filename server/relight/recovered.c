@@ -1,7 +1,6 @@
 /* recovered.c -- see recovered.h. */
 #include "server/relight/recovered.h"
 
-#include <math.h>
 #include <string.h>
 
 #include "common/buf.h"

@@ -1,7 +1,6 @@
 /* relit.c -- see relit.h. The room's triangles come first, those that are taken away left out, then the objects'. */
 #include "server/relight/relit.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

@@ -3,7 +3,6 @@
 #ifndef UNBAKE_RELIGHT_RELIT_H
 #define UNBAKE_RELIGHT_RELIT_H
 
-#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 

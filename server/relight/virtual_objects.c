@@ -6,7 +6,6 @@
 #include "server/relight/virtual_objects.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "common/mem.h"

@@ -2,8 +2,6 @@
 #ifndef UNBAKE_RELIGHT_VIRTUAL_OBJECTS_H
 #define UNBAKE_RELIGHT_VIRTUAL_OBJECTS_H
 
-#include <stddef.h>
-
 #include "server/relight/compass.h"
 #include "common/error.h"
 #include "common/parallel.h"

@@ -5,7 +5,6 @@
 
 #include "common/mem.h"
 #include "server/render/path_batch.h"
-#include "server/render/shade.h"
 
 static struct path_batch *batch_new(size_t capacity, int max_depth) {
     assert(max_depth >= 1 && max_depth <= PATH_MAX_DEPTH);

@@ -6,7 +6,6 @@
 #ifndef UNBAKE_SCENE_ADJACENCY_H
 #define UNBAKE_SCENE_ADJACENCY_H
 
-#include <stddef.h>
 #include <stdint.h>
 
 #include "server/scene/mesh.h"

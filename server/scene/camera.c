@@ -17,7 +17,6 @@
 #include "server/scene/camera.h"
 
 #include <math.h>
-#include <stddef.h>
 
 #define HALF_PI (0.5 * PI)
 #define FOLD_STEPS 4096 /* of the march towards the fold */

@@ -4,7 +4,6 @@
 #include <math.h>
 
 #include "common/image.h"
-#include "common/mem.h"
 
 uint32_t camera_step_to(const struct camera *camera, double most) {
     double width = (double)camera->width, height = (double)camera->height;

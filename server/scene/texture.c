@@ -1,7 +1,6 @@
 /* texture.c -- see texture.h. */
 #include "server/scene/texture.h"
 
-#include <math.h>
 #include <string.h>
 
 #include "common/mem.h"

@@ -4,8 +4,6 @@
 #ifndef UNBAKE_STATE_PACE_H
 #define UNBAKE_STATE_PACE_H
 
-#include <stdbool.h>
-
 #include "common/json.h"
 #include "common/parallel.h"
 #include "common/settings.h"

@@ -23,7 +23,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "common/mem.h"
 #include "server/store/transition.h"
 
 /* --- the table ------------------------------------------------------------------------------- */

@@ -21,7 +21,6 @@
 #ifndef UNBAKE_STORE_REMOTE_H
 #define UNBAKE_STORE_REMOTE_H
 
-#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 

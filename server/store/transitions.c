@@ -12,7 +12,6 @@
  *                   store_job_extend    any terminal     queued, attempts_left = max_attempts
  *
  * What the scheduler does is in attempts.c. `wanted` is "run" in every state but running. */
-#include "common/mem.h"
 #include "server/store/store.h"
 #include "server/store/transition.h"
 

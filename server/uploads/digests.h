@@ -11,7 +11,6 @@
 #define UNBAKE_UPLOADS_DIGESTS_H
 
 #include <stdatomic.h>
-#include <stdbool.h>
 #include <stdint.h>
 
 #include "common/error.h"

@@ -19,9 +19,6 @@
 #ifndef UNBAKE_UPLOADS_RESUMABLE_H
 #define UNBAKE_UPLOADS_RESUMABLE_H
 
-#include <stdbool.h>
-#include <stdint.h>
-
 #include "common/error.h"
 #include "server/store/store.h"
 #include "server/uploads/resumables_config.h"

@@ -10,7 +10,6 @@
 #include "server/ingest/photos.h"
 #include "server/ingest/pixels.h"
 #include "server/scene/select.h"
-#include "server/worker/pixel_memory.h"
 
 /* Leaves out what the settings exclude and crop. */
 static enum status select_parts(struct progress *progress, const struct settings *settings, struct scene *scene,

@@ -5,7 +5,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "common/file.h"
 #include "common/mem.h"
 #include "server/data/layout.h"
 #include "server/store/parts.h"

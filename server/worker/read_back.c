@@ -2,11 +2,9 @@
 #include "server/worker/read_back.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "common/json.h"
-#include "common/mem.h"
 #include "server/ingest/mesh/mesh_file.h"
 
 #define JSON_LIMIT ((size_t)1 << 30) /* bytes; our files are far smaller */

@@ -24,7 +24,6 @@
 #include "common/protocol.h"
 #include "common/sha256.h"
 #include "server/data/layout.h"
-#include "server/relight/denoise.h"
 #include "server/relight/relight.h"
 #include "server/relight/relight_plan.h"
 #include "server/store/parts.h"

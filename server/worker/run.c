@@ -6,8 +6,6 @@
  *    CHECKPOINT_SHARE of the time (a slow disk) the interval grows, at most CHECKPOINT_STRETCH
  *    times: what a crash costs stays bounded. Previews likewise, without a bound.
  * 3. A request to stop (requests.h) is heard at the work's next step, after a checkpoint. */
-#include <errno.h>
-#include <fcntl.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -18,7 +16,6 @@
 #include "common/file.h"
 #include "common/mem.h"
 #include "common/parallel.h"
-#include "common/protocol.h"
 #include "common/sha256.h"
 #include "server/data/layout.h"
 #include "server/export/outputs.h"

@@ -22,7 +22,6 @@
 #include "server/http/jobs/render_request.h"
 #include "server/http/retention.h"
 #include "server/http/space.h"
-#include "server/http/views.h"
 #include "server/transport/problem.h"
 
 struct job_submission {

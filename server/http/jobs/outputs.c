@@ -5,12 +5,10 @@
  * 2. ETag and Repr-Digest are those of the bytes in the reply (digests.h). Before the digest is known the tag is of the
  *    file's version, as strong, and there is no Repr-Digest. */
 #include <errno.h>
-#include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "common/file.h"
 #include "common/mem.h"
 #include "server/data/work_file.h"
 #include "server/http/auth.h"

@@ -5,7 +5,6 @@
  * 2. What is written has a name that an output or a part may have, and lies whole in its place before 204 is said.
  * 3. Of checkpoints there are at any time whole ones here: a part says from which number on they are needed, and what
  *    is older goes after it has come. */
-#include <stdio.h>
 #include <string.h>
 #include <unistd.h>
 

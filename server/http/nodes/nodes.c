@@ -4,7 +4,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
 #include "common/source_digest.h"

@@ -1,7 +1,6 @@
 /* gltf_extensions.c -- see gltf_extensions.h. Names are as Khronos lists them (glTF, extensions/README.md). */
 #include "server/ingest/mesh/gltf_extensions.h"
 
-#include <stdbool.h>
 #include <stddef.h>
 #include <string.h>
 

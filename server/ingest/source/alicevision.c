@@ -6,7 +6,6 @@
  * version 1.2.3 (2021) meshes are written with y and z turned around, as computer graphics has them, while this file is
  * not: the poses here are turned into the mesh's world. */
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 #include <strings.h>
 

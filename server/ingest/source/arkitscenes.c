@@ -4,7 +4,6 @@
  * Photographs get the pose at their time, between those of the trajectory, which come at 10 Hz. wide/ (1920 x 1440) and
  * vga_wide/ (640 x 480) of the raw data are of the same camera and are preferred where they are there. */
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 

@@ -3,7 +3,6 @@
  * matterport_camera_poses/PANO_pose_C_Y.txt: camera-to-world, 4 x 4, row-major, with our camera axes;
  * matterport_camera_intrinsics/PANO_intrinsics_C.txt: w h fx fy cx cy k1 k2 p1 p2 k3 in OpenCV's notation; photographs
  * matterport_color_images/PANO_iC_Y.jpg. */
-#include <stdio.h>
 #include <string.h>
 
 #include "common/mem.h"

@@ -15,7 +15,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "common/mem.h"
 #include "server/ingest/source/frame_list.h"
 #include "server/ingest/source/geodesy.h"
 #include "server/ingest/source/photo_folder.h"

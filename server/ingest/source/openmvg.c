@@ -3,7 +3,6 @@
  * centre, with our camera axes. Distortion is OpenCV's, with the tangential coefficients in its order: x gets t2 (r^2 +
  * 2 x^2) + 2 t1 x y. */
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "common/mem.h"

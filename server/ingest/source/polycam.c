@@ -4,7 +4,6 @@
  * t_00 .. t_23 is the camera-to-world matrix, row-major, with OpenGL's camera axes in ARKit's world (y up, metres). The
  * exported mesh (raw.glb) is that world turned by alignmentTransform of mesh_info.json, column-major, and so are the
  * poses here. Principal points have pixel centres at .5 as ARKit's. */
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 

@@ -10,7 +10,6 @@
  * its coefficients are of: Brown's have three at least, so that k1 alone is a division model's. z is up in both. */
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 

@@ -1,7 +1,6 @@
 /* record3d.c -- Record3D's .r3d (a zip archive) and its export: "metadata" or metadata.json with w, h, K (3 x 3,
  * column-major), poses ([x y z w  tx ty tz] a frame) and perhaps perFrameIntrinsicCoeffs ([fx fy cx cy] a frame);
  * photographs rgb/N.jpg or rgbd/N.jpg. Poses are camera-to-world with OpenGL's camera axes in ARKit's world. */
-#include <math.h>
 #include <stdio.h>
 
 #include "common/mem.h"

@@ -2,7 +2,6 @@
  * with OpenGL's camera axes in ARKit's world) and intrinsics (3 x 3, row-major), beside frame_N.jpg; the mesh of its
  * export (export.obj, textured_output.obj) is in the same world. Not every frame has a photograph. */
 #include <math.h>
-#include <stdio.h>
 
 #include "common/mem.h"
 #include "server/ingest/path.h"

@@ -2,11 +2,9 @@
  * row-major, with our camera axes. The lens is in none of the files. The data set's page gives 585 pixels and 320, 240
  * for the depth camera of 640 x 480; colour is not registered to it, and works that use it take 525 (Brachmann & Rother
  * 2017), the nominal one of the camera. */
-#include <math.h>
 #include <string.h>
 
 #include "common/mem.h"
-#include "server/ingest/path.h"
 #include "server/ingest/source/frame_list.h"
 #include "server/ingest/source/photo_folder.h"
 #include "server/ingest/source/values.h"
