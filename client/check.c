@@ -62,7 +62,7 @@ static enum status fetch_pictures(struct client *c, const cJSON *scene, const ch
                                   struct error *err) {
     const cJSON *preview;
     const cJSON *previews = member_items(cJSON_GetObjectItemCaseSensitive(scene, "facts"), "previews");
-    enum status status = file_make_dirs(dir, err);
+    enum status status = cJSON_GetArraySize(previews) > 0 ? file_make_dirs(dir, err) : STATUS_OK;
     if (status != STATUS_OK)
         reply->code = 0;
     cJSON_ArrayForEach(preview, previews) {

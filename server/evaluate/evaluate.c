@@ -283,11 +283,11 @@ enum status evaluate_outputs(const char *room, const char *outputs, const struct
     status = recovered_load(outputs, &e.scene.mesh, pool, &e.recovered, err);
     if (status != STATUS_OK)
         goto out;
-    status = settings->pictures_dir ? file_make_dirs(settings->pictures_dir, err) : STATUS_OK;
-    if (status == STATUS_OK)
-        status = stated_deviation_load(outputs, &e.recovered, &e.deviation, err);
+    status = stated_deviation_load(outputs, &e.recovered, &e.deviation, err);
     if (status == STATUS_OK)
         status = found_emitters_count(room, &e.scene.mesh, &e.recovered, e.emits, &v->emitters, err);
+    if (status == STATUS_OK && settings->pictures_dir)
+        status = file_make_dirs(settings->pictures_dir, err);
     if (status == STATUS_OK) {
         seen_init(&e.seen, &e.scene, e.recovered.world.accel, e.emits, pool);
         status = score_views(&e, v, err);

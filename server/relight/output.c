@@ -99,9 +99,8 @@ enum status output_open(struct output *o, const struct relight_job *job, const s
     char *path = file_join(job->out, OUTPUT_RECORD);
     buf_init(&text, RECORD_LIMIT);
     enum status status = file_read(path, &text, err);
-    if (status == STATUS_OK) {
+    if (status == STATUS_OK)
         read_lines(o, buf_text(&text));
-    }
     buf_release(&text);
     mem_free(path);
     return status == STATUS_NOT_FOUND ? STATUS_OK : status;

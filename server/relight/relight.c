@@ -314,6 +314,9 @@ static enum status run_open(struct relight_state *r, struct error *err) {
         status = say_dark(err);
     if (status == STATUS_OK)
         status = choose_exposure(r, err);
+    if (status ==
+        STATUS_OK) /* not before all that it needs is there: a wrong folder or setting leaves nothing behind */
+        status = file_make_dirs(r->job->out, err);
     if (render_settings_bool(r->job->settings, "denoise") && r->job->denoiser)
         r->output.note = denoiser_version(r->job->denoiser);
     mesh_release(&mesh);

@@ -174,8 +174,6 @@ static enum status run_one(struct relight_job *job, const char *out, uint32_t th
     if (status == STATUS_OK && pictures != 1)
         status = error_set(err, STATUS_INPUT, "the settings mean %llu pictures: give --out a folder for them",
                            (unsigned long long)pictures);
-    if (status == STATUS_OK)
-        status = file_make_dirs(folder, err);
     job->out = folder;
     if (status == STATUS_OK)
         status = run_into(job, threads, is_quiet, err);
@@ -216,10 +214,7 @@ int relight_command(int argc, char **argv) {
     if (status == STATUS_OK && settings_are_good(a.word[0], settings) && is_writable(out) &&
         (!is_file || add_format(out, settings))) {
         struct relight_job job = {.outputs = a.word[0], .settings = settings, .out = out};
-        if (!is_file)
-            status = file_make_dirs(out, &err);
-        if (status == STATUS_OK)
-            status = is_file ? run_one(&job, out, threads, is_quiet, &err) : run_into(&job, threads, is_quiet, &err);
+        status = is_file ? run_one(&job, out, threads, is_quiet, &err) : run_into(&job, threads, is_quiet, &err);
         code = finish(status, &err);
     }
     cJSON_Delete(settings);

@@ -13,7 +13,7 @@ struct relight_job {
     const char *outputs;             /* folder of a reconstruction's outputs */
     const char *files;               /* folder of the files that settings name; NULL: they are paths */
     const cJSON *settings;           /* that render_settings_check found good */
-    const char *out;                 /* an existing folder */
+    const char *out;                 /* folder; made where it is not there, once the inputs are read */
     uint64_t first_view, view_count; /* a part: which of the pictures; view_count 0: all from the first */
     const struct denoiser *denoiser; /* for denoise=true; NULL: there is none, which is STATUS_UNAVAILABLE then */
 };

@@ -177,11 +177,14 @@ static void test_gltf(void) {
 static void refused(const char *dir, const char *file, const char *why, const char *hint) {
     char *text = mem_printf("{" COMMON ",\"insert.1.file\":\"%s/%s\"}", dir, file);
     cJSON *tree = cJSON_Parse(text);
-    struct relight_job job = {.outputs = dir, .settings = tree, .out = dir};
+    char *out = file_join(dir, "out");
+    struct relight_job job = {.outputs = dir, .settings = tree, .out = out};
     err = (struct error){.message = ""};
     CHECK_THAT(relight_run(&job, NULL, pool, &err) == STATUS_INPUT && strstr(err.message, why) &&
                    strstr(err.hint, hint),
                "%s", err.message);
+    CHECK(!file_is_in(dir, "out")); /* what is refused leaves no folder */
+    mem_free(out);
     cJSON_Delete(tree);
     mem_free(text);
 }
