@@ -20,8 +20,9 @@ static const struct server_command table[] = {
     {"token", "add NAME|list|revoke WHICH", "make, list and revoke the tokens of users",
      "`token add` makes a token for the user NAME and prints it, once. WHICH is a token's number or a\n"
      "user's name; what is revoked stops working at once, in open streams too. While there has never\n"
-     "been a token, whoever reaches the daemon may do everything.\n",
-     "  unbaked token add alice --expires 90d\n  unbaked token add wall-display --role viewer\n"
+     "been a token, whoever reaches the daemon may do everything; so the first one makes an admin, unless\n"
+     "--role says otherwise, and later ones make users.\n",
+     "  unbaked token add alice --role admin\n  unbaked token add bob --expires 90d\n  unbaked token add wall-display --role viewer\n"
      "  unbaked token revoke alice\n",
      token_flags, token_command},
     {"check-config", "[FILE]", "say what is wrong with a configuration", "",

@@ -1,11 +1,14 @@
 /* admin_request.h -- what can be asked of a daemon's administration, and the work: tokens, usage, backups. The daemon
  * does it, or the command itself where none runs (admin.h).
  *
- *      {"command": "token-add", "name", "role", "expires_ms"}   {"id", "token"}; expires_ms 0: never
+ *      {"command": "token-add", "name", "role", "expires_ms"}   {"id", "token", "role", "has_admin"}
  *      {"command": "token-list"}                  {"items": [{"id", "user", "role", "created_ms", "expires_ms"}, ...]}
  *      {"command": "token-revoke", "which"}       {"count"}
  *      {"command": "usage"}                       {"items": [{"user", "month", "cpu_sec"}, ...]}
- *      {"command": "backup"}                      {}, and an open file: the copy of state.db */
+ *      {"command": "backup"}                      {}, and an open file: the copy of state.db
+ *
+ * expires_ms 0: never. Without a role the first token makes an admin, later ones users. has_admin: whether any token
+ * that is valid now is an admin's. */
 #ifndef UNBAKE_ADMIN_ADMIN_REQUEST_H
 #define UNBAKE_ADMIN_ADMIN_REQUEST_H
 

@@ -14,7 +14,7 @@
 #include "server/admin/admin.h"
 
 const struct command_option token_flags[] = {
-    {"role", 0, OPTION_TEXT, "ROLE", "of a new token: viewer, user (the default) or admin"},
+    {"role", 0, OPTION_TEXT, "ROLE", "of a new token: viewer, user or admin (the first token: admin; then: user)"},
     {"expires", 0, OPTION_TEXT, "WHEN",
      "of a new token: after 30d or 12h, or on a day such as 2027-01-31, at its end in UTC (never)"},
     {"json", 0, OPTION_FLAG, NULL, "print JSON"},
@@ -118,9 +118,15 @@ static void print_token_reply(const struct invocation *in, const cJSON *reply) {
         print_tokens(cJSON_GetObjectItem(reply, "items"));
     } else if (strcmp(action, "add") == 0) {
         bool is_alone = cJSON_IsFalse(cJSON_GetObjectItem(reply, "daemon_runs"));
-        fprintf(stderr, "This is shown once; whoever has it is user %s of the data folder %s%s:\n",
-                in->arguments.word[1], in->config.data_dir, is_alone ? ", on which no daemon runs now" : "");
+        fprintf(stderr, "This is shown once; whoever has it is user %s, role %s, of the data folder %s%s:\n",
+                in->arguments.word[1], cJSON_GetStringValue(cJSON_GetObjectItem(reply, "role")), in->config.data_dir,
+                is_alone ? ", on which no daemon runs now" : "");
         printf("%s\n", cJSON_GetStringValue(cJSON_GetObjectItem(reply, "token")));
+        if (cJSON_IsFalse(cJSON_GetObjectItem(reply, "has_admin")))
+            fputs(
+                "unbaked: no token is an admin's: only this command can make others and revoke them, and others' jobs "
+                "are out of reach; `unbaked token add NAME --role admin` makes one\n",
+                stderr);
     } else {
         printf("revoked: %d\n", cJSON_GetObjectItem(reply, "count")->valueint);
     }
@@ -159,7 +165,8 @@ int token_command(int argc, char **argv) {
             json_add_string(request, "name", in.arguments.word[1]);
         if (is_revoke)
             json_add_string(request, "which", in.arguments.word[1]);
-        json_add_string(request, "role", invocation_value(&in, "role", "user"));
+        if (invocation_value(&in, "role", NULL))
+            json_add_string(request, "role", invocation_value(&in, "role", NULL));
         json_add_int(request, "expires_ms", expires_ms);
     }
     return ask(code, &in, request, print_token_reply);

@@ -194,12 +194,20 @@ static bool daemon_runs(const char *dir) {
     return runs;
 }
 
-static int count_expired(const cJSON *tokens) {
+struct token_counts {
+    int all, expired;
+    int admins; /* of those that are valid */
+};
+
+static struct token_counts count_tokens(const cJSON *tokens) {
     const cJSON *item;
-    int count = 0;
+    struct token_counts count = {.all = cJSON_GetArraySize(tokens)};
     cJSON_ArrayForEach(item, tokens) {
+        const char *role = cJSON_GetStringValue(cJSON_GetObjectItem(item, "role"));
         double ms = cJSON_GetNumberValue(cJSON_GetObjectItem(item, "expires_ms"));
-        count += ms > 0.0 && ms <= (double)clock_unix_ms();
+        bool is_expired = ms > 0.0 && ms <= (double)clock_unix_ms();
+        count.expired += is_expired;
+        count.admins += !is_expired && role && strcmp(role, role_name(ROLE_ADMIN)) == 0;
     }
     return count;
 }
@@ -209,14 +217,13 @@ static void check_tokens(struct doctor *d, bool runs) {
     bool is_loopback = d->is_loopback;
     struct error err;
     char *path = layout_state(c->data_dir);
-    int fd, count = 0, expired = 0;
+    struct token_counts count = {0};
+    int fd;
     if (runs || access(path, R_OK) == 0) {
         cJSON *request = cJSON_CreateObject(), *reply;
         json_add_string(request, "command", "token-list");
         if (admin_call(c->data_dir, request, &reply, &fd, &err) == STATUS_OK) {
-            const cJSON *tokens = cJSON_GetObjectItem(reply, "items");
-            count = cJSON_GetArraySize(tokens);
-            expired = count_expired(tokens);
+            count = count_tokens(cJSON_GetObjectItem(reply, "items"));
         } else {
             tell(d, BAD, "database", "%s%s%s", err.message, *err.hint ? "; " : "", err.hint);
         }
@@ -228,12 +235,14 @@ static void check_tokens(struct doctor *d, bool runs) {
         tell(d, is_loopback ? GOOD : BAD, "tokens", "access = open%s",
              is_loopback ? ": whoever has an account on this machine may do everything"
                          : " is for loopback addresses only");
-    else if (count > 0 && expired == count)
-        tell(d, WARN, "tokens", "%d, and all have expired: `unbaked token add NAME --role admin`", count);
-    else if (expired > 0)
-        tell(d, GOOD, "tokens", "%d, %d of them expired", count, expired);
-    else if (count > 0)
-        tell(d, GOOD, "tokens", "%d", count);
+    else if (count.all > 0 && count.expired == count.all)
+        tell(d, WARN, "tokens", "%d, and all have expired: `unbaked token add NAME --role admin`", count.all);
+    else if (count.all > 0 && count.admins == 0)
+        tell(d, WARN, "tokens", "%d, none of them an admin's: `unbaked token add NAME --role admin`", count.all);
+    else if (count.expired > 0)
+        tell(d, GOOD, "tokens", "%d, %d of them expired", count.all, count.expired);
+    else if (count.all > 0)
+        tell(d, GOOD, "tokens", "%d", count.all);
     else if (is_loopback)
         tell(d, GOOD, "tokens", "none: whoever has an account on this machine may do everything");
     else

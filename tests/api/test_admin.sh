@@ -22,8 +22,9 @@ for command in "token list" "token revoke alice" usage "backup $work/none.db"; d
     refused 1 "$data is not a data folder: it has no state.db" unbaked $command --data "$data"
 done
 equal "$(ls -A "$data")" "" "what refused commands leave"
-alice=$(unbaked token add alice --data "$data") || fail "token add: $(cat "$work/err")"
-grep -qF "user alice of the data folder $data, on which no daemon runs now:" "$work/err" || fail "token add says: $(cat "$work/err")"
+alice=$(unbaked token add alice --role user --data "$data") || fail "token add: $(cat "$work/err")"
+grep -qF "user alice, role user, of the data folder $data, on which no daemon runs now:" "$work/err" || fail "token add says: $(cat "$work/err")"
+grep -qF 'no token is an admin'"'"'s' "$work/err" || fail "no word of a daemon that nobody administers: $(cat "$work/err")"
 [[ $alice =~ ^unbake_1_[0-9a-f]{48}$ ]] || fail "the token is '$alice'"
 equal "$(unbaked token list --data "$data" | awk 'NR > 1 {print $1, $2, $3}')" "1 alice user" "token list"
 refused 2 'there is no role "king"' unbaked token add bob --role king --data "$data"
@@ -37,6 +38,12 @@ refused 2 "--expires takes" unbaked token add bob --expires soon --data "$data"
 refused 2 "--expires takes" unbaked token add bob --expires 0d --data "$data"
 refused 2 "is past" unbaked token add bob --expires 2020-01-31 --data "$data"
 refused 2 "belongs to token add" unbaked token list --expires 3d --data "$data"
+# Without a role the first token is an admin's, the next a user's.
+mkdir -m 750 "$work/first"
+unbaked token add ada --data "$work/first" >/dev/null; grep -qF "role admin" "$work/err" || fail "the first token: $(cat "$work/err")"
+unbaked token add ben --data "$work/first" >/dev/null; grep -q "role user" "$work/err" || fail "the second token: $(cat "$work/err")"
+grep -qF 'no token is' "$work/err" && fail "an admin is there: $(cat "$work/err")"
+equal "$(unbaked token list --data "$work/first" | awk 'NR > 1 {print $2, $3}' | xargs)" "ada admin ben user" "roles without --role"
 
 # --- with one ---
 start_daemon --set keepalive_sec=1 --set log_format=json --set trusted_proxies=127.0.0.1
@@ -180,6 +187,7 @@ doctor 1 'FAIL +database .*damaged' --data "$work/damaged" --set min_free_mib=1
 doctor 0 'ok +libraries .*gnutls [0-9].*sqlite [0-9].*libjpeg [0-9].*zlib [0-9].*libtiff [0-9.]+, .*libexpat [0-9].*libunistring [0-9].*libseccomp [0-9]' --data "$work/none"
 doctor 0 'ok +tokens .*open: .*may do everything' --data "$work/none" --set access=open
 doctor 1 'FAIL +tokens .*loopback addresses only' --data "$work/none" --set access=open --set listen=0.0.0.0:1
+unbaked token revoke ada --data "$work/first" >/dev/null; doctor 0 "warn +tokens .*1, none of them an admin's" --data "$work/first"
 doctor 1 'warn +tls .*unencrypted' --data "$work/none" --set listen=0.0.0.0:1
 cp /etc/hostname "$work/nokey"
 doctor 1 'FAIL +tls .*private key' --data "$work/none" --set tls_certificate="$work/nokey" --set tls_key="$work/nokey"

@@ -10,7 +10,7 @@ quick="--set texture_size=64 --set texels_per_metre=2 --set iterations=100000000
 daemon_start
 run 4 login <<<"unbake_1_nothing"
 has "$err" "rejects this token"
-alice=$("$build/unbaked" token add alice --data "$data" 2>/dev/null)
+alice=$("$build/unbaked" token add alice --role user --data "$data" 2>/dev/null)
 vic=$("$build/unbaked" token add vic --role viewer --data "$data" 2>/dev/null)
 run 4 list
 has "$err" "asks for a token"
