@@ -74,17 +74,22 @@ static void make_segments(struct reconstruction *r) {
     json_add_string(r->report, "segmentation", given ? "given" : "automatic");
 }
 
-static void add_prepare_figures(const struct prepare *p) {
-    const struct reconstruction *r = p->r;
-    const struct mesh *mesh = &r->scene->mesh;
-    cJSON *figures = cJSON_AddObjectToObject(r->report, "prepare");
-    json_add_int(figures, "triangles", (int64_t)mesh->triangle_count);
-    json_add_int(figures, "degenerate_triangles_dropped", (int64_t)r->scene->mesh_report.degenerate_count);
-    json_add_int(figures, "duplicate_triangles_dropped", (int64_t)r->scene->mesh_report.duplicate_count);
+static void report_capture(const struct prepare *p) {
+    const struct mesh_report *mesh = &p->r->scene->mesh_report;
+    cJSON *figures = cJSON_AddObjectToObject(p->r->report, "prepare");
+    json_add_int(figures, "degenerate_triangles_dropped", (int64_t)mesh->degenerate_count);
+    json_add_int(figures, "duplicate_triangles_dropped", (int64_t)mesh->duplicate_count);
     json_add_int(figures, "triangles_turned", (int64_t)p->flipped);
     json_add_string(figures, "normals", p->normals);
     json_add_number(figures, "mesh_noise_m", (double)p->mesh_noise_m);
     json_add_number(figures, "mesh_roughness", (double)p->roughness);
+    json_add_int(figures, "training_photographs", (int64_t)p->views->train_count);
+    json_add_number(figures, "median_radiance", (double)p->views->median_radiance);
+}
+
+void prepare_report_surface(const struct reconstruction *r) {
+    cJSON *figures = cJSON_GetObjectItemCaseSensitive(r->report, "prepare");
+    json_add_int(figures, "triangles", (int64_t)r->scene->mesh.triangle_count);
     json_add_int(figures, "segments", (int64_t)r->segments.count);
     json_add_int(figures, "charts", (int64_t)r->atlas.chart_count);
     json_add_int(figures, "texture_width", r->atlas.width);
@@ -95,8 +100,6 @@ static void add_prepare_figures(const struct prepare *p) {
                     (double)r->inverse.valid_count / ((double)r->atlas.width * (double)r->atlas.height));
     json_add_int(figures, "atlas_padding", r->atlas.padding);
     json_add_int(figures, "atlas_clean_mip_level", atlas_clean_level(r->atlas.padding));
-    json_add_int(figures, "training_photographs", (int64_t)p->views->train_count);
-    json_add_number(figures, "median_radiance", (double)p->views->median_radiance);
 }
 
 /* Makes everything that depends on the segments. density[triangle_count]: texture density (atlas_make_uneven), or
@@ -366,7 +369,7 @@ enum status prepare_run(struct reconstruction *r, struct views *views, const str
     status = measure_photographs(p, err);
     if (status == STATUS_OK)
         status = remap_surface(p, split_bright_parts(p), 0, err);
-    add_prepare_figures(p);
+    report_capture(p);
     pace_measure_room(p->pace, r->scene, &r->inverse);
     advance(p, 1.0 - MAP_SHARE - VIEWS_SHARE - CALIBRATE_SHARE);
     if (status == STATUS_OK)

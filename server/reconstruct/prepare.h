@@ -16,6 +16,10 @@ enum status prepare_run(struct reconstruction *r, struct views *views, const str
  * get few texels. */
 enum status prepare_again(struct reconstruction *r, struct views *views, size_t coarse, struct error *err);
 
+/* Adds figures of mesh, segments and atlas to the report's "prepare", which prepare_run has made: once nothing is added
+ * to them any more. */
+void prepare_report_surface(const struct reconstruction *r);
+
 /* Lights the world by r->environment, after its map changed. */
 void prepare_environment(struct reconstruction *r);
 

@@ -93,6 +93,7 @@ static enum status fuse_photographs(struct stage_run *run, struct error *err) {
     enum status status = find_openings(run, err);
     if (status != STATUS_OK)
         return status;
+    prepare_report_surface(run->r);
     light_estimate(run->r, &run->views);
     unseen_light_estimate(run->r, &run->views);
     sun_find(run->r, &run->views);

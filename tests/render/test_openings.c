@@ -102,6 +102,18 @@ static void check_lights(const struct reconstruction *r) {
     CHECK(count > 0 && (size_t)count <= r->opening_count);
 }
 
+/* Figures of the surface are those of what it is with the openings. */
+static void check_figures(const struct reconstruction *r) {
+    static const char *const name[] = {"triangles", "segments", "charts", "valid_texels"};
+    const size_t wanted[] = {r->scene->mesh.triangle_count, r->segments.count, r->atlas.chart_count,
+                             r->inverse.valid_count};
+    const cJSON *figures = cJSON_GetObjectItem(r->report, "prepare");
+    for (size_t i = 0; i < sizeof wanted / sizeof *wanted; i++) {
+        double found = cJSON_GetNumberValue(cJSON_GetObjectItem(figures, name[i]));
+        CHECK_THAT(found == (double)wanted[i], "%s: %g in the report, %zu", name[i], found, wanted[i]);
+    }
+}
+
 /* The room whose ceiling and lamp were not scanned, nor a part of a wall that photographs show. */
 static void scan(struct scene *scene) {
     mesh_release(&scene->mesh);
@@ -130,6 +142,7 @@ static void test_room(struct parallel *pool) {
     CHECK(reconstruct(&scene, 2, -1, &r) == STATUS_OK);
     check_colors(&r);
     check_lights(&r);
+    check_figures(&r);
     vertices = scene.mesh.vertex_count;
     vec3 *position = mem_array(vertices, sizeof *position);
     memcpy(position, scene.mesh.position, vertices * sizeof *position);
