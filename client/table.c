@@ -9,7 +9,7 @@
 
 #define CELL_MAX 4096  /* bytes of a cell; what is longer is cut off */
 #define LAST_WANTED 16 /* columns: of a name in a list this much tells it from others */
-#define LAST_LEAST 8   /* columns: less is not worth a column */
+#define LAST_MIN 8     /* columns: less is not worth a column */
 
 void table_init(struct table *t, size_t columns, const char *const *headings) {
     assert(columns <= TABLE_COLUMNS);
@@ -67,7 +67,7 @@ static void put_spaces(FILE *out, size_t count) { fprintf(out, "%*s", (int)count
 
 /* Prints the last cell between column `from` and the edge (0: none), broken at blanks where the table wraps. */
 static void print_last(const struct table *t, const char *text, size_t from, size_t edge, struct terminal *terminal) {
-    size_t room = edge > from + LAST_LEAST ? edge - from : edge ? LAST_LEAST : CELL_MAX;
+    size_t room = edge > from + LAST_MIN ? edge - from : edge ? LAST_MIN : CELL_MAX;
     while (t->wraps && strlen(text) > room) { /* no fewer bytes than columns */
         size_t length = room;
         while (length > 0 && text[length] != ' ')

@@ -10,8 +10,8 @@
 /* A webhook's secret as standardwebhooks.com writes it: this and the base64 of a key of so many bytes. The text of any
  * other secret is the key itself. */
 #define WEBHOOK_SECRET_PREFIX "whsec_"
-#define WEBHOOK_KEY_LEAST 24 /* bytes, both */
-#define WEBHOOK_KEY_MOST 64
+#define WEBHOOK_KEY_MIN 24 /* bytes, both */
+#define WEBHOOK_KEY_MAX 64
 
 /* Event types of GET /v1/jobs/{id}/events. */
 #define EVENT_STATE "state"

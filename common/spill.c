@@ -41,11 +41,11 @@
 #define CHUNK ((size_t)64 << 10)
 /* Readers go on with at least so many chunks, however small the budget: one per array and row that a few threads
  * read. */
-#define LEAST_CHUNKS 64
+#define MIN_CHUNKS 64
 /* Part of the budget that the hand frees at a time, so that threads interrupt each other seldom. Moves time only. */
 #define FREED_SHARE 8
 /* Part of the budget that mapped pages may have in any case, however much is in memory. */
-#define LEAST_SHARE 8
+#define MIN_SHARE 8
 /* The keeper's: time between two looks, and the part of the budget beyond it that it leaves alone. */
 #define KEEPER_INTERVAL_MS 10
 #define KEEPER_SHARE 16
@@ -53,7 +53,7 @@
 /* Addresses for the file, as a multiple of the space that the disk has: space that is given back is reserved again at
  * other addresses. At most what a program under the thread sanitizer has room for. */
 #define ADDRESSES_SHARE 8
-#define ADDRESSES_MOST ((uint64_t)1 << 40)
+#define ADDRESSES_MAX ((uint64_t)1 << 40)
 
 enum { ABSENT, MAPPED, USED };
 
@@ -98,9 +98,9 @@ static uint64_t file_rss(const struct spill *s) {
 
 /* After what is in memory has changed. */
 static void set_most(struct spill *s) {
-    uint64_t budget = s->limits.memory_bytes, least = budget / LEAST_SHARE;
+    uint64_t budget = s->limits.memory_bytes, least = budget / MIN_SHARE;
     budget = budget > s->memory + least ? budget - s->memory : least;
-    s->most = budget / CHUNK > LEAST_CHUNKS ? budget / CHUNK : LEAST_CHUNKS;
+    s->most = budget / CHUNK > MIN_CHUNKS ? budget / CHUNK : MIN_CHUNKS;
 }
 
 struct spill *spill_new(const char *dir, const struct spill_limits *limits) {
@@ -269,7 +269,7 @@ static enum status take_addresses(struct spill *s, struct error *err) {
     enum status status = s->file.bytes > 0 ? STATUS_OK : file_free_bytes(s->dir, &room, err);
     if (status != STATUS_OK || s->file.bytes > 0)
         return status;
-    size_t bytes = (size_t)(room < ADDRESSES_MOST / ADDRESSES_SHARE ? ADDRESSES_SHARE * room : ADDRESSES_MOST);
+    size_t bytes = (size_t)(room < ADDRESSES_MAX / ADDRESSES_SHARE ? ADDRESSES_SHARE * room : ADDRESSES_MAX);
     bytes = (bytes / CHUNK + 1) * CHUNK;
     char *base = mmap(NULL, bytes + CHUNK, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
     if (base == MAP_FAILED)

@@ -72,7 +72,7 @@ static int ask(int code, struct invocation *in, cJSON *request,
 #define TIME_SIZE 32
 #define DAY_MS INT64_C(86400000)
 #define HOUR_MS INT64_C(3600000)
-#define EXPIRES_MOST 36500 /* days or hours: a century of the former */
+#define EXPIRES_MAX 36500 /* days or hours: a century of the former */
 
 static double time_of(const cJSON *item, const char *name, char text[TIME_SIZE]) {
     double ms = 0;
@@ -105,7 +105,7 @@ static bool read_expiry(const char *text, int64_t *expires_ms) {
     if (digits > 0 && digits <= 5 && (text[digits] == 'd' || text[digits] == 'h') && text[digits + 1] == '\0') {
         int64_t count = strtoll(text, NULL, 10);
         *expires_ms = clock_unix_ms() + count * (text[digits] == 'd' ? DAY_MS : HOUR_MS);
-        return count > 0 && count <= EXPIRES_MOST;
+        return count > 0 && count <= EXPIRES_MAX;
     }
     const char *rest = strptime(text, "%Y-%m-%d", &day);
     *expires_ms = rest && *rest == '\0' ? (int64_t)timegm(&day) * 1000 + DAY_MS : 0;

@@ -8,7 +8,7 @@
 
 /* Share of the pixels that meet no surface beyond which the message names the poses rather than the mesh: of a scanned
  * room, even with its windows, less than half lies outside. Chooses words only. */
-#define OPEN_MOST 0.5 /* +25 %: no change */
+#define OPEN_MAX 0.5 /* +25 %: no change */
 
 struct seen_job {
     const struct views *views;
@@ -53,7 +53,7 @@ struct seen_share seen_share_measure(const struct views *views, struct parallel 
 }
 
 enum status seen_share_require(const struct seen_share *share, bool ignored, struct error *err) {
-    if (share->surface >= SEEN_SHARE_LEAST || (ignored && share->surface > 0.0))
+    if (share->surface >= SEEN_SHARE_MIN || (ignored && share->surface > 0.0))
         return STATUS_OK;
     char part[32] = "nothing";
     if (share->surface > 0.0)
@@ -63,7 +63,7 @@ enum status seen_share_require(const struct seen_share *share, bool ignored, str
               "meet no surface",
               part, 100.0 * share->open);
     const char *anyway = share->surface > 0.0 ? "; fit=ignore reconstructs all the same" : "";
-    if (share->open > OPEN_MOST)
+    if (share->open > OPEN_MAX)
         return error_hint(err, "poses and mesh are likely of two places, axes or units: `unbake check` compares them%s",
                           anyway);
     return error_hint(err,

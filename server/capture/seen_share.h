@@ -15,9 +15,9 @@ struct seen_share {
 /* By SEEN_SHARE_POINTS points. The same for any number of threads. */
 struct seen_share seen_share_measure(const struct views *views, struct parallel *pool);
 
-#define SEEN_SHARE_LEAST 0.1 /* share of the surface; +25 %: no change */
+#define SEEN_SHARE_MIN 0.1 /* share of the surface; +25 %: no change */
 /* STATUS_INPUT, with the likely reason, where nothing can be measured; and, unless `ignored`, less than
- * SEEN_SHARE_LEAST of the surface. */
+ * SEEN_SHARE_MIN of the surface. */
 enum status seen_share_require(const struct seen_share *share, bool ignored, struct error *err);
 
 #endif

@@ -11,12 +11,12 @@
 #include "server/scene/adjacency.h"
 #include "server/scene/segment.h"
 
-#define REASONS_MAX 3    /* frames left out that are told one by one */
-#define SIZES_MAX 4      /* sizes of pictures that are told one by one */
-#define SIDE_LEAST 256.0 /* texels a side, below which nobody is sent */
+#define REASONS_MAX 3  /* frames left out that are told one by one */
+#define SIZES_MAX 4    /* sizes of pictures that are told one by one */
+#define SIDE_MIN 256.0 /* texels a side, below which nobody is sent */
 /* Diagonals of rooms, metres: outside of these another unit is likely. */
-#define ROOM_LEAST 1.0
-#define ROOM_MOST 100.0
+#define ROOM_MIN 1.0
+#define ROOM_MAX 100.0
 
 static void add_row(cJSON *table, const char *label, struct buf *value) {
     cJSON *row = cJSON_CreateObject();
@@ -110,9 +110,9 @@ static void tell_mesh(const struct mesh *mesh, struct buf *text) {
     double diagonal = (double)vec3_length(size);
     buf_printf(text, "%zu triangles, %.4g x %.4g x %.4g m, %.4g m2", mesh->triangle_count, (double)size.x,
                (double)size.y, (double)size.z, mesh_area(mesh));
-    if (diagonal > ROOM_MOST)
+    if (diagonal > ROOM_MAX)
         buf_puts(text, "; large for a room: is its unit a metre?");
-    else if (diagonal < ROOM_LEAST)
+    else if (diagonal < ROOM_MIN)
         buf_puts(text, "; small for a room: is its unit a metre?");
 }
 
@@ -175,7 +175,7 @@ static void warn_of_memory(cJSON *facts, const struct scene *scene, double kept,
                            double limit) {
     struct buf text;
     double smaller = side;
-    while (smaller / 2.0 >= SIDE_LEAST && estimate_memory_bytes(scene, kept, smaller) > limit)
+    while (smaller / 2.0 >= SIDE_MIN && estimate_memory_bytes(scene, kept, smaller) > limit)
         smaller = floor(smaller / 2.0);
     buf_init(&text, 1024);
     buf_printf(&text, "a job with texture_size=%.0f will not fit the memory: it takes about ", side);

@@ -11,7 +11,7 @@
 /* Other photographs a point is compared with; a random subset where more see it. */
 #define OTHERS_MAX 8 /* +25 %: no verdict */
 /* Cosine of the steepest view: at grazing angles a mesh's noise moves points by many pixels. */
-#define COSINE_LEAST 0.15f /* +25 %: no verdict */
+#define COSINE_MIN 0.15f /* +25 %: no verdict */
 /* Part of the way from a point to a camera that must be free: noisy scans hide what lies just behind. */
 #define FREE_SHARE 0.97f /* to .98: no verdict */
 /* From so many photographs on, the spread between them is known well enough; the difference must be so many standard
@@ -132,7 +132,7 @@ static bool sees(const struct search *s, size_t other, vec3 point, vec3 normal, 
     vec3 away = vec3_sub(camera_origin(camera), point);
     float distance = vec3_length(away);
     vec3 direction = vec3_scale(away, 1.0f / distance);
-    if (!(fabsf(vec3_dot(normal, direction)) > COSINE_LEAST))
+    if (!(fabsf(vec3_dot(normal, direction)) > COSINE_MIN))
         return false;
     if (accel_occluded(s->c->accel, camera_origin(camera), vec3_neg(direction), 0.0f, FREE_SHARE * distance))
         return false;
@@ -175,7 +175,7 @@ static void trace_point(struct search *s, size_t own, size_t number, struct phot
     float cosine = -vec3_dot(normal, direction);
     part->hits++;
     part->backs += cosine < 0.0f;
-    if (!(fabsf(cosine) > COSINE_LEAST))
+    if (!(fabsf(cosine) > COSINE_MIN))
         return;
     vec3 point = vec3_mad(camera_origin(camera), hit.distance_m, direction);
     size_t found = find_others(s, own, point, normal, (uint32_t)(bits >> 16), part->shared + at);

@@ -9,7 +9,7 @@
 #define WIDTH 800 /* pixels, as the next two */
 #define HEIGHT 240
 #define MARGIN 20.0f
-#define STOPS_LEAST 2.0 /* shown above and below the middle */
+#define STOPS_MIN 2.0 /* shown above and below the middle */
 
 static const rgb paper = {0.93f, 0.93f, 0.92f}, grid_color = {0.75f, 0.75f, 0.75f}, given_color = {0.85f, 0.12f, 0.03f},
                  dot_color = {0.01f, 0.10f, 0.75f};
@@ -39,7 +39,7 @@ static vec2 place(size_t frame, size_t count, double stops, double reach) {
 
 struct exposure_range exposure_chart_draw(struct drawing *drawing, const struct scene *scene, const float *brightness) {
     size_t count = scene->photograph_count;
-    double *dot = mem_array(count + 1, sizeof *dot), *given = mem_array(count + 1, sizeof *given), reach = STOPS_LEAST;
+    double *dot = mem_array(count + 1, sizeof *dot), *given = mem_array(count + 1, sizeof *given), reach = STOPS_MIN;
     for (size_t i = 0; i < count; i++) {
         dot[i] = (double)brightness[i];
         given[i] = scene->photograph[i].exposure_known ? (double)scene->photograph[i].exposure : 0.0;

@@ -33,7 +33,7 @@
  * wrong poses: below it the pictures cannot tell. */
 #define POWER 10.0               /* +25 %: no verdict */
 #define EXPECTED_CORRELATION 0.2 /* +25 %: 1 verdict of 96 */
-#define DETAIL_LEAST 0.15        /* share of the area; +25 %: no verdict */
+#define DETAIL_MIN 0.15          /* share of the area; +25 %: no verdict */
 
 static void tell(struct fit_result *fit, char *sentence) {
     if (fit->evidence_count < FIT_EVIDENCE_MAX)
@@ -105,7 +105,7 @@ static void judge_disagreement(struct fit_result *fit) {
                              fit->search.tried);
         tell(fit, mem_printf("most rays miss the mesh%s: the poses may be of another place or origin", others));
         mem_free(others);
-    } else if (fit->detail < DETAIL_LEAST) {
+    } else if (fit->detail < DETAIL_MIN) {
         tell(fit,
              mem_printf("only %.0f %% of the photographs' area shows detail: whether they agree cannot be determined",
                         100.0 * fit->detail));

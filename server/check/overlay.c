@@ -11,12 +11,12 @@
 #define CREASE_REACH 3 /* rays on either side by which a crease is measured */
 /* Relative bends of the inverse depth: of a step between neighbouring rays; of a crease over CREASE_REACH (a right
  * angle at two metres bends by some .03). They move drawings only. */
-#define STEP_LEAST 0.02f
-#define CREASE_LEAST 0.012f
+#define STEP_MIN 0.02f
+#define CREASE_MIN 0.012f
 #define BEND_OF_NOISE 6.0f /* and this many times the picture's median bend, which is the mesh's noise */
 /* A mark belongs to a line where so many lie within so many rays, itself included. */
 #define LINE_REACH 3
-#define LINE_LEAST 5
+#define LINE_MIN 5
 
 static const rgb edge_color = {0.0f, 0.9f, 0.35f}, miss_color = {1.0f, 0.02f, 0.1f};
 
@@ -121,7 +121,7 @@ static void keep_lines(struct depth_map *map, const uint8_t *marks) {
             for (int dy = -LINE_REACH; dy <= LINE_REACH && marks[at]; dy++)
                 for (int dx = -LINE_REACH; dx <= LINE_REACH; dx++)
                     near += marks[(ptrdiff_t)at + (ptrdiff_t)dy * map->width + dx];
-            if (near >= LINE_LEAST)
+            if (near >= LINE_MIN)
                 map->edge[at] = 1.0f;
         }
 }
@@ -131,8 +131,8 @@ static void find_edges(struct depth_map *map) {
     uint8_t *steps = mem_array(count, 1), *creases = mem_array(count, 1), *all = mem_calloc(count, 1);
     float *bend = mem_array(count, sizeof *bend);
     for (int axis = 0; axis < 2; axis++) {
-        mark(map, axis == 0, 1, STEP_LEAST, NULL, bend, steps);
-        mark(map, axis == 0, CREASE_REACH, CREASE_LEAST, steps, bend, creases);
+        mark(map, axis == 0, 1, STEP_MIN, NULL, bend, steps);
+        mark(map, axis == 0, CREASE_REACH, CREASE_MIN, steps, bend, creases);
         for (size_t i = 0; i < count; i++)
             all[i] |= steps[i] | creases[i];
     }

@@ -29,7 +29,7 @@ static const struct consistency_effort screening = {16, 48, 0}, refining = {24, 
 #define OFFSET_GAIN 1.02   /* of a step: less is chance; +25 %: no verdict */
 #define SNAP 0.015         /* relative distance at which a scale is that of a unit; +25 %: no verdict */
 #define NEAR_DIAGONALS 2.0 /* of the mesh's: cameras farther from its centre cannot see a room; +25 %: no verdict */
-#define SPREAD_LEAST 0.004 /* of the cameras, in diagonals of the mesh: a walk of 4 cm in 10 m; +25 %: no verdict */
+#define SPREAD_MIN 0.004   /* of the cameras, in diagonals of the mesh: a walk of 4 cm in 10 m; +25 %: no verdict */
 
 static const double unit_scales[] = {1e-3,         1e-2, 0.0254,       0.1,   0.3048, 1.0,
                                      1.0 / 0.3048, 10.0, 1.0 / 0.0254, 100.0, 1e3};
@@ -59,7 +59,7 @@ struct state {
 static bool is_plausible(const struct state *s, const struct hypothesis *h) {
     double spread = s->spread / h->scale;
     size_t close = 0, posed = 0;
-    if (spread < SPREAD_LEAST * s->diagonal && h->scale != 1.0)
+    if (spread < SPREAD_MIN * s->diagonal && h->scale != 1.0)
         return false;
     for (size_t i = 0; i < s->scene->photograph_count; i += 1 + s->scene->photograph_count / 32) {
         struct camera camera;

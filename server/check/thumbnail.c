@@ -16,7 +16,7 @@
 #define DETAIL_OF_NOISE 1.0f /* +25 %: no verdict */
 #define MEDIAN_OF_MAX 2048   /* values; +25 %: no verdict */
 /* Of the compression's half-way point: half of the noise that averaged pixels may have. */
-#define CONTRAST_LEAST 0.02f /* +25 %: no verdict */
+#define CONTRAST_MIN 0.02f /* +25 %: no verdict */
 
 /* Mean luminance of a block of the photograph's pixels; NAN where none is usable. */
 static float block_mean(const struct photograph *photo, const uint32_t from[2], const uint32_t to[2]) {
@@ -121,7 +121,7 @@ void thumbnail_make(struct thumbnail *t, const struct photograph *photo) {
         detailed += fabsf(t->value[i]) > detail;
     }
     t->detail = (float)detailed / (float)count;
-    float half_way = fmaxf(median_of(t->value, count, true), CONTRAST_LEAST);
+    float half_way = fmaxf(median_of(t->value, count, true), CONTRAST_MIN);
     for (size_t i = 0; i < count; i++)
         t->value[i] /= sqrtf(t->value[i] * t->value[i] + half_way * half_way);
     mem_free(around);

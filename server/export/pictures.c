@@ -135,8 +135,8 @@ static rgb ramp(float t) {
 }
 
 /* Standard deviations at the ends of the preview's scale. */
-#define DEVIATION_LEAST 0.01f
-#define DEVIATION_MOST 0.2f
+#define DEVIATION_MIN 0.01f
+#define DEVIATION_MAX 0.2f
 
 /* Display colour of a mean value. */
 static rgb show(enum picture_kind kind, rgb value) {
@@ -147,7 +147,7 @@ static rgb show(enum picture_kind kind, rgb value) {
     case PICTURE_SPECULAR: return rgb_gray(image_srgb_to_linear(value.r));
     case PICTURE_CONFIDENCE: break;
     }
-    return ramp(logf(DEVIATION_MOST / rgb_mean(value)) / logf(DEVIATION_MOST / DEVIATION_LEAST));
+    return ramp(logf(DEVIATION_MAX / rgb_mean(value)) / logf(DEVIATION_MAX / DEVIATION_MIN));
 }
 
 typedef rgb texel_value(const void *user, size_t texel);

@@ -14,10 +14,10 @@
 #define SQUARE_SLACK 1e-3f
 /* Share of texels that more than one triangle may cover: packers let charts touch, and round. Layouts that mirror or
  * repeat a part have tens of percent. */
-#define OVERLAP_MOST 0.002
+#define OVERLAP_MAX 0.002
 /* Share of the square that a layout of a whole room covers at least. Coordinates that are all alike, or pick colours
  * from a palette, cover less. */
-#define AREA_LEAST 0.01
+#define AREA_MIN 0.01
 #define BATCH 1024 /* valid texels */
 
 /* --- whether it can be made ------------------------------------------------------------------ */
@@ -192,11 +192,11 @@ static bool is_flat(struct uv_bake *b) {
     }
     /* Triangles smaller than a texel hold no centre; but the areas of all are no more than what they cover. */
     b->overlap_share = fmax((double)overlaps, area - valid) / fmax(valid, 1.0);
-    if (b->overlap_share > OVERLAP_MOST)
+    if (b->overlap_share > OVERLAP_MAX)
         snprintf(b->reason, sizeof b->reason,
                  "the input's texture coordinates overlap: %.3g %% of their texels belong to more than one triangle",
                  100.0 * fmin(b->overlap_share, 1.0));
-    else if (area < AREA_LEAST * (double)b->atlas.width * (double)b->atlas.height)
+    else if (area < AREA_MIN * (double)b->atlas.width * (double)b->atlas.height)
         snprintf(b->reason, sizeof b->reason, "the input's texture coordinates cover only %.2g %% of their square",
                  100.0 * area / ((double)b->atlas.width * (double)b->atlas.height));
     return b->reason[0] == '\0';

@@ -12,7 +12,7 @@
 /* Weight factor of a probe that no photograph sees, for a texel that one does: such probes lie in hidden, dark places.
  * One seen probe around outweighs all others. */
 #define UNSEEN_WEIGHT 0.01f /* +25 %: 0 dB */
-#define LEAST_WEIGHT 1e-6f  /* of any probe around, so that no texel is without light; +25 %: 0 dB */
+#define MIN_WEIGHT 1e-6f    /* of any probe around, so that no texel is without light; +25 %: 0 dB */
 #define CHUNK 16            /* probes a work item */
 
 /* The best probe position of each chart in one block: a seen texel nearest to the block's centre. */
@@ -151,7 +151,7 @@ void probes_mix(const struct probes *p, const struct atlas *atlas, const struct 
                 float like = fmaxf(vec3_dot(probe->shading, at->shading), 0.0f);
                 like *= like;
                 like *= like;
-                float w = tent(dx) * tent(dy) * like * like + LEAST_WEIGHT;
+                float w = tent(dx) * tent(dy) * like * like + MIN_WEIGHT;
                 if (seen && !probe->seen)
                     w *= UNSEEN_WEIGHT;
                 mix->probe[mix->count] = k;

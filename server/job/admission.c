@@ -25,7 +25,7 @@
  * they are plain. By hand: 16. */
 #define PIXEL_BYTES 75.0
 #define PIXELS_PER_BYTE 16.0
-#define PICTURES_MOST (1.15 * 0x1p30) /* of a mesh; an environment's picture takes no more */
+#define PICTURE_BYTES_MAX (1.15 * 0x1p30) /* of a mesh; an environment's picture takes no more */
 #define HINT "It begins when others have ended. Smaller textures, or of a render smaller files, need less memory."
 
 void admission_init(struct admission *a, uint64_t limit_bytes, uint64_t worker_limit_bytes) {
@@ -121,7 +121,7 @@ static double need_of_files(const struct job *job) {
     }
     cJSON_Delete(files);
     return RENDER_FACTOR * rest +
-           fmin(PIXEL_BYTES * PIXELS_PER_BYTE * pictures, PICTURES_MOST * count_pictured(job->settings));
+           fmin(PIXEL_BYTES * PIXELS_PER_BYTE * pictures, PICTURE_BYTES_MAX * count_pictured(job->settings));
 }
 
 /* A render holds the room and its textures, which are larger there than in their files, and what was sent to it. */

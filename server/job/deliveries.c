@@ -7,7 +7,7 @@
 
 #define USER_DELIVERIES 2 /* of one user at once */
 #define RETRY_SEC 5.0     /* after a failure of the store */
-#define LEAST_SEC 0.05    /* a process whose time is up has been killed, and is given a moment */
+#define MIN_SEC 0.05      /* a process whose time is up has been killed, and is given a moment */
 
 /* Lists the users that have as many deliveries under way as one may have; returns their number. */
 static size_t busy_users(const struct deliveries *d, int64_t users[DELIVERIES_AT_ONCE]) {
@@ -81,7 +81,7 @@ size_t deliveries_poll(const struct deliveries *d, struct pollfd *fds, double *s
         if (one->has_ended || one->id == 0)
             continue;
         count += run_poll(one->run, fds + count, &look);
-        *sleep_sec = fmin(*sleep_sec, fmin(look, fmax(one->kill_at_sec - now, LEAST_SEC)));
+        *sleep_sec = fmin(*sleep_sec, fmin(look, fmax(one->kill_at_sec - now, MIN_SEC)));
     }
     return count;
 }

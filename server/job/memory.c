@@ -5,8 +5,8 @@
 
 #include "common/settings.h"
 
-#define TEXELS_LEAST 64 /* texels_per_iteration is not reduced below this */
-#define SIDE_LEAST 64   /* nor texture_size below this */
+#define TEXELS_MIN 64 /* texels_per_iteration is not reduced below this */
+#define SIDE_MIN 64   /* nor texture_size below this */
 
 static double halved(double value, int times, double least) {
     for (; times > 0 && value / 2.0 >= least; times--)
@@ -34,8 +34,8 @@ cJSON *memory_reduce(enum job_kind kind, const cJSON *settings, int step, int *t
     if (kind == JOB_RECONSTRUCT && settings_apply(&full, settings, NULL, NULL) == STATUS_OK) {
         double texels = settings_number(&full, "texels_per_iteration");
         double side = settings_number(&full, "texture_size");
-        replace(smaller, "texels_per_iteration", texels, halved(texels, 2 * step, TEXELS_LEAST), what);
-        replace(smaller, "texture_size", side, halved(side, step - 1, SIDE_LEAST), what);
+        replace(smaller, "texels_per_iteration", texels, halved(texels, 2 * step, TEXELS_MIN), what);
+        replace(smaller, "texture_size", side, halved(side, step - 1, SIDE_MIN), what);
     }
     settings_release(&full);
     return smaller;

@@ -14,7 +14,7 @@
 static void keep_source(struct reconstruction *r, enum estimated_kind kind, uint32_t segment, rgb radiance,
                         float deviation) {
     struct estimated_light *light = &r->light;
-    if (light->source_count < ESTIMATED_MOST)
+    if (light->source_count < ESTIMATED_MAX)
         light->source[light->source_count++] = (struct estimated_source){(uint32_t)kind, segment, radiance, deviation};
 }
 

@@ -11,7 +11,7 @@
 #define LIGHT_SEEN_MOST 24 /* lamps that are seen */
 #define LIGHT_OPENINGS_MOST 14
 #define LIGHT_LAMPS_MOST (2 * LIGHT_MOST + LIGHT_SEEN_MOST + LIGHT_OPENINGS_MOST + ENVIRONMENT_HALVES)
-_Static_assert(LIGHT_MOST *LIGHT_MOST + LIGHT_MOST + LIGHT_OPENINGS_MOST + ENVIRONMENT_HALVES <= ESTIMATED_MOST,
+_Static_assert(LIGHT_MOST *LIGHT_MOST + LIGHT_MOST + LIGHT_OPENINGS_MOST + ENVIRONMENT_HALVES <= ESTIMATED_MAX,
                "all lamps and the sky are reported");
 
 /* Standard deviation of the logarithm of a radiance of which photographs tell no more than where to begin: a lower

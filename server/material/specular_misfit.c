@@ -13,8 +13,8 @@
  * surfaces would be explained by highlights that do not exist. */
 #define MAX_BASE_COLOR 1.25f /* +25 %: +0.04 dB, roughness +0.05 */
 #define SWEEPS 4
-#define CHANNELS 3       /* red, green, blue */
-#define MOST_SCALES 1e3f /* bound of a residual, whose robust misfit is 1 by then: what half precision holds */
+#define CHANNELS 3      /* red, green, blue */
+#define MAX_SCALES 1e3f /* bound of a residual, whose robust misfit is 1 by then: what half precision holds */
 /* Regions along the greatest extent of a segment. With 5, 8 and 16 specular comes out at 17.6, 16.7 and 13.9 dB for
  * staircase2's phone (means by area; 9.8 without regions), at 17.8, 17.9 and 17.9 dB for the perfect bathroom. */
 #define REGIONS_A_SIDE 8
@@ -50,7 +50,7 @@ static void add_channel(const struct specular_sample *s, const struct specular_p
         }
         float base = clampf(over / under, 0.0f, MAX_BASE_COLOR);
         for (size_t i = 0; i < s->count; i++) {
-            e[i] = clampf((diffuse[i] - base * unit_diffuse[i]) / scale, -MOST_SCALES, MOST_SCALES);
+            e[i] = clampf((diffuse[i] - base * unit_diffuse[i]) / scale, -MAX_SCALES, MAX_SCALES);
             float influence = 1.0f / (1.0f + e[i] * e[i]);
             weight[i] = influence * influence;
         }

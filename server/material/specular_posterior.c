@@ -21,7 +21,7 @@
  * difference of the cube roots of the colours (a perceptual scale), whose deviation is that of base colour errors. */
 #define COMMON 0.8        /* +25 %: 0 dB */
 #define COLOR_SPREAD 0.04 /* +25 %: 0 dB */
-#define COMMON_LEAST 0.02 /* less counts as 0; +25 %: no change */
+#define COMMON_MIN 0.02   /* less counts as 0; +25 %: no change */
 
 static const double specular_prior[HIGHLIGHT_SPECULARS] = {0.05, 0.15, 0.5, 0.15, 0.15};
 
@@ -63,7 +63,7 @@ static double shared_probability(const struct specular_evidence *a, const struct
         squares += d * d / 3.0;
     }
     double chance = COMMON * exp(-0.5 * squares / (COLOR_SPREAD * COLOR_SPREAD));
-    return chance > COMMON_LEAST ? chance : 0.0;
+    return chance > COMMON_MIN ? chance : 0.0;
 }
 
 /* Multiplies the distribution of the common material by the evidence of another segment, and normalises it. */

@@ -81,7 +81,7 @@ static size_t planned_samples(const struct solve *s, int first) {
     for (int pass = first; pass < PASSES; pass++)
         left += is_skipped(s, pass) ? 0.0 : wanted_samples(s, pass) * (double)s->probes.count;
     double share = left > 0.0 ? (work->now - work->done) / left : 1.0;
-    return (size_t)ceil(fmin(fmax(share, PACE_LEAST_GATHER), 1.0) * wanted_samples(s, first));
+    return (size_t)ceil(fmin(fmax(share, PACE_MIN_GATHER), 1.0) * wanted_samples(s, first));
 }
 
 static uint32_t stride_of(const struct solve *s, int pass) {

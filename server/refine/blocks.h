@@ -9,7 +9,7 @@
 #include "server/scene/texture.h"
 
 /* Lower bound of scaled base colour: no factor could raise 0 again. */
-#define BLOCKS_LEAST_COLOR 0.002f /* +25 %: no change */
+#define BLOCKS_MIN_COLOR 0.002f /* +25 %: no change */
 
 /* Number of blocks across that many texels. */
 static inline size_t blocks_across(uint32_t texels, int level) {
@@ -27,7 +27,7 @@ static inline size_t blocks_at(const struct texture *t, size_t texel, int level)
 
 static inline void blocks_scale(float color[3], const float factor[3]) {
     for (int c = 0; c < 3; c++)
-        color[c] = clampf(color[c] * factor[c], BLOCKS_LEAST_COLOR, 1.0f);
+        color[c] = clampf(color[c] * factor[c], BLOCKS_MIN_COLOR, 1.0f);
 }
 
 #endif

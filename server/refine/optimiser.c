@@ -69,7 +69,7 @@ struct optimiser *optimiser_new(const struct optimiser_input *input, bool deriva
         .roulette_depth = (int)settings_number(set, "roulette_depth"),
         .derivatives = derivatives,
         .seed = (uint64_t)settings_number(set, "seed"),
-        .least_color = derivatives ? PATH_LEAST_COLOR : 0.0f,
+        .min_color = derivatives ? PATH_MIN_COLOR : 0.0f,
     };
     pass_init(&o->pass, &input->surface, input->world, input->views, set, &path, input->pool);
     emission_init(&o->emission, input->materials);

@@ -7,9 +7,9 @@
 #include "server/scene/inverse_uv.h"
 
 #define MIN_SIZE 64
-#define UTILISATION 0.5     /* of an atlas, about */
-#define LEAST_DENSITY 0.05f /* of a triangle, as a share of the finest one's; those without a picture have it */
-#define TAPS 4              /* by which a texel is averaged: 2 x 2 */
+#define UTILISATION 0.5   /* of an atlas, about */
+#define MIN_DENSITY 0.05f /* of a triangle, as a share of the finest one's; those without a picture have it */
+#define TAPS 4            /* by which a texel is averaged: 2 x 2 */
 
 void bake_release(struct baked *b) {
     atlas_release(&b->atlas);
@@ -57,7 +57,7 @@ static enum status make_atlas(const struct mesh *mesh, const struct mesh_materia
         sum += pixels;
     }
     for (size_t t = 0; t < mesh->triangle_count; t++)
-        density[t] = finest > 0.0f ? fmaxf(density[t] / finest, LEAST_DENSITY) : 1.0f;
+        density[t] = finest > 0.0f ? fmaxf(density[t] / finest, MIN_DENSITY) : 1.0f;
     double size = fmin(fmax(ceil(sqrt(sum / UTILISATION)), MIN_SIZE), BAKE_MAX_SIZE);
     enum status status = atlas_make_uneven(atlas, mesh, segments, (uint32_t)size, density, ATLAS_PADDING, err);
     while (status == STATUS_INPUT && size < BAKE_MAX_SIZE) { /* of a mesh in many pieces each takes some texels */

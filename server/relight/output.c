@@ -13,8 +13,8 @@
 #include "common/mem.h"
 
 #define RECORD_LIMIT ((size_t)1 << 30) /* bytes of views.jsonl */
-#define LEAST_DIGITS 5                 /* of a picture's number in names */
-#define HALF_MOST 65504.0f             /* largest finite number of IEEE 754 binary16 */
+#define MIN_DIGITS 5                   /* of a picture's number in names */
+#define HALF_MAX 65504.0f              /* largest finite number of IEEE 754 binary16 */
 
 /* --- the record ------------------------------------------------------------------------------------------------- */
 
@@ -62,7 +62,7 @@ void output_digest(const struct relight_job *job, char digest[SHA256_HEX_SIZE]) 
 }
 
 void output_count(struct output *o, uint64_t pictures) {
-    o->digits = LEAST_DIGITS;
+    o->digits = MIN_DIGITS;
     for (uint64_t most = 100000; most < pictures && o->digits < 19; most *= 10)
         o->digits++;
 }
@@ -94,7 +94,7 @@ static void read_lines(struct output *o, const char *text) {
 enum status output_open(struct output *o, const struct relight_job *job, const struct relight_watch *watch,
                         struct error *err) {
     struct buf text;
-    *o = (struct output){.job = job, .watch = watch, .digits = LEAST_DIGITS, .done = cJSON_CreateObject()};
+    *o = (struct output){.job = job, .watch = watch, .digits = MIN_DIGITS, .done = cJSON_CreateObject()};
     output_digest(job, o->digest);
     char *path = file_join(job->out, OUTPUT_RECORD);
     buf_init(&text, RECORD_LIMIT);
@@ -240,7 +240,7 @@ static enum status list(struct output *o, const char *name, const char *pass, cJ
 /* A seen sun is brighter than half precision can say; the infinity that it would become spoils every sum. */
 static void fit_half(struct image *image) {
     for (size_t i = 0; i < (size_t)image->width * image->height * image->channel_count; i++)
-        image->pixel[i] = fminf(image->pixel[i], HALF_MOST);
+        image->pixel[i] = fminf(image->pixel[i], HALF_MAX);
 }
 
 enum status output_pass(struct output *o, uint64_t picture, const struct render_pass *pass, const char *name,

@@ -9,15 +9,15 @@
 
 /* A round: so many paths that stopping and looking cost little, and so few that they are soon done. */
 #define ROUND_PATHS 4e6
-#define FIRST_PATHS 1e6   /* of the first round, which is the first preview */
-#define ROUND_LEAST_SPP 4 /* FILM_GROUPS: there are standard errors */
-#define ROUND_MOST_SPP 64
+#define FIRST_PATHS 1e6 /* of the first round, which is the first preview */
+#define ROUND_MIN_SPP 4 /* FILM_GROUPS: there are standard errors */
+#define ROUND_MAX_SPP 64
 
 static uint32_t round_spp(const struct camera *camera, uint32_t done, uint32_t most) {
     double spp = (done > 0 ? ROUND_PATHS : FIRST_PATHS) / ((double)camera->width * camera->height);
-    uint32_t wanted = spp < ROUND_MOST_SPP ? (uint32_t)spp : ROUND_MOST_SPP;
+    uint32_t wanted = spp < ROUND_MAX_SPP ? (uint32_t)spp : ROUND_MAX_SPP;
     wanted = wanted / FILM_GROUPS * FILM_GROUPS;
-    wanted = wanted > ROUND_LEAST_SPP ? wanted : ROUND_LEAST_SPP;
+    wanted = wanted > ROUND_MIN_SPP ? wanted : ROUND_MIN_SPP;
     return wanted < most - done ? wanted : most - done;
 }
 
@@ -68,7 +68,7 @@ enum status picture_render(const struct world *world, const struct camera *camer
                            struct parallel *pool, struct image *image, struct picture_quality *quality,
                            struct error *err) {
     static const char *const names[] = {"R", "G", "B", "direct.R", "direct.G", "direct.B"};
-    uint32_t most = (goal->most_spp + FILM_GROUPS - 1) / FILM_GROUPS * FILM_GROUPS;
+    uint32_t most = (goal->max_spp + FILM_GROUPS - 1) / FILM_GROUPS * FILM_GROUPS;
     double start = clock_sec(), variance = 0.0;
     *quality = (struct picture_quality){0};
     image_init(image, camera->width, camera->height, has_direct ? 6 : 3, names);

@@ -13,9 +13,9 @@
 #include "server/scene/camera.h"
 
 struct picture_goal {
-    uint32_t most_spp; /* paths for each pixel, at most */
-    double noise;      /* standard error over mean, of luminance; 0: all of most_spp */
-    double seconds;    /* 0: no limit */
+    uint32_t max_spp; /* paths for each pixel, at most */
+    double noise;     /* standard error over mean, of luminance; 0: all of max_spp */
+    double seconds;   /* 0: no limit */
 };
 
 /* How good a picture has become. */

@@ -83,11 +83,11 @@ static double share_done(const struct relight_state *r, double of_part) {
 static bool look(void *user, const struct image *so_far, struct picture_quality quality) {
     struct relight_state *r = user;
     const struct relight_watch *w = r->watch;
-    bool is_last = quality.spp >= r->goal.most_spp;
+    bool is_last = quality.spp >= r->goal.max_spp;
     if (w->should_stop && w->should_stop(w->user))
         return false;
     if (w->progress)
-        w->progress(w->user, r->done + share_done(r, (double)quality.spp / r->goal.most_spp), r->total);
+        w->progress(w->user, r->done + share_done(r, (double)quality.spp / r->goal.max_spp), r->total);
     if (w->preview && !is_last && r->part == 0 && clock_sec() - r->shown_sec >= PREVIEW_INTERVAL_SEC) {
         struct image shown;
         image_take_rgb(so_far, &shown);
@@ -267,7 +267,7 @@ static enum status choose_exposure(struct relight_state *r, struct error *err) {
         camera_resize(&camera, METER_WIDTH, (uint32_t)fmax(1.0, (double)METER_WIDTH * camera.height / camera.width));
     enum status status = use_sun(r, r->suns / 2, err);
     if (status == STATUS_OK)
-        status = picture_render(&r->room.world, &camera, &r->path, &(struct picture_goal){.most_spp = METER_SPP}, false,
+        status = picture_render(&r->room.world, &camera, &r->path, &(struct picture_goal){.max_spp = METER_SPP}, false,
                                 NULL, NULL, r->pool, &image, &quality, err);
     if (status != STATUS_OK)
         return status;

@@ -63,7 +63,7 @@ struct shade_block {
     float pdf[LANES];           /* of the direction, by solid angle; 0: a camera ray */
     float path_radiance[LANES]; /* greatest channel of the radiance that the path has gathered so far */
     struct lanes3 rr_beta;      /* throughput for Russian roulette: base colours are clamped from below to
-                                        * least_color */
+                                        * min_color */
     float area_density[LANES];  /* by area, of the previous vertex's light sample at this point */
     /* The triangle. */
     struct lanes3 normal; /* geometric */

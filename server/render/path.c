@@ -205,7 +205,7 @@ static struct shade_roulette roulette_at(const struct path_settings *settings, i
         .least = any ? MIN_CHANCE : 1.0f,
         .most = all && !derivatives ? MAX_CHANCE : 1.0f,
         .least_light = any ? MIN_LIGHT_CHANCE : 1.0f,
-        .least_color = settings->least_color,
+        .min_color = settings->min_color,
     };
 }
 

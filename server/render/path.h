@@ -16,9 +16,9 @@
 #include "server/render/gradient.h"
 #include "server/render/world.h"
 
-/* settings.least_color when derivatives are wanted. 0.3 reduces the variance of the gradient in a room of dark tiles
+/* settings.min_color when derivatives are wanted. 0.3 reduces the variance of the gradient in a room of dark tiles
  * by a third, for a fifth more time. */
-#define PATH_LEAST_COLOR 0.1f
+#define PATH_MIN_COLOR 0.1f
 
 struct path_settings {
     int max_depth;      /* path segments from the camera: 1 emission only, 2 direct light, ... <= 32 */
@@ -27,7 +27,7 @@ struct path_settings {
     bool derivatives;   /* roulette ends fewer paths, since derivatives of far vertices scatter over many texels and
                          * their noise falls only with the number of paths */
     uint64_t seed;
-    float least_color; /* base colours are clamped to this from below for roulette: derivatives by base colour are no
+    float min_color; /* base colours are clamped to this from below for roulette: derivatives by base colour are no
                          * smaller where it is dark. 0 when only pictures are wanted */
 };
 

@@ -217,8 +217,8 @@ static inline __attribute__((always_inline)) void scatter(struct vertex_block *r
         /* Roulette for shadow rays whose contribution is small against what the path has gathered (Veach 1997,
          * section 10.4.1). */
         rgb path_rr_beta = lanes3_rgb(&s->rr_beta, i),
-            color = {bsdf_max(base_color.r, roulette.least_color), bsdf_max(base_color.g, roulette.least_color),
-                     bsdf_max(base_color.b, roulette.least_color)};
+            color = {bsdf_max(base_color.r, roulette.min_color), bsdf_max(base_color.g, roulette.min_color),
+                     bsdf_max(base_color.b, roulette.min_color)};
         float max_contribution = max_channel(
             rgb_mul(path_rr_beta, reflect_lane(&bsdf, f, has_metals, metallic, wo, light, color, unoccluded)));
         float chance = max_contribution / bsdf_max(MIN_CONTRIBUTION_SHARE * s->path_radiance[i], 1e-30f);

@@ -33,7 +33,7 @@ void shade_light(struct shade_block *restrict s);
 struct shade_roulette {
     float scale, least, most;
     float least_light; /* minimum probability of tracing a shadow ray */
-    float least_color; /* see struct path_settings */
+    float min_color;   /* see struct path_settings */
 };
 
 /* Reflection towards the light sample and along the continued path. */

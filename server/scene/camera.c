@@ -20,7 +20,7 @@
 
 #define HALF_PI (0.5 * PI)
 #define FOLD_STEPS 4096 /* of the march towards the fold */
-#define FOV_LEAST 1e-7  /* radians of FOV's angle; below it there is no distortion in single precision */
+#define FOV_MIN 1e-7    /* radians of FOV's angle; below it there is no distortion in single precision */
 #define NEWTON_STEPS 50
 #define NEWTON_PIXELS 1e-6 /* residual at which the inverse is taken as found */
 
@@ -186,9 +186,9 @@ static bool project_thin_prism(const struct camera *c, float x, float y, float *
 
 static bool project_fov(const struct camera *c, float x, float y, float *u, float *v) {
     double r = hypot((double)x, (double)y), omega = (double)c->k[0], scale = 1.0;
-    if (r > 1e-12 && fabs(omega) > FOV_LEAST)
+    if (r > 1e-12 && fabs(omega) > FOV_MIN)
         scale = atan(2.0 * r * tan(0.5 * omega)) / (omega * r);
-    else if (fabs(omega) > FOV_LEAST)
+    else if (fabs(omega) > FOV_MIN)
         scale = 2.0 * tan(0.5 * omega) / omega;
     *u = (float)(scale * (double)x);
     *v = (float)(scale * (double)y);
@@ -306,7 +306,7 @@ static bool invert_fisheye(const struct camera *c, double bent, double *t) {
 
 static bool invert_fov(const struct camera *c, double *x, double *y) {
     double bent = hypot(*x, *y), omega = (double)c->k[0], angle = bent * fabs(omega);
-    if (!(fabs(omega) > FOV_LEAST) || bent == 0.0)
+    if (!(fabs(omega) > FOV_MIN) || bent == 0.0)
         return true;
     if (!(angle < HALF_PI))
         return false;

@@ -6,7 +6,7 @@
 
 /* Of a segment's area, in the object that it is called after. Not all of it: regions that are too small to be segments
  * join a neighbour of another object. */
-#define LEAST_SHARE 0.9
+#define MIN_SHARE 0.9
 
 struct vote {
     int64_t object; /* that leads */
@@ -46,7 +46,7 @@ static const char **find_objects(const uint32_t *of_triangle, size_t count, cons
     }
     for (size_t s = 0; s < count; s++) {
         object[s] = vote[s].object;
-        name[s] = inside[s] >= LEAST_SHARE * whole[s] ? mesh_object_name(mesh, object[s]) : NULL;
+        name[s] = inside[s] >= MIN_SHARE * whole[s] ? mesh_object_name(mesh, object[s]) : NULL;
     }
     mem_free(whole);
     mem_free(inside);

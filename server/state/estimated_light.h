@@ -10,7 +10,7 @@
 #include "common/vec.h"
 
 /* Sources, at most. */
-#define ESTIMATED_MOST 288
+#define ESTIMATED_MAX 288
 #define ESTIMATED_FACTORS 4 /* times that saturated sky may be brightened */
 
 enum estimated_kind {
@@ -30,7 +30,7 @@ struct estimated_source {
 
 struct estimated_light {
     uint32_t source_count, factor_count;
-    struct estimated_source source[ESTIMATED_MOST];
+    struct estimated_source source[ESTIMATED_MAX];
     rgb sky_factor[ESTIMATED_FACTORS];    /* by which solve brightened the saturated sky, one after another */
     rgb ground_factor[ESTIMATED_FACTORS]; /* the same of the ground; 0: as the sky, in checkpoints before format 5 */
 };

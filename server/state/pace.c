@@ -72,7 +72,7 @@ static void plan_report(const struct pace *p, double pixels) {
 void pace_plan_solve(const struct pace *p, double valid, double directions, double early_texels, double last_texels,
                      double detail_steps) {
     double n = p->thread_count;
-    plan_set(p->plan, PLAN_GATHER, directions, directions, PACE_LEAST_GATHER * directions, GATHER_SEC / n);
+    plan_set(p->plan, PLAN_GATHER, directions, directions, PACE_MIN_GATHER * directions, GATHER_SEC / n);
     plan_set(p->plan, PLAN_MEASURE, early_texels + last_texels, early_texels + last_texels,
              early_texels + MIN_MEASURE * last_texels, MEASURE_SEC / n);
     plan_set(p->plan, PLAN_DETAIL, detail_steps, detail_steps, 0.0, DETAIL_SEC / n);

@@ -13,7 +13,7 @@
 #include "server/state/plan.h"
 
 /* Least part of the gathered directions that a time limit leaves. */
-#define PACE_LEAST_GATHER 0.25
+#define PACE_MIN_GATHER 0.25
 
 /* What the amounts follow from, and the plan, which the functions below write. All borrowed. */
 struct pace {

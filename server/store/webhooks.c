@@ -10,9 +10,9 @@
 #include "server/store/internal.h"
 #include "server/store/store.h"
 
-#define RETRY_FIRST_MS 2000.0  /* before a message is sent again; doubled each time */
-#define RETRY_MOST_MS 600000.0 /* up to this */
-#define TRIES 30               /* spread over four hours */
+#define RETRY_FIRST_MS 2000.0 /* before a message is sent again; doubled each time */
+#define RETRY_MAX_MS 600000.0 /* up to this */
+#define TRIES 30              /* spread over four hours */
 
 enum status store_webhook_set(struct store *store, int64_t job_id, const char *url, const char *secret,
                               struct error *err) {
@@ -65,7 +65,7 @@ enum status store_outbox_next(struct store *store, int64_t after, const int64_t 
     bool found = false;
     *row = (struct outbox_row){0};
     /* A clock that was set back must not delay a message by more than its longest pause. */
-    int64_t now = store_now_ms(), never = now + (int64_t)(2.0 * RETRY_MOST_MS);
+    int64_t now = store_now_ms(), never = now + (int64_t)(2.0 * RETRY_MAX_MS);
     struct buf skipped;
     buf_init(&skipped, 4096);
     for (size_t i = 0; i < skip_count; i++)
@@ -101,7 +101,7 @@ enum status store_outbox_wait(struct store *store, double *seconds, struct error
                                  "SELECT next_ms FROM outbox WHERE next_ms > ? ORDER BY next_ms LIMIT 1", "i", now);
     store_unlock(store);
     double wait = (double)(next - now) * 1e-3;
-    *seconds = next < 0 ? (double)INFINITY : fmin(fmax(wait, 0.05), RETRY_MOST_MS * 1e-3);
+    *seconds = next < 0 ? (double)INFINITY : fmin(fmax(wait, 0.05), RETRY_MAX_MS * 1e-3);
     return status;
 }
 
@@ -128,7 +128,7 @@ static enum status settle(struct store *store, int64_t id, const struct outbox_o
         return status;
     status = sql_int(&store->sql, 0, &tries, err, "SELECT tries FROM outbox WHERE id = ?", "i", id);
     *gave_up = !outcome->delivered && (outcome->is_final || tries + 1 >= TRIES);
-    double pause = fmin(RETRY_FIRST_MS * pow(2.0, (double)tries), RETRY_MOST_MS);
+    double pause = fmin(RETRY_FIRST_MS * pow(2.0, (double)tries), RETRY_MAX_MS);
     if (status == STATUS_OK)
         status = note_outcome(store, id, outcome, *gave_up, err);
     if (status == STATUS_OK && (outcome->delivered || *gave_up))

@@ -1,6 +1,6 @@
 // curve.js -- a curve of positive values over iterations, logarithmic in the value.
 
-const SVG = "http://www.w3.org/2000/svg", POINTS_MOST = 1000; // plenty for 400 pixels
+const SVG = "http://www.w3.org/2000/svg", POINTS_MAX = 1000; // plenty for 400 pixels
 
 function part(name, attributes, text) {
   const made = document.createElementNS(SVG, name);
@@ -13,7 +13,7 @@ function part(name, attributes, text) {
 export function drawCurve(svg, caption, points) {
   const sorted = [...points].filter(([, value]) => value > 0).sort((a, b) => a[0] - b[0]);
   if (sorted.length < 2) return false;
-  const every = Math.ceil(sorted.length / POINTS_MOST);
+  const every = Math.ceil(sorted.length / POINTS_MAX);
   const shown = sorted.filter((_, i) => i % every === 0 || i === sorted.length - 1);
   const logs = shown.map(([, value]) => Math.log(value));
   const low = Math.min(...logs), high = Math.max(...logs), last = shown.at(-1)[0] || 1;

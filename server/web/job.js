@@ -14,11 +14,11 @@ const ACTIONS = {
   failed: ["retry"], cancelled: ["retry"], succeeded: [],
 };
 const OUTPUTS_WAIT_MS = 300;
-const PICTURE_MOST = 8 << 20; // bytes; larger ones are opened from the list of files
+const PICTURE_MAX = 8 << 20; // bytes; larger ones are opened from the list of files
 
 const isRendered = ({ name }) => /^\d{5}_\w+\.png$/.test(name);
 const isComparison = ({ name }) => /^compare\/.*\.png$/.test(name);
-const isThumbnail = ({ name, bytes: size }) => /\.png$/.test(name) && size < PICTURE_MOST && name !== "base_color.png";
+const isThumbnail = ({ name, bytes: size }) => /\.png$/.test(name) && size < PICTURE_MAX && name !== "base_color.png";
 
 const goTo = (job) => go({ job: job.id });
 

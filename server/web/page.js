@@ -9,7 +9,7 @@ import { showList } from "./list.js";
 import { forgetPeople, showPeople } from "./people.js";
 
 const DAY_MS = 86400000, WARN_DAYS = 14;  // before a token ends
-const PAGES_MOST = 20, PAGE_JOBS = 200; // of the list
+const PAGES_MAX = 20, PAGE_JOBS = 200; // of the list
 
 const server = { me: null, jobs: new Map(), refresh }; // me: {user, role, open}; jobs: by number
 const views = [new JobView("job", server), new JobView("with", server)];
@@ -115,7 +115,7 @@ function follow() {
 async function loadJobs() {
   const all = new Map();
   let cursor = "";
-  for (let i = 0; i < PAGES_MOST && cursor !== null; i++) {
+  for (let i = 0; i < PAGES_MAX && cursor !== null; i++) {
     const page = await get(`v1/jobs?limit=${PAGE_JOBS}${cursor && `&cursor=${encodeURIComponent(cursor)}`}`);
     for (const job of page.items) all.set(job.id, job);
     cursor = page.next ?? null;

@@ -1,11 +1,11 @@
 // ply.js -- reads scene.ply as server/export/mesh_ply.h writes it: binary, little-endian, triangles, each with its segment.
 
-const HEADER_MOST = 1 << 17; // bytes: it has the names of segments
+const HEADER_MAX = 1 << 17; // bytes: it has the names of segments
 const FLOAT_BYTES = 4, FACE_BYTES = 1 + 3 * 4 + 2 * 4; // 3, three indices, segment, face of the input
 
 // {count, position[9 count], uv[6 count], segment[count]}: the corners of `count` triangles, one after another.
 export function readPly(buffer) {
-  const header = new TextDecoder("latin1").decode(buffer.slice(0, HEADER_MOST));
+  const header = new TextDecoder("latin1").decode(buffer.slice(0, HEADER_MAX));
   const end = header.indexOf("end_header\n");
   const vertices = Number(/element vertex (\d+)/.exec(header)?.[1]), count = Number(/element face (\d+)/.exec(header)?.[1]);
   if (end < 0 || !header.startsWith("ply\nformat binary_little_endian") || !(count > 0))

@@ -59,12 +59,12 @@ bool deliver_is_public(const struct sockaddr *address) {
 }
 
 /* The signing key of a secret; it lies in `key` or in the secret itself. */
-static size_t key_of(const char *secret, unsigned char key[WEBHOOK_KEY_MOST], const void **bytes) {
+static size_t key_of(const char *secret, unsigned char key[WEBHOOK_KEY_MAX], const void **bytes) {
     size_t prefix = strlen(WEBHOOK_SECRET_PREFIX), size;
     const char *base64 = secret + prefix;
     *bytes = key;
     if (strncmp(secret, WEBHOOK_SECRET_PREFIX, prefix) == 0 &&
-        base64_decode(base64, strlen(base64), key, WEBHOOK_KEY_MOST, &size) && size >= WEBHOOK_KEY_LEAST)
+        base64_decode(base64, strlen(base64), key, WEBHOOK_KEY_MAX, &size) && size >= WEBHOOK_KEY_MIN)
         return size;
     *bytes = secret;
     return strlen(secret);
@@ -73,7 +73,7 @@ static size_t key_of(const char *secret, unsigned char key[WEBHOOK_KEY_MOST], co
 void deliver_sign(const char *secret, const char *id, long long timestamp, const char *body, char signature[64]) {
     unsigned char mac[32];
     gnutls_datum_t raw = {.data = mac, .size = sizeof mac}, text = {0};
-    unsigned char decoded[WEBHOOK_KEY_MOST];
+    unsigned char decoded[WEBHOOK_KEY_MAX];
     const void *key;
     size_t key_size = key_of(secret, decoded, &key);
     char *signed_text = mem_printf("%s.%lld.%s", id, timestamp, body);

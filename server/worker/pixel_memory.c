@@ -5,7 +5,7 @@
 
 /* With less, even one photograph is read from the disk again and again: one of 12 megapixels with what is found of it
  * takes 150 MB. Moves time only. */
-#define LEAST_BYTES ((uint64_t)64 << 20)
+#define MIN_BYTES ((uint64_t)64 << 20)
 /* Where the system does not tell what it has. */
 #define UNKNOWN_BYTES ((uint64_t)2 << 30)
 #define STEPS_MAX 16 /* halvings of the share */
@@ -21,7 +21,7 @@ uint64_t pixel_memory_bytes(const struct order *order) {
         bytes = available / 2;
     }
     bytes >>= order->memory_step < STEPS_MAX ? order->memory_step : STEPS_MAX;
-    return bytes > LEAST_BYTES || order->photograph_memory_bytes > 0 ? bytes : LEAST_BYTES;
+    return bytes > MIN_BYTES || order->photograph_memory_bytes > 0 ? bytes : MIN_BYTES;
 }
 
 struct spill *pixel_memory_new(const struct order *order) {

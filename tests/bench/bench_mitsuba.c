@@ -124,7 +124,7 @@ static void bench_room(const char *python, const char *name) {
     struct work work;
     work_init(&work, &room, &camera, 0);
     work.settings.derivatives = false;
-    work.settings.least_color = 0.0f;
+    work.settings.min_color = 0.0f;
     run(&work, false);
     double mean = 0.0;
     for (size_t i = 0; i < work.path_count; i++)
@@ -135,7 +135,7 @@ static void bench_room(const char *python, const char *name) {
     for (int i = 0; i < REPEATS; i++) {
         for (int gradient = 0; gradient < 2; gradient++) {
             work.settings.derivatives = gradient;
-            work.settings.least_color = gradient ? PATH_LEAST_COLOR : 0.0f;
+            work.settings.min_color = gradient ? PATH_MIN_COLOR : 0.0f;
             ours[gradient][i] = run(&work, gradient);
             theirs[gradient][i] = other_ask(&other, gradient ? "gradient" : "primal");
         }

@@ -42,7 +42,7 @@ static void set_paths(struct work *w, const struct inverse_uv *inverse, const ui
                       enum how how) {
     const struct room *room = w->room;
     w->settings.derivatives = how == DEFAULT;
-    w->settings.least_color = how == DEFAULT ? PATH_LEAST_COLOR : 0.0f;
+    w->settings.min_color = how == DEFAULT ? PATH_MIN_COLOR : 0.0f;
     for (size_t i = 0; i < w->path_count; i++) {
         uint32_t look = (uint32_t)(i / SPP), sample = (uint32_t)(i % SPP), t = texel[look], triangle;
         w->key[i] = how == PLAIN ? (struct path_key){(uint32_t)i, round, 0} : (struct path_key){look, round, sample};

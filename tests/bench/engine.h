@@ -84,7 +84,7 @@ static inline void work_init(struct work *w, const struct room *room, const stru
                                          .roulette_depth = ROULETTE_DEPTH,
                                          .derivatives = true,
                                          .seed = 1,
-                                         .least_color = PATH_LEAST_COLOR};
+                                         .min_color = PATH_MIN_COLOR};
     w->path_count = (size_t)camera->width * camera->height * SPP;
     w->chunk_count = (w->path_count + BATCH - 1) / BATCH;
     w->ray = mem_array(w->path_count, sizeof *w->ray);

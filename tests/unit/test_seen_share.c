@@ -47,7 +47,7 @@ int main(void) {
         for (size_t v = 24; v < 32; v++)
             (&rig.scene.mesh.position[v].x)[i] = i < 2 ? (v >> i & 1 ? 50.0f : -50.0f) : v & 4 ? -1.0f : -2.0f;
     CHECK(require(&rig, false, &share, &err) == STATUS_INPUT);
-    CHECK_THAT(share.surface > 0.0 && share.surface < SEEN_SHARE_LEAST, "%g", share.surface);
+    CHECK_THAT(share.surface > 0.0 && share.surface < SEEN_SHARE_MIN, "%g", share.surface);
     CHECK(strstr(err.hint, "crop") != NULL && strstr(err.hint, "fit=ignore") != NULL);
     CHECK(require(&rig, true, &share, &err) == STATUS_OK);
     fit_rig_release(&rig);

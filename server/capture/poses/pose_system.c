@@ -17,13 +17,13 @@
 /* pixels: scale of the prior, which is weak: redkitchen's drift is shared by neighbouring frames */
 #define PRIOR_PX 1.0 /* +25 %: no change */
 /* Pixels: the prior is quadratic below this, about where corrections are not applied. */
-#define PRIOR_LEAST_PX 0.2 /* +25 %: no change */
-#define CG_STEPS 40        /* of conjugate gradients, at most; +25 %: no change */
-#define CG_TOLERANCE 1e-3  /* of the residual's norm, over that of the right-hand side; +25 %: no change */
+#define PRIOR_MIN_PX 0.2  /* +25 %: no change */
+#define CG_STEPS 40       /* of conjugate gradients, at most; +25 %: no change */
+#define CG_TOLERANCE 1e-3 /* of the residual's norm, over that of the right-hand side; +25 %: no change */
 
 double pose_prior(const struct pose_frame *frame) {
     double squares = conjugate_dot(frame->total, frame->total, POSE_UNKNOWNS);
-    return 1.0 / (PRIOR_PX * fmax(PRIOR_LEAST_PX, sqrt(squares)));
+    return 1.0 / (PRIOR_PX * fmax(PRIOR_MIN_PX, sqrt(squares)));
 }
 
 /* The same on a frame's own, where a walk may hold it to its neighbours. */

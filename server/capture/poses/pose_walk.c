@@ -7,7 +7,7 @@
 #define FIRST_TURN_PX 1.0
 #define FIRST_MOVE_PX 0.5
 /* Pixels a step: least deviation, a third of the least correction that is applied. */
-#define LEAST_PX 0.05
+#define MIN_PX 0.05
 
 static size_t place_of(const struct pose_solver *s, size_t f) { return s->tracks->views->train[f]; }
 
@@ -126,7 +126,7 @@ static void variances_of(const struct pose_frame *frame, double (*factor)[POSE_U
 }
 
 void pose_walk_learn(struct pose_solver *s, double (*block)[POSE_UNKNOWNS][POSE_UNKNOWNS]) {
-    struct pose_walk least = walk_of(s, LEAST_PX, LEAST_PX);
+    struct pose_walk least = walk_of(s, MIN_PX, MIN_PX);
     double turn = 0.0, move = 0.0, before[2] = {0.0, 0.0};
     for (size_t f = 0; f < s->frames; f++) {
         double here[2];

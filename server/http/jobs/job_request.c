@@ -16,10 +16,10 @@
 #include "server/transport/body.h"
 #include "server/transport/problem.h"
 
-#define PRIORITY_MAX 100        /* either way */
-#define LABELS_MAX 32           /* of a job */
-#define WEBHOOK_SECRET_LEAST 16 /* bytes, both */
-#define WEBHOOK_SECRET_MOST 200
+#define PRIORITY_MAX 100      /* either way */
+#define LABELS_MAX 32         /* of a job */
+#define WEBHOOK_SECRET_MIN 16 /* bytes, both */
+#define WEBHOOK_SECRET_MAX 200
 
 void job_request_release(struct job_request *w) {
     cJSON_Delete(w->body);
@@ -59,9 +59,9 @@ static void read_priority(struct job_request *w, const cJSON *member, cJSON *par
 }
 
 static bool is_key(const char *base64) {
-    unsigned char key[WEBHOOK_KEY_MOST];
+    unsigned char key[WEBHOOK_KEY_MAX];
     size_t size;
-    return base64_decode(base64, strlen(base64), key, sizeof key, &size) && size >= WEBHOOK_KEY_LEAST;
+    return base64_decode(base64, strlen(base64), key, sizeof key, &size) && size >= WEBHOOK_KEY_MIN;
 }
 
 /* {"url", "secret"}: both, and nothing else. */
@@ -74,15 +74,15 @@ static void read_webhook(struct job_request *w, const cJSON *member, cJSON *para
     if (!url || !secret || cJSON_GetArraySize(member) != 2)
         problem_param(params, "webhook", "the secret signs the messages, and so tells them from others'",
                       "must be an object of two texts, url and secret");
-    else if (length < WEBHOOK_SECRET_LEAST || length > WEBHOOK_SECRET_MOST)
-        problem_param(params, "webhook", NULL, "must have a secret of %d to %d bytes", WEBHOOK_SECRET_LEAST,
-                      WEBHOOK_SECRET_MOST);
+    else if (length < WEBHOOK_SECRET_MIN || length > WEBHOOK_SECRET_MAX)
+        problem_param(params, "webhook", NULL, "must have a secret of %d to %d bytes", WEBHOOK_SECRET_MIN,
+                      WEBHOOK_SECRET_MAX);
     else if (strncmp(secret, WEBHOOK_SECRET_PREFIX, strlen(WEBHOOK_SECRET_PREFIX)) == 0 &&
              !is_key(secret + strlen(WEBHOOK_SECRET_PREFIX)))
         problem_param(params, "webhook", "printf 'whsec_%s' \"$(head -c 32 /dev/urandom | base64)\" makes one",
                       "has a secret that begins with " WEBHOOK_SECRET_PREFIX
                       ", but what follows is not the base64 of %d to %d bytes",
-                      WEBHOOK_KEY_LEAST, WEBHOOK_KEY_MOST);
+                      WEBHOOK_KEY_MIN, WEBHOOK_KEY_MAX);
     else if (url_parse(url, &parts, &err) != STATUS_OK)
         problem_param(params, "webhook", NULL, "%s", err.message);
     w->webhook_url = url;

@@ -7,7 +7,7 @@
 
 #include "common/mem.h"
 
-#define LEAST_GAIN 4.0 /* two bits: of the step before the move over that after it */
+#define MIN_GAIN 4.0 /* two bits: of the step before the move over that after it */
 
 void positions_append(struct positions *p, const double at[3]) {
     if (p->count == p->capacity) {
@@ -27,7 +27,7 @@ double positions_step(double coordinate) { return fabs(coordinate) * 0x1p-23; }
 static double centre_of(double lower, double upper) {
     double farthest = fmax(fabs(lower), fabs(upper));
     double centre = round(0.5 * (lower + upper)), left = fmax(upper - centre, centre - lower);
-    bool gains = LEAST_GAIN * left <= farthest; /* false without a vertex */
+    bool gains = MIN_GAIN * left <= farthest; /* false without a vertex */
     return positions_step(farthest) > POSITIONS_STEP_M && gains ? centre : 0.0;
 }
 
