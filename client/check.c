@@ -155,7 +155,7 @@ int check_set_run(struct client *c, const struct options *o) {
         status = client_room_reading_of(o->word + 2, o->word_count - 2, &room.reading, &err);
     if (status == STATUS_OK) {
         room.scene = mem_strdup(o->word[1]);
-        status = client_room_look(&room, &reply, &err);
+        status = client_room_fetch(&room, &reply, &err);
     }
     if (status == STATUS_OK)
         status = client_room_check_again(&room, &reply, &err);

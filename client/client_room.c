@@ -88,7 +88,7 @@ static enum status measure(struct client_room *room, const char *path, struct er
 
 /* --- what is there ------------------------------------------------------------------------ */
 
-enum status client_room_look(struct client_room *room, struct reply *reply, struct error *err) {
+enum status client_room_fetch(struct client_room *room, struct reply *reply, struct error *err) {
     struct buf path;
     buf_init(&path, 4096);
     buf_puts(&path, "/v1/scenes/");
@@ -113,7 +113,7 @@ enum status client_room_open(struct client_room *room, struct client *c, const s
     else
         status = measure(room, path, err);
     if (status == STATUS_OK)
-        status = client_room_look(room, reply, err);
+        status = client_room_fetch(room, reply, err);
     return status == STATUS_NOT_FOUND && reply->code == 404 ? STATUS_OK : status;
 }
 
@@ -186,11 +186,11 @@ enum status client_room_check_again(struct client_room *room, struct reply *repl
 enum status client_room_send(struct client_room *room, struct reply *reply, struct error *err) {
     enum status status = STATUS_OK;
     if (!room->found && !room->pack)
-        return client_room_look(room, reply, err); /* says that there is none */
+        return client_room_fetch(room, reply, err); /* says that there is none */
     if (!room->found) {
         status = upload(room, reply, err);
         if (status == STATUS_OK)
-            status = client_room_look(room, reply, err);
+            status = client_room_fetch(room, reply, err);
         /* An upload that had begun before may have said nothing of it, and jobs may keep the scene as it was. */
         if (status == STATUS_OK && reads_otherwise(room))
             status = client_room_check_again(room, reply, err);
@@ -217,7 +217,7 @@ enum status client_room_wait(struct client_room *room, struct reply *reply, stru
         was_told = was_told || tries == TRIES_MAX;
         if (!request_pause(c->request, tries < TRIES_MAX ? tries : TRIES_MAX, -1.0))
             return error_set(err, STATUS_CANCELLED, "interrupted");
-        status = client_room_look(room, reply, err);
+        status = client_room_fetch(room, reply, err);
         if (status == STATUS_OK)
             answered_at = clock_sec();
         else if (status == STATUS_UNAVAILABLE && clock_sec() - answered_at < patience)

@@ -40,7 +40,7 @@ enum status client_room_open(struct client_room *room, struct client *c, const s
 void client_room_release(struct client_room *room);
 
 /* Asks the server for the scene. */
-enum status client_room_look(struct client_room *room, struct reply *reply, struct error *err);
+enum status client_room_fetch(struct client_room *room, struct reply *reply, struct error *err);
 /* "ready", "" where it is not there; borrowed. */
 const char *client_room_state(const struct client_room *room);
 /* Whether client_room_send changes what the server has: the content, or how it is read. */

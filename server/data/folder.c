@@ -38,7 +38,7 @@ void folder_close(struct folder *f) {
 
 #define MIB ((uint64_t)1 << 20) /* bytes */
 
-enum status folder_check_room(const struct folder *f, uint64_t keep, uint64_t bytes, struct error *err) {
+enum status folder_check_space(const struct folder *f, uint64_t keep, uint64_t bytes, struct error *err) {
     uint64_t room;
     enum status status = file_free_bytes(f->dir, &room, err);
     if (status != STATUS_OK || (room >= keep && room - keep >= bytes))

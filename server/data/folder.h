@@ -23,7 +23,7 @@ struct folder {
 enum status folder_open(struct folder *f, const char *dir, void (*emptied)(void *user), void *user, struct error *err);
 void folder_close(struct folder *f); /* one that is all 0 is allowed */
 /* STATUS_NO_SPACE, with a hint, if less than `keep` bytes would be free after `bytes` more. */
-enum status folder_check_room(const struct folder *f, uint64_t keep, uint64_t bytes, struct error *err);
+enum status folder_check_space(const struct folder *f, uint64_t keep, uint64_t bytes, struct error *err);
 
 /* Creates the folder if it is missing and locks it; *fd holds the lock while it is open. STATUS_CONFLICT when
  * another process has it. From then on files of this process and its workers are unreadable for other users (umask

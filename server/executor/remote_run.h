@@ -1,4 +1,4 @@
-/* remote_run.h -- what remote_runs.c, which keeps the runs, shares with follow.c, which judges by what the site
+/* remote_run.h -- what remote_runs.c, which keeps the runs, shares with remote_follow.c, which judges by what the site
  * says. */
 #ifndef UNBAKE_EXECUTOR_REMOTE_RUN_H
 #define UNBAKE_EXECUTOR_REMOTE_RUN_H
@@ -63,7 +63,7 @@ double remote_due(const struct remote *remote);
 void remote_cancel(struct remote_run *r);
 void remote_decide(struct remote_run *r, enum run_way way, int code, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
-/* 32 random hex digits a 16 bytes; false where the system has none. */
-bool remote_draw(char *hex, size_t digits);
+/* Writes that many (at most 64, even) random hex digits and a NUL; false where the system has no random bytes. */
+bool remote_random_hex(char *hex, size_t digits);
 
 #endif

@@ -1,4 +1,4 @@
-/* remote_runs.c -- see remote.h. This file keeps the runs; follow.c has the rules. */
+/* remote_runs.c -- see remote.h. This file keeps the runs; remote_follow.c has the rules. */
 #include "server/executor/remote.h"
 
 #include <math.h>
@@ -239,7 +239,7 @@ static bool remote_ended(struct run *run, struct run_end *end, run_line_fn *each
 static double remote_cpu_sec(const struct run *run) { return of_const(run)->row.cpu_sec; }
 
 static char *remote_log_tail(const struct run *run, size_t limit) {
-    return mem_printf("%.*s", (int)limit, of_const(run)->row.end.words);
+    return mem_printf("%.*s", (int)limit, of_const(run)->row.end.log_tail);
 }
 
 static size_t remote_poll(const struct run *run, struct pollfd fds[RUN_FDS], double *look_sec) {
@@ -303,7 +303,7 @@ static enum status start(const struct executor *executor, const struct run_work 
     struct remote_row row = {
         .job_id = work->job_id, .number = work->attempt, .lease_sec = (int)m->parts.site->lease_sec};
     *run = NULL;
-    if (!remote_draw(token, 64) || !remote_draw(random, 8))
+    if (!remote_random_hex(token, 64) || !remote_random_hex(random, 8))
         return error_set(err, STATUS_IO, "the system has no random numbers");
     snprintf(row.executor, sizeof row.executor, "%s", m->parts.site->name);
     snprintf(row.name, sizeof row.name, NAME_PREFIX "%lld-%d-%s", (long long)row.job_id, row.number, random);

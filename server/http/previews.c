@@ -46,7 +46,7 @@ struct response *previews_get(struct api *api, struct request *r) {
     if (status == STATUS_OK)
         status = work_file_open_preview(api->config.data_dir, row.id, name, &fd, &err);
     if (status == STATUS_OK)
-        status = digests_look_at(fd, row.id, name, &file, &err);
+        status = digests_identify_file(fd, row.id, name, &file, &err);
     scene_row_release(&row);
     if (status == STATUS_OK)
         return file_reply(r, fd, &file, "image/png");

@@ -11,7 +11,7 @@ static struct response *refuse(const struct request *r, const struct error *err,
 
 static struct response *check_room(struct api *api, const struct request *r, uint64_t keep, uint64_t bytes) {
     struct error err;
-    enum status status = folder_check_room(&api->folder, keep, bytes, &err);
+    enum status status = folder_check_space(&api->folder, keep, bytes, &err);
     return status == STATUS_OK ? NULL : refuse(r, &err, STATUS_NO_SPACE);
 }
 

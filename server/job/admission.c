@@ -11,7 +11,7 @@
 #include "common/kept_pixels.h"
 #include "common/mem.h"
 #include "common/settings.h"
-#include "server/job/memory.h"
+#include "server/job/memory_reduction.h"
 
 /* Memory of a render: of the program with its threads and pictures, and for each byte of the room and the textures in
  * their files. Rooms of 0.5, 1.7, 6 and 36 MiB in files took 23, 27, 65 and 163 MiB, at 320 x 240: 4 to 7.4 times their
@@ -63,7 +63,7 @@ static double bytes_for(const struct job *job, const struct foretold *f) {
     double bytes = f->bytes;
     cJSON *given = cJSON_Parse(job->settings);
     buf_init(&what, 4096);
-    cJSON *reduced = memory_reduce(job->kind, given, job->memory_step, &threads, &what);
+    cJSON *reduced = memory_reduction_apply(job->kind, given, job->memory_step, &threads, &what);
     settings_init(&settings);
     if (settings_apply(&settings, reduced, NULL, NULL) == STATUS_OK) {
         double side = settings_number(&settings, "texture_size"), kept = kept_pixels(&settings, side);

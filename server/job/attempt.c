@@ -11,7 +11,7 @@
 #include "server/data/attempt_folder.h"
 #include "server/data/layout.h"
 #include "server/job/admission.h"
-#include "server/job/fit.h"
+#include "server/job/scene_fit.h"
 #include "server/job/housekeeping.h"
 #include "server/job/orders.h"
 
@@ -128,7 +128,7 @@ static enum status check_scene(struct store *store, const struct job *job, struc
                             scene_id);
         cJSON_Delete(problems);
     } else if (status == STATUS_OK && job->kind == JOB_RECONSTRUCT && !ignores_fit(job->settings) &&
-               fit_check(row, NULL, err) != STATUS_OK) {
+               scene_fit_check(row, NULL, err) != STATUS_OK) {
         status = err->status = STATUS_INPUT;
     }
     return status;

@@ -82,7 +82,7 @@ static enum status next_job(struct dispatch *d, bool is_small, int64_t *id, cons
                             struct error *err) {
     struct job_lane lane = {.small_cost = d->config->small_render_cost, .is_small = is_small};
     for (bool may = false; !may;) {
-        char *names = is_small ? NULL : executors_free(&d->places), *chosen = NULL;
+        char *names = is_small ? NULL : executors_available(&d->places), *chosen = NULL;
         if (!names && !is_small)
             return error_set(err, STATUS_NOT_FOUND, "no place is free");
         charge_all(d);

@@ -70,7 +70,7 @@ static char *list_names(const struct executors *p, bool all) {
 
 char *executors_names(const struct executors *p) { return list_names(p, true); }
 
-char *executors_free(const struct executors *p) { return list_names(p, false); }
+char *executors_available(const struct executors *p) { return list_names(p, false); }
 
 void executors_add(struct executors *p, const struct executor *executor) {
     for (size_t i = 0; i < p->count; i++)

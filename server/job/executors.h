@@ -32,6 +32,6 @@ struct executor_use *executors_for(struct executors *p, const char *chosen);
 /* One more has begun there; NULL: none. */
 void executors_add(struct executors *p, const struct executor *executor);
 /* The names of those where one may begin, as store_job_next takes them; the caller's. NULL: there is none. */
-char *executors_free(const struct executors *p);
+char *executors_available(const struct executors *p);
 
 #endif

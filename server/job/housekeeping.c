@@ -54,7 +54,7 @@ void housekeeping_drop_temporary(const char *dir) {
     mem_free(out);
 }
 
-void housekeeping_tidy_job(const char *data_dir, struct store *store, int64_t job_id, int ended) {
+void housekeeping_clean_job(const char *data_dir, struct store *store, int64_t job_id, int ended) {
     struct error err;
     if (attempt_cleanup(data_dir, store, job_id, ended, &err) != STATUS_OK)
         log_warning("job %lld: what its attempts have left over stays: %s", (long long)job_id, err.message);
@@ -73,7 +73,7 @@ void housekeeping_after_kill(const struct scheduler_config *config, struct store
         enum status status = key->number ? store_remote_get(store, key->job_id, key->number, &row, &err) : STATUS_OK;
         if (status == STATUS_NOT_FOUND) {
             housekeeping_drop_temporary(dir);
-            housekeeping_tidy_job(config->data_dir, store, key->job_id, key->number);
+            housekeeping_clean_job(config->data_dir, store, key->job_id, key->number);
         } else if (status != STATUS_OK) { /* what runs elsewhere goes on, and writes */
             log_warning("what killed jobs left cannot be removed: %s", err.message);
         }
@@ -91,7 +91,7 @@ static enum status drop_checkpoint(const char *data_dir, struct store *store, in
         log_warning("job %lld: %s", (long long)id, err->message);
     enum status status = attempt_folder_drop_checkpoint(data_dir, id, err);
     if (status == STATUS_OK)
-        housekeeping_tidy_job(data_dir, store, id, 0);
+        housekeeping_clean_job(data_dir, store, id, 0);
     status = status == STATUS_OK ? disk_usage_enter_job(store, id, dir, err) : status;
     mem_free(dir);
     return status;

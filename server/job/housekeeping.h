@@ -19,6 +19,6 @@ void housekeeping_after_kill(const struct scheduler_config *config, struct store
 /* Removes files of a job that no output names, and folders of attempts that have nothing left (data/attempt_folder.h).
  * Those of attempts that run stay as they are, but for `ended` (0: none), whose end is still to be entered. Failures
  * are logged. */
-void housekeeping_tidy_job(const char *data_dir, struct store *store, int64_t job_id, int ended);
+void housekeeping_clean_job(const char *data_dir, struct store *store, int64_t job_id, int ended);
 
 #endif

@@ -92,7 +92,7 @@ struct job {
     int64_t created_ms, started_ms, finished_ms; /* Unix time, 0: not yet */
     char *stage;                                 /* last reported; "" before */
     char *restart_from; /* the stage that the next attempt begins with; "": where the last one stopped */
-    int memory_step;    /* how often its working set was reduced; see job/memory.h */
+    int memory_step;    /* how often its working set was reduced; see job/memory_reduction.h */
     bool is_pinned;
     int64_t expires_ms; /* Unix time as of now, 0: never; see store/retention.h */
     int64_t disk_bytes; /* size of its folder at the end of its last attempt; -1: unknown */

@@ -6,8 +6,8 @@
 
 #include "common/render_settings.h"
 #include "server/data/attempt_folder.h"
-#include "server/job/fit.h"
-#include "server/job/memory.h"
+#include "server/job/scene_fit.h"
+#include "server/job/memory_reduction.h"
 
 cJSON *orders_new(const char *kind, const struct scheduler_config *config, int thread_count) {
     cJSON *order = cJSON_CreateObject();
@@ -15,7 +15,7 @@ cJSON *orders_new(const char *kind, const struct scheduler_config *config, int t
     json_add_int(order, "thread_count", thread_count);
     json_add_int(order, "memory_bytes", (int64_t)config->worker_memory_bytes);
     json_add_int(order, "photograph_memory_bytes", (int64_t)config->photograph_memory_bytes);
-    /* a quarter more than what stops jobs (disk.h): its own pixels are not to stop it */
+    /* a quarter more than what stops jobs (disk_watch.h): its own pixels are not to stop it */
     json_add_int(order, "keep_free_bytes", (int64_t)(config->low_disk_bytes + config->low_disk_bytes / 4));
     json_add_bool(order, "sandbox", config->sandbox);
     return order;
@@ -112,12 +112,12 @@ enum status orders_of_job(const struct job_work *work, const struct scheduler_co
         return status;
     struct buf reduced;
     buf_init(&reduced, 4096);
-    cJSON *smaller = memory_reduce(job->kind, settings, job->memory_step, &thread_count, &reduced);
+    cJSON *smaller = memory_reduction_apply(job->kind, settings, job->memory_step, &thread_count, &reduced);
     *order = new_job_order(work, config, thread_count, disk_bytes, smaller);
     if (job->kind == JOB_RENDER)
         add_parts(*order, work, config, done);
     else
-        json_add(*order, "reading", fit_reading(work->scene));
+        json_add(*order, "reading", scene_fit_reading(work->scene));
     if (job->kind == JOB_RECONSTRUCT)
         complete_order(*order, config, &reduced);
     cJSON_Delete(settings);

@@ -15,7 +15,7 @@
 #include "server/job/worker_messages.h"
 #include "server/job/housekeeping.h"
 #include "server/job/disk_usage.h"
-#include "server/job/memory.h"
+#include "server/job/memory_reduction.h"
 #include "server/worker/progress.h"
 
 #define LOG_TAIL_MAX 400 /* bytes */
@@ -126,7 +126,7 @@ static enum status settle_memory(const struct attempt *a, struct store *store, c
     buf_init(&what, 4096);
     buf_init(&reason, 4096);
     buf_puts(&reason, v->reason);
-    if (memory_can_reduce(a->kind, settings, step, a->thread_count, &what)) {
+    if (memory_reduction_is_possible(a->kind, settings, step, a->thread_count, &what)) {
         step++;
         buf_printf(&reason, "; a further attempt works with %s", buf_text(&what));
     }
@@ -273,7 +273,7 @@ static enum status settle_check(struct attempt *a, struct store *store, struct t
     return status;
 }
 
-bool outcome_lacks_room(const struct attempt *a) {
+bool outcome_lacks_space(const struct attempt *a) {
     return a->phase == ATTEMPT_ENDED && a->end.way == RUN_EXIT && a->end.code == PROGRESS_EXIT_NO_SPACE;
 }
 
@@ -310,7 +310,7 @@ enum status outcome_settle(struct attempt *a, struct store *store, struct trash 
     enum status status = make_up(a, store, err);
     if (status == STATUS_OK && a->job_id) {
         take_log(a);
-        housekeeping_tidy_job(a->data_dir, store, a->job_id, a->number);
+        housekeeping_clean_job(a->data_dir, store, a->job_id, a->number);
         status = disk_usage_enter_job(store, a->job_id, a->whole_dir, err);
     }
     if (status == STATUS_OK)

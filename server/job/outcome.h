@@ -8,7 +8,7 @@
 struct trash; /* data/trash.h */
 
 /* Whether an ended attempt ran out of disk space. */
-bool outcome_lacks_room(const struct attempt *a);
+bool outcome_lacks_space(const struct attempt *a);
 
 /* Enters the outcome of an ended attempt and empties it. Where that fails (the disk of state.db is full) the attempt
  * stays ended and is settled later: nothing is lost. What a failed check has unpacked goes to `trash`; where that is

@@ -20,7 +20,7 @@
 #include "common/file.h"
 #include "common/mem.h"
 #include "server/data/layout.h"
-#include "server/job/lines.h"
+#include "server/job/line_reader.h"
 #include "server/job/oom.h"
 #include "server/job/worker_log.h"
 #include "server/worker/progress.h"
@@ -32,9 +32,9 @@
 
 struct process {
     struct run run;
-    pid_t pid;          /* 0: reaped */
-    int pid_fd;         /* readable when the process has ended; -1 on old kernels */
-    struct lines lines; /* of its pipe */
+    pid_t pid;                /* 0: reaped */
+    int pid_fd;               /* readable when the process has ended; -1 on old kernels */
+    struct line_reader lines; /* of its pipe */
     char *log;
     off_t log_start;    /* where this process's part of the log begins */
     double cpu_sec;     /* in all, once it is reaped */
@@ -216,7 +216,7 @@ static enum status start(const struct executor *executor, const struct run_work 
     char *dir = file_join(e->data_dir, work->folder);
     *p = (struct process){.run = {.kind = &kind}, .pid_fd = -1, .oom_kills = oom_kills("")};
     p->log = file_join(e->data_dir, work->log);
-    lines_init(&p->lines, -1);
+    line_reader_init(&p->lines, -1);
     enum status status = write_order(e->data_dir, dir, work, err);
     if (status == STATUS_OK)
         status = spawn_in(p, e->binary, dir, err);
@@ -236,7 +236,7 @@ const struct executor *process_executor_init(struct process_executor *p, const c
 /* --- its lines, and its end ------------------------------------------------------------------ */
 
 static void read_lines(struct process *p, size_t limit, run_line_fn *each, void *user) {
-    lines_read(&p->lines, limit, each, user);
+    line_reader_read(&p->lines, limit, each, user);
     p->run.long_lines = p->lines.dropped;
 }
 
@@ -299,7 +299,7 @@ static double process_cpu_sec(const struct run *run) {
 
 static char *process_log_tail(const struct run *run, size_t limit) {
     const struct process *p = of_const(run);
-    return worker_log_words(p->log, p->log_start, limit);
+    return worker_log_tail(p->log, p->log_start, limit);
 }
 
 static size_t process_poll(const struct run *run, struct pollfd fds[RUN_FDS], double *look_sec) {
@@ -312,7 +312,7 @@ static size_t process_poll(const struct run *run, struct pollfd fds[RUN_FDS], do
 
 static void process_free(struct run *run) {
     struct process *p = of(run);
-    lines_release(&p->lines);
+    line_reader_release(&p->lines);
     if (p->pid_fd >= 0)
         close(p->pid_fd);
     mem_free(p->log);

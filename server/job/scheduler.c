@@ -23,7 +23,7 @@
 #include "server/job/attempt.h"
 #include "server/job/checks.h"
 #include "server/job/deliveries.h"
-#include "server/job/disk.h"
+#include "server/job/disk_watch.h"
 #include "server/job/housekeeping.h"
 #include "server/job/dispatch.h"
 #include "server/job/disk_usage.h"
@@ -66,7 +66,7 @@ enum status scheduler_new(struct scheduler **out, const struct scheduler_config 
     s->config = *config;
     s->store = store;
     s->wake_fd = fd;
-    disk_init(&s->disk, config->low_disk_bytes);
+    disk_watch_init(&s->disk, config->low_disk_bytes);
     if (s->config.thread_count <= 0) {
         cpu_set_t set;
         s->config.thread_count = sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : 1;
@@ -227,7 +227,7 @@ static bool any_alive(const struct scheduler *s) {
 /* While the disk is nearly full, running jobs are stopped at a checkpoint, and queued jobs give the reason. */
 static void watch_disk(struct scheduler *s) {
     struct error err;
-    bool changed = disk_check(&s->disk, s->config.data_dir);
+    bool changed = disk_watch_check(&s->disk, s->config.data_dir);
     atomic_store(&s->waits_for_disk, s->disk.is_low);
     if (!changed && !s->disk.is_low)
         return;
@@ -292,7 +292,7 @@ static void listen_and_settle(struct scheduler *s) {
         struct attempt *a = &s->slot[i];
         struct error err;
         worker_messages_read(a, s->store, &s->counters);
-        bool is_postponed = i >= s->dispatch.job_slots && outcome_lacks_room(a);
+        bool is_postponed = i >= s->dispatch.job_slots && outcome_lacks_space(a);
         if (a->phase == ATTEMPT_ENDED && outcome_settle(a, s->store, s->trash, &s->counters, &err) != STATUS_OK)
             retry_later(s, "cannot record how an attempt ended", &err);
         else if (is_postponed)

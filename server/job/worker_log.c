@@ -65,7 +65,7 @@ enum status worker_log_take(const char *path, const char *from, size_t limit, st
     return status;
 }
 
-char *worker_log_words(const char *path, off_t start, size_t limit) {
+char *worker_log_tail(const char *path, off_t start, size_t limit) {
     char *text = mem_calloc(limit + 1, 1);
     int fd = open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
     if (fd < 0)

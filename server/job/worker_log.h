@@ -16,6 +16,6 @@ enum status worker_log_take(const char *path, const char *from, size_t limit, st
 
 /* The end of what was appended since `start`, at most `limit` bytes, from a whole line on if possible, joined into one
  * line of ASCII; the caller's (mem_free), "" if none. */
-char *worker_log_words(const char *path, off_t start, size_t limit);
+char *worker_log_tail(const char *path, off_t start, size_t limit);
 
 #endif

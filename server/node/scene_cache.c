@@ -12,7 +12,7 @@
 
 #include "common/file.h"
 #include "common/mem.h"
-#include "server/node/cache_room.h"
+#include "server/node/cache_eviction.h"
 #include "server/node/hash.h"
 
 #define WAIT_MS 200  /* between two tries to take a lock */
@@ -198,10 +198,10 @@ static enum status complete(struct cached_scene *scene, const char *cache_dir, u
     uint64_t bytes;
     enum status status = look(scene->files, list, missing, &bytes, source, err);
     if (status == STATUS_OK && bytes > 0)
-        cache_room_make(cache_dir, cache_bytes, bytes);
+        cache_eviction_make_space(cache_dir, cache_bytes, bytes);
     if (status == STATUS_OK)
         status = fetch(scene->files, list, missing, source, err);
-    while (status == STATUS_NO_SPACE && cache_room_give_up(cache_dir)) /* the disk is smaller than was thought */
+    while (status == STATUS_NO_SPACE && cache_eviction_evict_one(cache_dir)) /* the disk is smaller than was thought */
         status = fetch(scene->files, list, missing, source, err);
     scene->fetched_bytes = bytes;
     mem_free(missing);
@@ -244,7 +244,7 @@ enum status scene_cache_take(struct cached_scene *scene, const char *cache_dir, 
     enum status status = make_cache(cache_dir, err);
     if (status == STATUS_OK)
         status = begin(scene, use, fetching, source, &fetch_fd, err);
-    while (status == STATUS_NO_SPACE && cache_room_give_up(cache_dir)) /* even a name takes space */
+    while (status == STATUS_NO_SPACE && cache_eviction_evict_one(cache_dir)) /* even a name takes space */
         status = begin(scene, use, fetching, source, &fetch_fd, err);
     if (status == STATUS_OK)
         status = complete(scene, cache_dir, cache_bytes, list, source, err);

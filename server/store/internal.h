@@ -115,14 +115,14 @@ int64_t store_now_ms(void); /* Unix time */
     " WHEN EXISTS (SELECT 1 FROM attempts WHERE job_id = " job " AND phase = 1) THEN NULL ELSE 0 END)"
 
 /* users.c, while the store is opened: sets has_users. */
-enum status store_look_for_users(struct store *store, struct error *err);
+enum status store_load_has_users(struct store *store, struct error *err);
 
 /* reserve.c, under the mutex: after the database was opened; after it was closed. */
 enum status reserve_open(struct store *store, const char *dir, struct error *err);
 void reserve_close(struct store *store);
 /* Before a commit; after it. Space that cannot be had is tried again after the next. */
-enum status reserve_look(struct store *store, struct error *err);
-void reserve_keep(struct store *store);
+enum status reserve_before_commit(struct store *store, struct error *err);
+void reserve_after_commit(struct store *store);
 /* Before an ordinary transaction: STATUS_NO_SPACE while space is tight. */
 enum status reserve_check(struct store *store, struct error *err);
 

@@ -42,7 +42,7 @@ static void fill(struct remote_row *row, sqlite3_stmt *stmt) {
     COPY(row->end.way, 17);
     row->end.code = sqlite3_column_int(stmt, 18);
     COPY(row->end.reason, 19);
-    COPY(row->end.words, 20);
+    COPY(row->end.log_tail, 20);
 }
 
 enum status remote_row_read(struct store *store, int64_t job_id, int number, struct remote_row *row,

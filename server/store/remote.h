@@ -50,7 +50,7 @@ struct remote_end {
     char way[16];     /* "exit", "signal", "memory", "lost", "refused" or "preempted"; "": it has not ended */
     int code;         /* exit: the status; signal: its number */
     char reason[256]; /* in words for users; may be "" */
-    char words[REMOTE_LOG_TAIL_SIZE]; /* the last that its worker printed; may be "" */
+    char log_tail[REMOTE_LOG_TAIL_SIZE]; /* the last lines that its worker printed; may be "" */
 };
 
 struct remote_row {

@@ -112,7 +112,7 @@ static enum status enter_end(struct store *store, const struct remote_key *key, 
     return sql_run(&store->sql, err,
                    "UPDATE remote SET phase = ?, end_way = ?, end_code = ?, end_reason = ?, end_words = ?"
                    " WHERE job_id = ? AND part = 0 AND number = ?",
-                   "ntnttin", (int)REMOTE_ENDED, end->way, end->code, end->reason, end->words, key->job_id,
+                   "ntnttin", (int)REMOTE_ENDED, end->way, end->code, end->reason, end->log_tail, key->job_id,
                    key->number);
 }
 

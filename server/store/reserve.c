@@ -94,11 +94,11 @@ static bool extend_database(struct store *store) {
              (file_free_bytes(r->dir, &room, NULL) == STATUS_OK && room < (uint64_t)r->cushion_bytes));
 }
 
-enum status reserve_look(struct store *store, struct error *err) {
+enum status reserve_before_commit(struct store *store, struct error *err) {
     return sql_int(&store->sql, 0, &store->reserve.pages_used, err, "PRAGMA page_count", "");
 }
 
-void reserve_keep(struct store *store) {
+void reserve_after_commit(struct store *store) {
     struct reserve *r = &store->reserve;
     bool was_tight = r->is_tight;
     r->is_tight = !(extend_wal(store) && extend_database(store));
@@ -110,7 +110,7 @@ void reserve_keep(struct store *store) {
 
 enum status reserve_check(struct store *store, struct error *err) {
     if (store->reserve.is_tight)
-        reserve_keep(store);
+        reserve_after_commit(store);
     if (!store->reserve.is_tight)
         return STATUS_OK;
     error_set(err, STATUS_NO_SPACE, "%s: the disk is full", store->sql.path);

@@ -73,7 +73,7 @@ enum status store_open(struct store **out, const char *dir, struct error *err) {
     if (status == STATUS_OK)
         status = migrate(store, err);
     if (status == STATUS_OK)
-        status = store_look_for_users(store, err);
+        status = store_load_has_users(store, err);
     /* Do not overwrite freed pages, as Debian's SQLite does by default: it costs writes. */
     if (status == STATUS_OK)
         status = sql_script(&store->sql, "PRAGMA secure_delete=FAST", err);

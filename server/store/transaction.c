@@ -51,12 +51,12 @@ enum status store_begin_freeing(struct store *store, struct error *err) { return
 enum status store_end(struct store *store, enum status status, int64_t changed_job, struct error *err) {
     bool is_part = store->group.is_open;
     if (status == STATUS_OK)
-        status = reserve_look(store, err);
+        status = reserve_before_commit(store, err);
     status = end_sql(store, status, err);
     if (status == STATUS_OK && is_part && changed_job != STORE_NOTHING_CHANGED)
         store->group.changed = changed_job;
     if (status == STATUS_OK && !is_part)
-        reserve_keep(store);
+        reserve_after_commit(store);
     store_unlock(store);
     if (status == STATUS_OK && !is_part && changed_job != STORE_NOTHING_CHANGED && store->changed)
         store->changed(store->changed_user, changed_job);

@@ -66,7 +66,7 @@ enum status store_scene_access(struct store *store, const struct caller *who, co
 
 bool store_has_users(struct store *store) { return atomic_load(&store->has_users); }
 
-enum status store_look_for_users(struct store *store, struct error *err) {
+enum status store_load_has_users(struct store *store, struct error *err) {
     int64_t found;
     enum status status = sql_int(&store->sql, 0, &found, err, "SELECT 1 FROM users LIMIT 1", "");
     atomic_store(&store->has_users, found != 0);

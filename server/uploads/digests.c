@@ -96,8 +96,8 @@ static void make_tag(const char *thing, const char *name, const struct file_vers
     mem_free(text);
 }
 
-enum status digests_look(struct digests *d, int64_t job_id, const struct output_row *row, int fd,
-                         struct digests_file *file, struct error *err) {
+enum status digests_identify(struct digests *d, int64_t job_id, const struct output_row *row, int fd,
+                             struct digests_file *file, struct error *err) {
     struct file_version v;
     *file = (struct digests_file){0};
     enum status status = look(fd, &v, err);
@@ -120,7 +120,8 @@ enum status digests_look(struct digests *d, int64_t job_id, const struct output_
     return status;
 }
 
-enum status digests_look_at(int fd, const char *thing, const char *name, struct digests_file *file, struct error *err) {
+enum status digests_identify_file(int fd, const char *thing, const char *name, struct digests_file *file,
+                                  struct error *err) {
     struct file_version v;
     *file = (struct digests_file){0};
     enum status status = look(fd, &v, err);

@@ -37,12 +37,13 @@ struct digests_file {
     char hex[SHA256_HEX_SIZE]; /* "": not known yet; it has been requested */
 };
 /* Identifies an output's open file, without moving its offset. STATUS_UNAVAILABLE when it changed during the call. */
-enum status digests_look(struct digests *d, int64_t job_id, const struct output_row *row, int fd,
-                         struct digests_file *file, struct error *err);
+enum status digests_identify(struct digests *d, int64_t job_id, const struct output_row *row, int fd,
+                             struct digests_file *file, struct error *err);
 
 /* The same for a file that is not an output; `thing` and `name` identify it. Files above DIGESTS_AT_ONCE get no
  * digest. */
-enum status digests_look_at(int fd, const char *thing, const char *name, struct digests_file *file, struct error *err);
+enum status digests_identify_file(int fd, const char *thing, const char *name, struct digests_file *file,
+                                  struct error *err);
 
 /* Hashes the open file. Once *stopping (may be NULL) is true it returns STATUS_CANCELLED. *version is the version
  * hashed; STATUS_UNAVAILABLE when it changed meanwhile. */

@@ -171,7 +171,7 @@ static void check_reports(struct rig *rig) {
     struct remote_row row;
     CHECK(store_remote_get(rig->store, job, number, &row, &err) == STATUS_OK);
     CHECK(row.end.code == 85 && row.cpu_sec == 3.5 && row.last_seq == 3);
-    CHECK_STRING(row.end.words, "bye");
+    CHECK_STRING(row.end.log_tail, "bye");
     /* Nothing after the end. */
     IS(post(rig, "report", ANN, "{\"seq\":4}"), 409);
     IS(post(rig, "end", ANN, "{\"seq\":4,\"way\":\"exit\"}"), 409);

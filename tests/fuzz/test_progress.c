@@ -9,7 +9,7 @@
 #include "common/mem.h"
 #include "server/http/views.h"
 #include "server/job/worker_messages.h"
-#include "server/job/lines.h"
+#include "server/job/line_reader.h"
 #include "server/job/outcome.h"
 #include "server/job/counters.h"
 #include "server/worker/progress.h"
@@ -59,7 +59,7 @@ static int pipe_of(const uint8_t *data, size_t size) {
 /* A run that has said the bytes, and has ended. */
 struct said {
     struct run run;
-    struct lines lines;
+    struct line_reader lines;
     struct run_end end;
 };
 
@@ -67,7 +67,7 @@ static struct said *said_of(struct run *run) { return (struct said *)(void *)run
 
 static void said_read(struct run *run, run_line_fn *each, void *user) {
     struct said *said = said_of(run);
-    lines_read(&said->lines, SIZE_MAX, each, user);
+    line_reader_read(&said->lines, SIZE_MAX, each, user);
     run->long_lines = said->lines.dropped;
 }
 
@@ -88,7 +88,7 @@ static char *said_last_words(const struct run *run, size_t limit) {
 }
 
 static void said_free(struct run *run) {
-    lines_release(&said_of(run)->lines);
+    line_reader_release(&said_of(run)->lines);
     mem_free(run);
 }
 
@@ -100,7 +100,7 @@ static struct said *said_new(const uint8_t *data, size_t size) {
                                          .free = said_free};
     struct said *said = mem_calloc(1, sizeof *said);
     said->run.kind = &kind;
-    lines_init(&said->lines, pipe_of(data, size));
+    line_reader_init(&said->lines, pipe_of(data, size));
     return said;
 }
 

@@ -401,7 +401,7 @@ static enum status back_up(void) {
     mem_free(path);
     return status;
 }
-static enum status look_for_users(void) { return store_look_for_users(store, &err); }
+static enum status look_for_users(void) { return store_load_has_users(store, &err); }
 
 static const struct step {
     const char *name;

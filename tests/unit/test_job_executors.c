@@ -64,11 +64,11 @@ static void test_places(void) {
     CHECK(!executors_for(&e, "pbs") && executors_find(&e, "slurm") && !executors_find(&e, "pbs"));
     executors_count(&e, slots, 3); /* one that is still to be settled has its place */
     CHECK(executors_for(&e, "")->executor == &here && !executors_for(&e, "slurm"));
-    char *names = executors_free(&e);
+    char *names = executors_available(&e);
     CHECK_STRING(names, " process ");
     mem_free(names);
     executors_add(&e, &here);
-    CHECK(!executors_for(&e, "") && !executors_free(&e));
+    CHECK(!executors_for(&e, "") && !executors_available(&e));
     executors_release(&e);
 
     /* This machine is not in the list: it takes what must run here, and nothing else. */

@@ -9,7 +9,7 @@
 #include "common/file.h"
 #include "common/mem.h"
 #include "common/sha256.h"
-#include "server/node/cache_room.h"
+#include "server/node/cache_eviction.h"
 #include "server/node/scene_cache.h"
 #include "tests/check.h"
 #include "tests/system_faults.h"
@@ -210,7 +210,7 @@ static void test_room(void) {
     OK(use(&s, SCENE_C, 0));
     CHECK(system_faults_lift() && has(SCENE_A) && !has(SCENE_B) && has(SCENE_C));
     set_age(SCENE_C, 1000);
-    CHECK(cache_room_give_up(dir));
+    CHECK(cache_eviction_evict_one(dir));
     OK(use(&s, SCENE_B, 0));
     s = (struct store){.full = 99};
     CHECK(use(&s, SCENE_C, 0) == STATUS_NO_SPACE);
@@ -225,7 +225,7 @@ static void test_together(void) {
             struct cached_scene scene;
             for (int k = 0; k < 30; k++) {
                 if (i >= 4) {
-                    cache_room_give_up(dir);
+                    cache_eviction_evict_one(dir);
                     continue;
                 }
                 OK(take(&s, SCENE_A, 0, &scene));

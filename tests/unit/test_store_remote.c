@@ -86,10 +86,10 @@ static void check_life(struct store *store) {
     CHECK(count_lines(store, &key, "one\ntwo\nthree\n") == 3);
     OK(store_remote_get(store, key.job_id, key.number, &row, &err));
     CHECK(row.last_seq == 3 && row.cpu_sec == 2.5 && row.heard_count == 5);
-    struct remote_end end = {.way = "exit", .code = 0, .words = "bye"};
+    struct remote_end end = {.way = "exit", .code = 0, .log_tail = "bye"};
     OK(store_remote_end(store, &key, 4, &end, 3.0, &err));
     OK(store_remote_get(store, key.job_id, key.number, &row, &err));
-    CHECK(row.phase == REMOTE_ENDED && strcmp(row.end.way, "exit") == 0 && strcmp(row.end.words, "bye") == 0);
+    CHECK(row.phase == REMOTE_ENDED && strcmp(row.end.way, "exit") == 0 && strcmp(row.end.log_tail, "bye") == 0);
     OK(store_job_succeed(store, key.job_id, key.number, "", &err));
 }
 
@@ -233,7 +233,7 @@ static void fill_disk(struct store *store, bool is_full) {
     static int64_t cushion;
     cushion = is_full ? store->reserve.cushion_bytes : cushion;
     store->reserve.cushion_bytes = is_full ? INT64_C(1) << 60 : cushion; /* no disk has that */
-    reserve_keep(store);
+    reserve_after_commit(store);
     CHECK(store->reserve.is_tight == is_full);
 }
 

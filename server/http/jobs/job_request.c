@@ -12,7 +12,7 @@
 #include "common/utf8.h"
 #include "server/http/api.h"
 #include "server/http/retention.h"
-#include "server/job/fit.h"
+#include "server/job/scene_fit.h"
 #include "server/transport/body.h"
 #include "server/transport/problem.h"
 
@@ -221,7 +221,7 @@ struct response *job_request_fit(const struct request *r, const struct scene_row
                                  const struct settings *settings) {
     struct error err;
     cJSON *remedy;
-    if (settings_is(settings, "fit", "ignore") || fit_check(scene, &remedy, &err) == STATUS_OK)
+    if (settings_is(settings, "fit", "ignore") || scene_fit_check(scene, &remedy, &err) == STATUS_OK)
         return NULL;
     cJSON *members = cJSON_CreateObject();
     json_add(members, "remedy", remedy ? remedy : cJSON_CreateNull());

@@ -54,7 +54,7 @@ static struct response *send_file(struct api *api, const struct request *r, int6
     struct digests_file file;
     struct error err;
     struct response *reply = NULL;
-    if (digests_look(api->digests, job_id, row, fd, &file, &err) != STATUS_OK) {
+    if (digests_identify(api->digests, job_id, row, fd, &file, &err) != STATUS_OK) {
         reply = problem_from(r, &err);
     } else if (is_too_early(r, &file)) {
         reply = problem(r, 503, "the file's digest is being computed");

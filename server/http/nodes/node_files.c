@@ -37,7 +37,7 @@ static struct response *send_file(const struct request *r, enum status status, i
                                   const char *name, struct error *err) {
     struct digests_file file;
     if (status == STATUS_OK)
-        status = digests_look_at(fd, thing, name, &file, err);
+        status = digests_identify_file(fd, thing, name, &file, err);
     if (status == STATUS_OK)
         return file_reply(r, fd, &file, "application/octet-stream");
     if (fd >= 0)

@@ -163,7 +163,7 @@ static struct response *end(struct api *api, struct request *r, const struct nod
     if (status == STATUS_OK)
         status = copy_text(body, "reason", told.reason, sizeof told.reason, &err);
     if (status == STATUS_OK)
-        status = copy_text(body, "last_words", told.words, sizeof told.words, &err);
+        status = copy_text(body, "last_words", told.log_tail, sizeof told.log_tail, &err);
     if (status == STATUS_OK)
         status = json_number(body, "code", "the end", 0.0, &code, &err);
     size_t way = 0;

@@ -1,5 +1,6 @@
-/* fit.c -- see fit.h. The facts come from a worker that has parsed untrusted files: no member is taken for granted. */
-#include "server/job/fit.h"
+/* scene_fit.c -- see scene_fit.h. The facts come from a worker that has parsed untrusted files: no member is taken for
+ * granted. */
+#include "server/job/scene_fit.h"
 
 #include <string.h>
 
@@ -12,7 +13,7 @@ static const char *text_of(const cJSON *object, const char *key) {
     return text ? text : "";
 }
 
-enum status fit_check(const struct scene_row *scene, cJSON **remedy, struct error *err) {
+enum status scene_fit_check(const struct scene_row *scene, cJSON **remedy, struct error *err) {
     cJSON *facts = cJSON_Parse(scene->facts);
     const cJSON *fit = cJSON_GetObjectItemCaseSensitive(facts, "fit");
     const cJSON *known = cJSON_GetObjectItemCaseSensitive(fit, "remedy");
@@ -42,7 +43,7 @@ enum status fit_check(const struct scene_row *scene, cJSON **remedy, struct erro
     return status;
 }
 
-cJSON *fit_reading(const struct scene_row *scene) {
+cJSON *scene_fit_reading(const struct scene_row *scene) {
     cJSON *facts = cJSON_Parse(scene->facts);
     cJSON *reading = cJSON_DetachItemFromObjectCaseSensitive(facts, "reading");
     if (!cJSON_IsObject(reading)) {

@@ -1,5 +1,5 @@
-/* disk.c -- see disk.h. */
-#include "server/job/disk.h"
+/* disk_watch.c -- see disk_watch.h. */
+#include "server/job/disk_watch.h"
 
 #include <stdio.h>
 
@@ -7,13 +7,13 @@
 #include "common/file.h"
 #include "common/log.h"
 
-void disk_init(struct disk_watch *w, uint64_t low_bytes) {
+void disk_watch_init(struct disk_watch *w, uint64_t low_bytes) {
     *w = (struct disk_watch){.low_bytes = low_bytes};
     snprintf(w->reason, sizeof w->reason, DISK_REASON ": less than %llu MiB are free",
              (unsigned long long)(low_bytes >> 20));
 }
 
-bool disk_check(struct disk_watch *w, const char *dir) {
+bool disk_watch_check(struct disk_watch *w, const char *dir) {
     struct error err;
     uint64_t room;
     bool was_low = w->is_low, first = !w->was_seen;

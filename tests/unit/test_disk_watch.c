@@ -1,6 +1,6 @@
 /* test_disk.c -- when the disk counts as nearly full, and when no more: not by the same figure, lest jobs stop and go
  * on all the time. */
-#include "server/job/disk.h"
+#include "server/job/disk_watch.h"
 
 #include <errno.h>
 #include <sys/statvfs.h>
@@ -28,12 +28,12 @@ static struct disk_watch watch;
 static bool look(uint64_t bytes) {
     room = bytes;
     watch.looked_at = -1e9;
-    return disk_check(&watch, "/");
+    return disk_watch_check(&watch, "/");
 }
 
 int main(void) {
     log_set_level(LOG_ERROR);
-    disk_init(&watch, LOW);
+    disk_watch_init(&watch, LOW);
     CHECK(look(900 * MIB) && !watch.is_low); /* the first look is told */
     CHECK(!look(LOW) && !watch.is_low);
     CHECK(look(LOW - MIB) && watch.is_low);
@@ -48,9 +48,9 @@ int main(void) {
     CHECK(look(0) && watch.is_low);
     /* Not before its time. */
     room = 2 * LOW;
-    CHECK(!disk_check(&watch, "/") && watch.is_low);
+    CHECK(!disk_watch_check(&watch, "/") && watch.is_low);
 
-    disk_init(&watch, 0);
+    disk_watch_init(&watch, 0);
     CHECK(look(0) && !watch.is_low); /* 0: never */
     return check_result();
 }

@@ -1,5 +1,5 @@
-/* memory.c -- see memory.h. */
-#include "server/job/memory.h"
+/* memory_reduction.c -- see memory_reduction.h. */
+#include "server/job/memory_reduction.h"
 
 #include <string.h>
 
@@ -23,7 +23,8 @@ static void replace(cJSON *settings, const char *name, double present, double sm
     buf_printf(what, "%s%s %.0f", what->length ? ", " : "", name, smaller);
 }
 
-cJSON *memory_reduce(enum job_kind kind, const cJSON *settings, int step, int *thread_count, struct buf *what) {
+cJSON *memory_reduction_apply(enum job_kind kind, const cJSON *settings, int step, int *thread_count,
+                              struct buf *what) {
     cJSON *smaller = cJSON_Duplicate(settings, true);
     struct settings full;
     int threads = (int)halved(*thread_count, step, 1.0);
@@ -41,13 +42,14 @@ cJSON *memory_reduce(enum job_kind kind, const cJSON *settings, int step, int *t
     return smaller;
 }
 
-bool memory_can_reduce(enum job_kind kind, const cJSON *settings, int step, int thread_count, struct buf *what) {
+bool memory_reduction_is_possible(enum job_kind kind, const cJSON *settings, int step, int thread_count,
+                                  struct buf *what) {
     struct buf present;
     int threads = thread_count;
     buf_init(&present, 4096);
-    cJSON_Delete(memory_reduce(kind, settings, step, &threads, &present));
+    cJSON_Delete(memory_reduction_apply(kind, settings, step, &threads, &present));
     threads = thread_count;
-    cJSON_Delete(memory_reduce(kind, settings, step + 1, &threads, what));
+    cJSON_Delete(memory_reduction_apply(kind, settings, step + 1, &threads, what));
     bool differs = strcmp(buf_text(&present), buf_text(what)) != 0;
     buf_release(&present);
     return differs;

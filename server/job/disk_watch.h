@@ -1,9 +1,9 @@
-/* disk.h -- whether the disk of the data folder is so full that work must wait.
+/* disk_watch.h -- whether the disk of the data folder is so full that work must wait.
  *
  *      enough ──(less than low_bytes free)──> low ──(a quarter more than that free)──> enough
  */
-#ifndef UNBAKE_JOB_DISK_H
-#define UNBAKE_JOB_DISK_H
+#ifndef UNBAKE_JOB_DISK_WATCH_H
+#define UNBAKE_JOB_DISK_WATCH_H
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -21,8 +21,8 @@ struct disk_watch {
 #define DISK_REASON "the disk is nearly full" /* the beginning of every such reason */
 #define DISK_HINT "It goes on by itself when there is room: delete jobs or scenes that nobody needs."
 
-void disk_init(struct disk_watch *w, uint64_t low_bytes);
+void disk_watch_init(struct disk_watch *w, uint64_t low_bytes);
 /* Measures at most every DISK_LOOK_SEC. True when is_low has changed, and the first time. */
-bool disk_check(struct disk_watch *w, const char *dir);
+bool disk_watch_check(struct disk_watch *w, const char *dir);
 
 #endif

@@ -1,4 +1,5 @@
-/* follow.c -- what a site's commands say of its attempts, and what follows from it; the rules are in remote.h. */
+/* remote_follow.c -- what a site's commands say of its attempts, and what follows from it; the rules are in remote.h.
+ */
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -19,7 +20,7 @@ static bool is_silent(const struct remote_run *r) {
     return now_sec(r->remote) - r->heard_at >= LEASE_FACTOR * r->row.lease_sec;
 }
 
-bool remote_draw(char *hex, size_t digits) {
+bool remote_random_hex(char *hex, size_t digits) {
     unsigned char bytes[32];
     if (digits > 2 * sizeof bytes || getrandom(bytes, digits / 2, 0) != (ssize_t)(digits / 2))
         return false;
@@ -268,7 +269,7 @@ static void submit_again(struct remote_run *r) {
                       r->fault[0] ? r->fault : "no reason is known");
         return;
     }
-    if (!remote_draw(token, 64) || !remote_draw(random, 8))
+    if (!remote_random_hex(token, 64) || !remote_random_hex(random, 8))
         return;
     char digest[SHA256_HEX_SIZE], fresh[REMOTE_NAME_SIZE];
     sha256_of(token, 64, digest);

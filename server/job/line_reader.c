@@ -1,5 +1,5 @@
-/* lines.c -- see lines.h. */
-#include "server/job/lines.h"
+/* line_reader.c -- see line_reader.h. */
+#include "server/job/line_reader.h"
 
 #include <errno.h>
 #include <string.h>
@@ -7,18 +7,18 @@
 
 #include "server/worker/progress.h"
 
-void lines_init(struct lines *l, int fd) {
-    *l = (struct lines){.fd = fd};
+void line_reader_init(struct line_reader *l, int fd) {
+    *l = (struct line_reader){.fd = fd};
     buf_init(&l->line, PROGRESS_LINE_MAX);
 }
 
-void lines_release(struct lines *l) {
+void line_reader_release(struct line_reader *l) {
     if (l->fd >= 0)
         close(l->fd);
     buf_release(&l->line);
 }
 
-static void take(struct lines *l, const char *data, size_t length, run_line_fn *each, void *user) {
+static void take(struct line_reader *l, const char *data, size_t length, run_line_fn *each, void *user) {
     while (length > 0) {
         const char *newline = memchr(data, '\n', length);
         size_t part = newline ? (size_t)(newline - data) : length;
@@ -37,7 +37,7 @@ static void take(struct lines *l, const char *data, size_t length, run_line_fn *
     }
 }
 
-void lines_read(struct lines *l, size_t limit, run_line_fn *each, void *user) {
+void line_reader_read(struct line_reader *l, size_t limit, run_line_fn *each, void *user) {
     char chunk[16384];
     for (size_t total = 0; l->fd >= 0 && total < limit;) {
         ssize_t got = read(l->fd, chunk, sizeof chunk);

@@ -1,5 +1,5 @@
-/* cache_room.c -- see cache_room.h. */
-#include "server/node/cache_room.h"
+/* cache_eviction.c -- see cache_eviction.h. */
+#include "server/node/cache_eviction.h"
 
 #include <fcntl.h>
 #include <stdlib.h>
@@ -72,7 +72,7 @@ static bool give_up(const struct kept *kept) {
     return is_gone;
 }
 
-void cache_room_make(const char *cache_dir, uint64_t cache_bytes, uint64_t bytes) {
+void cache_eviction_make_space(const char *cache_dir, uint64_t cache_bytes, uint64_t bytes) {
     size_t count;
     uint64_t kept_bytes = 0, files, size;
     if (cache_bytes == 0 || file_tree_size(cache_dir, &files, &kept_bytes, NULL) != STATUS_OK)
@@ -84,7 +84,7 @@ void cache_room_make(const char *cache_dir, uint64_t cache_bytes, uint64_t bytes
     free_kept(list, count);
 }
 
-bool cache_room_give_up(const char *cache_dir) {
+bool cache_eviction_evict_one(const char *cache_dir) {
     size_t count;
     bool is_gone = false;
     struct kept *list = list_kept(cache_dir, &count);

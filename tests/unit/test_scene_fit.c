@@ -1,6 +1,6 @@
-/* server/job/fit.h: a job reads its scene as the check has found that it is to be read, else as it was given, whatever
- * a worker has told; and is refused where mesh and photographs do not fit. */
-#include "server/job/fit.h"
+/* server/job/scene_fit.h: a job reads its scene as the check has found that it is to be read, else as it was given,
+ * whatever a worker has told; and is refused where mesh and photographs do not fit. */
+#include "server/job/scene_fit.h"
 
 #include "common/mem.h"
 #include "server/store/store.h"
@@ -8,7 +8,7 @@
 
 static void check_reading(const char *facts, const char *given, const char *wanted) {
     struct scene_row row = {.facts = (char *)(uintptr_t)facts, .reading = (char *)(uintptr_t)given};
-    cJSON *reading = fit_reading(&row);
+    cJSON *reading = scene_fit_reading(&row);
     char *text = json_text(reading);
     CHECK_STRING(text, wanted);
     mem_free(text);
@@ -19,13 +19,13 @@ static void check_fit(const char *facts, enum status wanted, const char *part, c
     struct scene_row row = {.id = "0123456789abcdef", .facts = (char *)(uintptr_t)facts};
     struct error err = {.message = ""};
     cJSON *known;
-    CHECK_THAT(fit_check(&row, &known, &err) == wanted, "%s: %s", facts, err.message);
+    CHECK_THAT(scene_fit_check(&row, &known, &err) == wanted, "%s: %s", facts, err.message);
     CHECK_THAT(strstr(err.message, part) || strstr(err.hint, part), "%s: %s; %s", facts, err.message, err.hint);
     char *text = known ? json_text(known) : mem_strdup("");
     CHECK_STRING(text, remedy);
     mem_free(text);
     cJSON_Delete(known);
-    CHECK(fit_check(&row, NULL, &err) == wanted);
+    CHECK(scene_fit_check(&row, NULL, &err) == wanted);
 }
 
 int main(void) {
