@@ -1,12 +1,14 @@
 /* new_job.c -- see new_job.h. */
 #include "client/new_job.h"
 
-#include <errno.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/random.h>
 
 #include "common/mem.h"
+#include "common/random_hex.h"
+
+#define KEY_DIGITS 32 /* 128 bits: no two submissions of anybody draw the same */
 
 enum status label_add(cJSON *labels, const char *text, struct error *err) {
     const char *equals = strchr(text, '=');
@@ -55,12 +57,10 @@ enum status new_job_describe(cJSON *job, const struct options *o,
 }
 
 enum status new_job_queue(struct client *c, const cJSON *job, struct reply *reply, struct error *err) {
-    unsigned char random[16];
-    char header[64] = "Idempotency-Key: ";
-    if (getrandom(random, sizeof random, 0) != (ssize_t)sizeof random)
-        return error_set_errno(err, errno, "cannot get random numbers");
-    for (size_t i = 0; i < sizeof random; i++)
-        snprintf(header + 17 + 2 * i, 3, "%02x", random[i]);
+    char key[KEY_DIGITS + 1], header[64];
+    if (random_hex(key, KEY_DIGITS, err) != STATUS_OK)
+        return err->status;
+    snprintf(header, sizeof header, "Idempotency-Key: %s", key);
     struct request_call call = {
         .method = "POST", .path = "/v1/jobs", .header = {header}, .body = job, .same_twice = true};
     return request_run(c->request, &call, reply, err);

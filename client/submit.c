@@ -8,7 +8,6 @@
  * 4. Jobs of one command have one label `group`. Where the user has named it, jobs that are in the group already are
  *    not queued again: a command that was interrupted may be repeated. */
 #include <string.h>
-#include <sys/random.h>
 
 #include "client/client_room.h"
 #include "client/commands.h"
@@ -18,6 +17,7 @@
 #include "client/new_job.h"
 #include "common/mem.h"
 #include "common/protocol.h"
+#include "common/random_hex.h"
 #include "common/settings.h"
 
 const struct command_option submit_options[] = {
@@ -34,6 +34,7 @@ const struct command_option submit_options[] = {
     {0},
 };
 
+#define GROUP_DIGITS 8     /* hex, of its value: no two groups of a user have one */
 #define GROUP "group"      /* label of what was submitted together */
 #define NAME_MAX_BYTES 200 /* of a job's name, as the server takes it */
 
@@ -58,7 +59,7 @@ static const char *group_of(const struct submission *s) {
 
 /* Finds what is in the group already, or makes one. */
 static enum status join_group(struct submission *s, struct reply *reply, struct error *err) {
-    uint32_t random = 0;
+    char name[GROUP_DIGITS + 1];
     if (*group_of(s)) {
         struct buf path;
         buf_init(&path, 1024);
@@ -68,12 +69,10 @@ static enum status join_group(struct submission *s, struct reply *reply, struct 
         buf_release(&path);
         return status;
     }
-    if (getrandom(&random, sizeof random, 0) != (ssize_t)sizeof random)
-        return error_set(err, STATUS_IO, "cannot get random numbers");
-    char *name = mem_printf("%08x", (unsigned)random);
-    json_add_string(cJSON_GetObjectItemCaseSensitive(s->base, "labels"), GROUP, name);
-    mem_free(name);
-    return STATUS_OK;
+    enum status status = random_hex(name, GROUP_DIGITS, err);
+    if (status == STATUS_OK)
+        json_add_string(cJSON_GetObjectItemCaseSensitive(s->base, "labels"), GROUP, name);
+    return status;
 }
 
 /* The body of POST /v1/jobs for one combination on the room; the caller's. */

@@ -5,10 +5,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/random.h>
 
 #include "common/log.h"
 #include "common/mem.h"
+#include "common/random_hex.h"
 #include "server/executor/remote_run.h"
 
 #define LEASE_FACTOR 1.5 /* of the lease: what the node stops at, this side waits for half as long again */
@@ -18,15 +18,6 @@ static double now_sec(const struct remote *m) { return m->parts.now(m->parts.use
 
 static bool is_silent(const struct remote_run *r) {
     return now_sec(r->remote) - r->heard_at >= LEASE_FACTOR * r->row.lease_sec;
-}
-
-bool remote_random_hex(char *hex, size_t digits) {
-    unsigned char bytes[32];
-    if (digits > 2 * sizeof bytes || getrandom(bytes, digits / 2, 0) != (ssize_t)(digits / 2))
-        return false;
-    for (size_t i = 0; i < digits / 2; i++)
-        snprintf(hex + 2 * i, 3, "%02x", bytes[i]);
-    return true;
 }
 
 void remote_decide(struct remote_run *r, enum run_way way, int code, const char *format, ...) {
@@ -262,17 +253,18 @@ void remote_receive(struct remote *m) {
 static void submit_again(struct remote_run *r) {
     struct remote *m = r->remote;
     const char *name = m->parts.site->name;
-    char token[65], random[9];
+    char token[REMOTE_TOKEN_DIGITS + 1], random[REMOTE_NAME_DIGITS + 1];
     struct error err;
     if (r->tries >= REMOTE_TRIES_MAX) {
         remote_decide(r, RUN_REFUSED, 0, "%s does not take it: %.190s", name,
                       r->fault[0] ? r->fault : "no reason is known");
         return;
     }
-    if (!remote_random_hex(token, 64) || !remote_random_hex(random, 8))
+    if (random_hex(token, REMOTE_TOKEN_DIGITS, &err) != STATUS_OK ||
+        random_hex(random, REMOTE_NAME_DIGITS, &err) != STATUS_OK)
         return;
     char digest[SHA256_HEX_SIZE], fresh[REMOTE_NAME_SIZE];
-    sha256_of(token, 64, digest);
+    sha256_of(token, REMOTE_TOKEN_DIGITS, digest);
     snprintf(fresh, sizeof fresh, NAME_PREFIX "%lld-%d-%s", (long long)r->row.job_id, r->row.number, random);
     enum status status = store_remote_rename(m->parts.store, r->row.job_id, r->row.number, fresh, digest, &err);
     if (status == STATUS_OK) {

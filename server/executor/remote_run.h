@@ -7,6 +7,9 @@
 #include "server/executor/remote.h"
 #include "server/store/remote.h"
 
+#define REMOTE_TOKEN_DIGITS 64 /* hex digits of an attempt's token: 256 bits, nobody guesses it */
+#define REMOTE_NAME_DIGITS 8   /* that end its name, so that no two submissions of an attempt have one */
+
 enum submit_state {
     SUBMISSION_SENT,   /* the command is on its way */
     SUBMISSION_DONE,   /* it is in the site's queue, or was */
@@ -63,7 +66,5 @@ double remote_due(const struct remote *remote);
 void remote_cancel(struct remote_run *r);
 void remote_decide(struct remote_run *r, enum run_way way, int code, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
-/* Writes that many (at most 64, even) random hex digits and a NUL; false where the system has no random bytes. */
-bool remote_random_hex(char *hex, size_t digits);
 
 #endif

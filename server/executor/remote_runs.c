@@ -8,6 +8,7 @@
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
+#include "common/random_hex.h"
 #include "common/protocol.h"
 #include "server/data/layout.h"
 #include "server/executor/remote_run.h"
@@ -299,16 +300,19 @@ static enum status write_order(const struct remote *m, const struct run_work *wo
 static enum status start(const struct executor *executor, const struct run_work *work, struct run **run,
                          struct error *err) {
     struct remote *m = remote_of(executor);
-    char token[65], random[9], digest[SHA256_HEX_SIZE];
+    char token[REMOTE_TOKEN_DIGITS + 1], random[REMOTE_NAME_DIGITS + 1], digest[SHA256_HEX_SIZE];
     struct remote_row row = {
         .job_id = work->job_id, .number = work->attempt, .lease_sec = (int)m->parts.site->lease_sec};
     *run = NULL;
-    if (!remote_random_hex(token, 64) || !remote_random_hex(random, 8))
-        return error_set(err, STATUS_IO, "the system has no random numbers");
+    enum status status = random_hex(token, REMOTE_TOKEN_DIGITS, err);
+    if (status == STATUS_OK)
+        status = random_hex(random, REMOTE_NAME_DIGITS, err);
+    if (status != STATUS_OK)
+        return status;
     snprintf(row.executor, sizeof row.executor, "%s", m->parts.site->name);
     snprintf(row.name, sizeof row.name, NAME_PREFIX "%lld-%d-%s", (long long)row.job_id, row.number, random);
-    sha256_of(token, 64, digest);
-    enum status status = write_order(m, work, err);
+    sha256_of(token, REMOTE_TOKEN_DIGITS, digest);
+    status = write_order(m, work, err);
     if (status == STATUS_OK)
         status = store_remote_begin(m->parts.store, &row, digest, err);
     if (status != STATUS_OK)

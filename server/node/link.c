@@ -5,12 +5,12 @@
 #include <poll.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/random.h>
 
 #include "common/clock.h"
 #include "common/log.h"
 #include "common/mem.h"
 #include "common/protocol.h"
+#include "common/random_hex.h"
 #include "common/source_digest.h"
 #include "common/utf8.h"
 #include "server/worker/progress.h"
@@ -26,17 +26,12 @@
 #define PAUSE_FIRST_SEC 0.5              /* before a request is repeated; doubled each time */
 #define PAUSE_MAX_SEC 5.0                /* up to this */
 #define BEAT_SEC 0.2                     /* between two beats during a pause */
+#define CLAIMANT_DIGITS 64               /* hex, 256 bits: nobody guesses it */
 
 static void draw_claimant(char field[128]) {
-    unsigned char random[32];
-    char hex[2 * sizeof random + 1];
-    size_t got = 0;
-    while (got < sizeof random) {
-        ssize_t more = getrandom(random + got, sizeof random - got, 0);
-        got += more > 0 ? (size_t)more : 0;
-    }
-    for (size_t i = 0; i < sizeof random; i++)
-        snprintf(hex + 2 * i, 3, "%02x", random[i]);
+    char hex[CLAIMANT_DIGITS + 1];
+    while (random_hex(hex, CLAIMANT_DIGITS, NULL) != STATUS_OK) /* interrupted by a signal */
+        continue;
     snprintf(field, 128, NODE_CLAIMANT_FIELD ": %s", hex);
 }
 

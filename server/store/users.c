@@ -6,16 +6,15 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/random.h>
 
 #include "common/clock.h"
 #include "common/mem.h"
+#include "common/random_hex.h"
 #include "common/sha256.h"
 #include "server/store/internal.h"
 
 #define TOKEN_PREFIX "unbake_"
-#define SECRET_BYTES 24 /* random ones of a token: 192 bits */
-#define SECRET_DIGITS (2 * SECRET_BYTES)
+#define SECRET_DIGITS 48 /* random hex digits of a token: 192 bits */
 
 static const char *const role_names[] = {"viewer", "user", "admin"};
 
@@ -83,15 +82,6 @@ static bool name_is_good(const char *name) {
     return true;
 }
 
-static enum status make_secret(char secret[SECRET_DIGITS + 1], struct error *err) {
-    unsigned char bytes[SECRET_BYTES];
-    if (getrandom(bytes, sizeof bytes, 0) != (ssize_t)sizeof bytes)
-        return error_set(err, STATUS_IO, "the system gives no random bytes");
-    for (size_t i = 0; i < sizeof bytes; i++)
-        snprintf(secret + 2 * i, 3, "%02x", bytes[i]);
-    return STATUS_OK;
-}
-
 static enum status insert_token(struct store *store, const char *name, enum role role, int64_t expires_ms,
                                 const char *hash, int64_t *id, struct error *err) {
     int64_t user;
@@ -120,7 +110,7 @@ enum status store_token_add(struct store *store, const char *name, enum role rol
     }
     if (expires_ms != 0 && expires_ms <= store_now_ms())
         return error_set(err, STATUS_INPUT, "the time at which the token would end is past");
-    enum status status = make_secret(secret, err);
+    enum status status = random_hex(secret, SECRET_DIGITS, err);
     if (status != STATUS_OK)
         return status;
     sha256_of(secret, SECRET_DIGITS, hash);

@@ -5,7 +5,6 @@
 #include <fcntl.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/random.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -14,6 +13,7 @@
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
+#include "common/random_hex.h"
 #include "server/data/layout.h"
 #include "server/data/trash.h"
 #include "server/uploads/upload.h"
@@ -192,20 +192,11 @@ enum status resumables_recover(struct resumables *r, struct error *err) { return
 
 /* --- one of them ------------------------------------------------------------------------- */
 
-static enum status new_id(char id[UPLOAD_ID_SIZE], struct error *err) {
-    unsigned char random[(UPLOAD_ID_SIZE - 1) / 2];
-    if (getrandom(random, sizeof random, 0) != (ssize_t)sizeof random)
-        return error_set_errno(err, errno, "cannot get random numbers");
-    for (size_t i = 0; i < sizeof random; i++)
-        snprintf(id + 2 * i, 3, "%02x", random[i]);
-    return STATUS_OK;
-}
-
 enum status resumable_create(struct resumables *r, struct upload_row *row, size_t user_max, struct error *err) {
     struct sha256 hash;
     memset(&hash, 0, sizeof hash); /* everything is stored */
     sha256_init(&hash);
-    enum status status = new_id(row->id, err);
+    enum status status = random_hex(row->id, UPLOAD_ID_SIZE - 1, err);
     if (status != STATUS_OK)
         return status;
     snprintf(row->boot, sizeof row->boot, "%s", r->boot);
