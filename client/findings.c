@@ -59,7 +59,8 @@ static void print_remedy(struct client *c, FILE *out, const cJSON *scene) {
     if (!cJSON_IsObject(remedy) && !*text)
         return;
     if (cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(fit, "taken"))) {
-        print_line(c, out, COLOUR_YELLOW, "remedy taken", text);
+        print_line(c, out, COLOUR_YELLOW, "applied", text);
+        print_line(c, out, COLOUR_NONE, "", "nothing is to be done: jobs read the room so");
         return;
     }
     print_line(c, out, COLOUR_YELLOW, "remedy", text);

@@ -58,7 +58,7 @@ static int by_name(const void *a, const void *b) {
 
 /* What stat cannot reach: the name was just listed, so what is not there is what a link leads to. */
 static enum status refuse_entry(const char *path, int number, struct error *err) {
-    error_set_errno(err, number, "cannot look at %s", path);
+    error_set_errno(err, number, "cannot access %s", path);
     return number == ENOENT ? error_hint(err, "it is a link to what is not there: remove it, or put that in its place")
                             : err->status;
 }
@@ -97,7 +97,7 @@ enum status pack_open(struct pack **pack, const char *path, struct error *err) {
     struct stat info;
     *pack = NULL;
     if (stat(path, &info) != 0)
-        return error_set_errno(err, errno, "cannot look at %s", path);
+        return error_set_errno(err, errno, "cannot access %s", path);
     if (!S_ISDIR(info.st_mode) && !S_ISREG(info.st_mode))
         return error_set(err, STATUS_INPUT, "%s is neither a file nor a folder", path);
     struct pack *p = mem_calloc(1, sizeof *p);

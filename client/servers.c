@@ -37,7 +37,7 @@ static enum status read_safe(const char *path, struct buf *text, struct error *e
     struct stat info;
     buf_init(text, FILE_MAX_BYTES);
     if (stat(path, &info) != 0)
-        return errno == ENOENT || errno == ENOTDIR ? STATUS_OK : error_set_errno(err, errno, "cannot look at %s", path);
+        return errno == ENOENT || errno == ENOTDIR ? STATUS_OK : error_set_errno(err, errno, "cannot access %s", path);
     if ((info.st_mode & 022) != 0 || (info.st_uid != geteuid() && info.st_uid != 0)) {
         error_set(err, STATUS_IO, "%s can be written by others: it is not used", path);
         return error_hint(err, "chmod 600 %s", path);

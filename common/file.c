@@ -285,7 +285,7 @@ static enum status add_size(int dir_fd, const char *name, const char *path, uint
     size_t count;
     DIR *dir;
     if (fstatat(dir_fd, name, &info, AT_SYMLINK_NOFOLLOW) != 0)
-        return errno == ENOENT ? STATUS_OK : error_set_errno(err, errno, "cannot look at %s", path);
+        return errno == ENOENT ? STATUS_OK : error_set_errno(err, errno, "cannot access %s", path);
     if (S_ISREG(info.st_mode)) {
         ++*files;
         *bytes += (uint64_t)info.st_blocks * 512;

@@ -169,7 +169,7 @@ static enum status ask_daemon(int socket_fd, const cJSON *request, cJSON **reply
 static enum status check_folder(const char *dir, const cJSON *request, struct stat *info, struct error *err) {
     const char *command = cJSON_GetStringValue(cJSON_GetObjectItem(request, "command"));
     if (stat(dir, info) != 0) { /* whose a new folder would be is unknown */
-        error_set_errno(err, errno, "cannot look at the data folder %s", dir);
+        error_set_errno(err, errno, "cannot access the data folder %s", dir);
         return error_hint(err,
                           "--data DIR or --config FILE names the daemon's; or start the daemon once, or make the folder"
                           " for its user");

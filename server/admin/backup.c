@@ -259,7 +259,7 @@ static enum status list_sums(const char *folder, const char *path, struct buf *s
         struct stat info;
         char *inner = *path ? file_join(path, names[i]) : mem_strdup(names[i]), *full = file_join(folder, inner);
         if (lstat(full, &info) != 0)
-            status = error_set_errno(err, errno, "cannot look at %s", full);
+            status = error_set_errno(err, errno, "cannot access %s", full);
         else if (S_ISDIR(info.st_mode))
             status = list_sums(folder, inner, sums, err);
         else if ((status = sha256_of_file(full, hex, err)) == STATUS_OK)

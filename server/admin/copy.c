@@ -104,7 +104,7 @@ enum status copy_file(struct copy *c, const char *path, bool *exists, struct err
         goto out;
     }
     if (fstat(in, &info) != 0) {
-        status = error_set_errno(err, errno, "cannot look at %s", path);
+        status = error_set_errno(err, errno, "cannot access %s", path);
         goto out;
     }
     if (!S_ISREG(info.st_mode))

@@ -59,7 +59,7 @@ static enum status prepare(struct restoring *r, struct error *err) {
 static enum status open_backup(struct restoring *r, struct buf *sums, struct error *err) {
     struct stat info;
     if (stat(r->backup, &info) != 0)
-        return error_set_errno(err, errno, "cannot look at %s", r->backup);
+        return error_set_errno(err, errno, "cannot access %s", r->backup);
     char *list = file_join(r->backup, BACKUP_SUMS);
     enum status status = STATUS_OK;
     if (!S_ISDIR(info.st_mode) || !file_is_in(r->backup, BACKUP_SUMS)) {

@@ -27,9 +27,10 @@ enum status grey_card_find(struct grey_card *card, const struct pixel_setting *p
     struct accel_hit hit;
     vec3 direction;
     *card = (struct grey_card){.is_given = true, .pixel = *pixel};
-    if (!photo)
-        return error_set(err, STATUS_INPUT, "grey_card: there is no photograph %s, or more than one",
-                         pixel->photograph);
+    if (!photo) {
+        error_set(err, STATUS_INPUT, "grey_card: there is no photograph %s, or more than one", pixel->photograph);
+        return error_hint(err, "name it by its path in the bundle, as images/IMG_12.jpg");
+    }
     const struct camera camera = photograph_file_camera(photo);
     if (pixel->x >= camera.width || pixel->y >= camera.height)
         return error_set(err, STATUS_INPUT, "grey_card: %s has %u x %u pixels, none at %u, %u", pixel->photograph,
@@ -48,8 +49,11 @@ enum status grey_card_find(struct grey_card *card, const struct pixel_setting *p
     card->triangle = hit.triangle;
     card->point = vec3_mad(origin, hit.distance_m, direction);
     card->texel = row * width + column;
-    if (surface->inverse->triangle[card->texel] == INVERSE_UV_NONE)
-        return error_set(err, STATUS_INPUT, "grey_card: pixel %u, %u of %s shows a part of the mesh without texture",
-                         pixel->x, pixel->y, pixel->photograph);
+    if (surface->inverse->triangle[card->texel] == INVERSE_UV_NONE) {
+        error_set(err, STATUS_INPUT,
+                  "grey_card: pixel %u, %u of %s shows a part of the mesh that is smaller than a texel", pixel->x,
+                  pixel->y, pixel->photograph);
+        return error_hint(err, "name a pixel nearer to the card's middle, or take a larger texture_size");
+    }
     return STATUS_OK;
 }

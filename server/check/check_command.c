@@ -58,7 +58,7 @@ static void print_facts(const cJSON *facts) {
     printf("fit: %s\n", text_of(fit, "verdict"));
     print_list("  ", cJSON_GetObjectItemCaseSensitive(fit, "evidence"));
     if (*text_of(fit, "remedy_text"))
-        printf("%s: %s\n", cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(fit, "taken")) ? "taken" : "remedy",
+        printf("%s: %s\n", cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(fit, "taken")) ? "applied" : "remedy",
                text_of(fit, "remedy_text"));
 }
 

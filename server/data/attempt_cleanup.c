@@ -43,7 +43,7 @@ static enum status tidy_folder(struct tidying *t, const char *path, const char *
         struct stat info;
         char *inner = file_join(path, names[i]), *output = *name ? file_join(name, names[i]) : mem_strdup(names[i]);
         if (lstat(inner, &info) != 0)
-            status = error_set_errno(err, errno, "cannot look at %s", inner);
+            status = error_set_errno(err, errno, "cannot access %s", inner);
         else if (S_ISDIR(info.st_mode)) {
             status = tidy_folder(t, inner, output, err);
             if (status == STATUS_OK && rmdir(inner) != 0 && errno != ENOTEMPTY && errno != EEXIST)

@@ -27,7 +27,7 @@ static enum status look(const char *path, bool *exists, struct error *err) {
     struct stat info;
     *exists = lstat(path, &info) == 0;
     return *exists || errno == ENOENT || errno == ENOTDIR ? STATUS_OK
-                                                          : error_set_errno(err, errno, "cannot look at %s", path);
+                                                          : error_set_errno(err, errno, "cannot access %s", path);
 }
 
 bool attempt_folder_is_checkpoint_name(const char *name) {

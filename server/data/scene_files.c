@@ -62,7 +62,7 @@ static enum status walk(struct walk *w, const char *path, const char *name, stru
         struct stat info;
         char *inner = file_join(path, names[i]), *below = *name ? file_join(name, names[i]) : mem_strdup(names[i]);
         if (lstat(inner, &info) != 0)
-            status = error_set_errno(err, errno, "cannot look at %s", inner);
+            status = error_set_errno(err, errno, "cannot access %s", inner);
         else if (S_ISDIR(info.st_mode))
             status = walk(w, inner, below, err);
         else if (S_ISREG(info.st_mode))

@@ -241,8 +241,10 @@ static enum status score_views(struct evaluator *e, struct evaluation *v, struct
     v->msre = sum / measured;
     v->msre_noise_left = sqrt(noise) / measured;
     v->msre_deviation = sqrt(fmax(0.0, squares / measured - v->msre * v->msre));
-    if (status == STATUS_OK && v->view_count == 0)
-        status = error_set(err, STATUS_INPUT, "%s: no photograph is held out (split test)", e->room);
+    if (status == STATUS_OK && v->view_count == 0) {
+        status = error_set(err, STATUS_INPUT, "%s: no photograph is held out, so there is nothing to compare", e->room);
+        error_hint(err, "frames of transforms.json with \"split\": \"test\" are held out");
+    }
     return status;
 }
 

@@ -37,8 +37,11 @@ enum status found_emitters_count(const char *room, const struct mesh *mesh, cons
     enum status status = json_read(path, OBJECTS_LIMIT, &list, err);
     if (status == STATUS_OK && !cJSON_IsArray(list))
         status = error_set(err, STATUS_INPUT, "%s: not a list of objects", path);
-    if (status == STATUS_OK && !mesh->object_id)
-        status = error_set(err, STATUS_INPUT, "%s: the mesh has no object_id", room);
+    if (status == STATUS_OK && !mesh->object_id) {
+        status = error_set(err, STATUS_INPUT,
+                           "%s: the faces of the mesh have no object_id, by which the truth names objects", room);
+        error_hint(err, "the room of the truth is a PLY with object_id, as `unbaked demo-room` writes it");
+    }
     for (const cJSON *o = list ? list->child : NULL; o && status == STATUS_OK; o = o->next) {
         const cJSON *emission = cJSON_GetObjectItemCaseSensitive(o, "emission");
         double id;

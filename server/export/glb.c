@@ -352,9 +352,9 @@ enum status glb_write(const char *path, const struct export_input *input, const 
     struct stat info, emission_info = {.st_size = 0};
     struct sink out;
     if (stat(base_color, &info) != 0)
-        return error_set_errno(err, errno, "cannot look at %s", base_color);
+        return error_set_errno(err, errno, "cannot access %s", base_color);
     if (input->materials->emission_pattern && stat(emission, &emission_info) != 0)
-        return error_set_errno(err, errno, "cannot look at %s", emission);
+        return error_set_errno(err, errno, "cannot access %s", emission);
     const struct export_input *shown = glb_shown(input);
     float *scales = emission_texture_scales(shown);
     struct glb g = {.in = input, .parts = parts, .shown = shown};

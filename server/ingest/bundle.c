@@ -63,7 +63,7 @@ enum status bundle_root(const char *dir, char **root, struct error *err) {
         enum status status = list_folder(*root, &names, &count, err);
         char *inner = status == STATUS_OK && count == 1 ? file_join(*root, names[0]) : NULL;
         if (inner && lstat(inner, &info) != 0)
-            status = error_set_errno(err, errno, "cannot look at %s", inner);
+            status = error_set_errno(err, errno, "cannot access %s", inner);
         bool is_folder = inner && status == STATUS_OK && S_ISDIR(info.st_mode);
         file_free_names(names, count);
         if (is_folder) {

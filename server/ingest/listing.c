@@ -52,7 +52,7 @@ static enum status add_below(struct growing *g, const char *base, int depth, str
             continue;
         char *path = mem_printf("%s%s", base, names[i]), *full = file_join(dir, names[i]);
         if (lstat(full, &info) != 0) {
-            status = error_set_errno(err, errno, "cannot look at %s", path);
+            status = error_set_errno(err, errno, "cannot access %s", path);
         } else if (S_ISREG(info.st_mode)) {
             add_file(g, path, (uint64_t)info.st_size, NULL);
             path = NULL;

@@ -129,7 +129,7 @@ static enum status put_file(const struct attempt *a, struct store *store, const 
         char *path = layout_output(a->dir, name);
         bool is_there = lstat(path, &info) == 0;
         if (!is_there && errno != ENOENT && !is_last)
-            status = error_set_errno(err, errno, "cannot look at %s", path);
+            status = error_set_errno(err, errno, "cannot access %s", path);
         else if (is_there && S_ISREG(info.st_mode) && (double)info.st_size != bytes && strcmp(type, EVENT_PREVIEW) == 0)
             is_replaced = true;
         else if (!is_there || !S_ISREG(info.st_mode) || (double)info.st_size != bytes)

@@ -142,7 +142,7 @@ static enum status begin_fetch(struct request_call *call, struct transfer *t, st
     struct stat info;
     static const char *const whole = NULL;
     if (fstat(t->fd, &info) != 0)
-        return error_set_errno(err, errno, "cannot look at what is fetched");
+        return error_set_errno(err, errno, "cannot access what is fetched");
     t->at = (uint64_t)info.st_size;
     t->link->fetched_bytes += t->bytes;
     t->bytes = 0;
@@ -198,7 +198,7 @@ enum status link_send(struct attempt_link *l, const char *what, const char *name
     struct transfer t = {.link = l, .fd = fd, .err = err};
     char value[64], digest[96];
     if (fstat(fd, &info) != 0)
-        return error_set_errno(err, errno, "cannot look at %s", name ? name : what);
+        return error_set_errno(err, errno, "cannot access %s", name ? name : what);
     field_digest_format(hex, value);
     snprintf(digest, sizeof digest, "Repr-Digest: %s", value);
     char *path = path_of(l, what, name, query);

@@ -65,7 +65,7 @@ static enum status fetch_once(const char *part, const char *name, uint64_t bytes
     if (status == STATUS_NO_SPACE)
         error_prefix(err, "%s", part);
     if (status == STATUS_OK && fstat(fd, &info) != 0)
-        status = error_set_errno(err, errno, "cannot look at %s", part);
+        status = error_set_errno(err, errno, "cannot access %s", part);
     *size = (uint64_t)info.st_size;
     if (close(fd) != 0 && status == STATUS_OK)
         status = error_set_errno(err, errno, "cannot write %s", part);
@@ -216,7 +216,7 @@ static enum status make_cache(const char *cache_dir, struct error *err) {
         return status;
     char *parent = mem_printf("%s/..", cache_dir);
     if (lstat(cache_dir, &own) != 0 || stat(parent, &above) != 0)
-        status = error_set_errno(err, errno, "cannot look at %s", cache_dir);
+        status = error_set_errno(err, errno, "cannot access %s", cache_dir);
     else if ((above.st_mode & S_IWOTH) && own.st_uid != geteuid() && own.st_uid != 0)
         status =
             error_set(err, STATUS_INPUT, "%s belongs to another user (%u), who may have made it to change scenes there",

@@ -349,10 +349,16 @@ static enum status measure_photographs(struct prepare *p, struct error *err) {
     return STATUS_OK;
 }
 
+static enum status refuse_segmentation(struct error *err) {
+    error_set(err, STATUS_INPUT,
+              "segmentation=given, but the mesh tells no objects apart: its faces have no object_id");
+    return error_hint(err, "leave the setting out: segments are then made from the mesh's shape");
+}
+
 enum status prepare_run(struct reconstruction *r, struct views *views, const struct pace *pace, struct error *err) {
     struct prepare prepare = {.r = r, .views = views, .pace = pace}, *p = &prepare;
     if (settings_is(r->settings, "segmentation", "given") && !r->scene->mesh.object_id)
-        return error_set(err, STATUS_INPUT, "segmentation=given, but the mesh has no object_id per face");
+        return refuse_segmentation(err);
     hold_out(r);
     enum status status = reserve_pixels(r, err);
     if (status == STATUS_OK)

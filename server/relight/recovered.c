@@ -115,7 +115,7 @@ static enum status read_scene_ply(const char *dir, struct charted *c, struct err
     if (status == STATUS_OK)
         status = ply_header_parse(&at, &header, err);
     if (status == STATUS_OK && (header.format != PLY_LITTLE_ENDIAN || header.element_count < 2))
-        status = error_set(err, STATUS_INPUT, "%s: not a scene.ply of ours", path);
+        status = error_set(err, STATUS_INPUT, "%s: not the scene.ply of a reconstruction's outputs", path);
     if (status == STATUS_OK)
         status = read_vertices(c, &header, &at, err);
     if (status == STATUS_OK)

@@ -33,7 +33,7 @@ static int64_t nanoseconds(struct timespec t) { return (int64_t)t.tv_sec * 10000
 static enum status look(int fd, struct file_version *v, struct error *err) {
     struct stat info;
     if (fstat(fd, &info) != 0)
-        return error_set_errno(err, errno, "cannot look at an output");
+        return error_set_errno(err, errno, "cannot access an output");
     if (!S_ISREG(info.st_mode))
         return error_set(err, STATUS_CORRUPT, "an output is not a plain file");
     *v = (struct file_version){info.st_ino, (uint64_t)info.st_size, nanoseconds(info.st_mtim),

@@ -143,7 +143,7 @@ function showCheck() {
   showLines("check-evidence", fit?.evidence ?? []);
   showLines("check-warnings", warnings);
   $("check-remedy").hidden = !fit?.remedy_text && !fit?.remedy;
-  $("remedy-text").textContent = (fit?.taken ? "Done by itself: " : "") + (fit?.remedy_text ?? JSON.stringify(fit?.remedy ?? ""));
+  $("remedy-text").textContent = (fit?.taken ? "Applied: " : "") + (fit?.remedy_text ?? JSON.stringify(fit?.remedy ?? ""));
   $("apply-remedy").hidden = !fit?.remedy || Boolean(fit.taken) || scene.state === "checking";
   $("start").hidden = !isReady;
   $("start-button").textContent = fit?.verdict === "no" ? "Start all the same" : "Start";

@@ -19,7 +19,7 @@ enum status announce_known(struct progress *progress, const char *type, const ch
                            const char *content_type, const char *sha256, uint64_t *bytes, struct error *err) {
     struct stat info;
     if (stat(path, &info) != 0)
-        return error_set_errno(err, errno, "cannot look at %s", path);
+        return error_set_errno(err, errno, "cannot access %s", path);
     progress_file(progress, type, name, (uint64_t)info.st_size, sha256, content_type);
     if (bytes)
         *bytes = (uint64_t)info.st_size;

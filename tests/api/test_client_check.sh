@@ -44,7 +44,7 @@ run 0 submit --scene "$scene" --dry-run --json
 so '.fit.verdict == "doubtful" and .upload_bytes == 0'
 found '{"fit":{"verdict":"yes","remedy":{"scale":0.001},"remedy_text":"the mesh is in millimetres","taken":true},"previews":[{"name":"../x.png"}]}'
 run 0 submit --scene "$scene" --dry-run
-has "$err" "remedy taken: the mesh is in millimetres"
+has "$err" "applied: the mesh is in millimetres"
 run 7 check --scene "$scene" --pictures "$work/pictures"
 has "$err" "unsafe name"
 exec {idle[1]}>&-

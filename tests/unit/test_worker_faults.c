@@ -80,7 +80,7 @@ static void check_attempts(void) {
     attempt_fails(" mkdir ", 1, false, "cannot create folder");
     attempt_fails(" open ", 1, false, "checkpoint.db");
     attempt_fails(" stat ", 1, false, "/out/preview/radiance.png"); /* its size, before it is announced */
-    attempt_fails(" stat ", 2, true, "cannot look at");
+    attempt_fails(" stat ", 2, true, "cannot access");
     bool is_output = false; /* until it is what was written that cannot be read */
     for (long n = 1; !is_output && check_failed_count == 0; n++) {
         faults_are_off = false;
