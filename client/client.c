@@ -8,6 +8,7 @@
 #include <time.h>
 
 #include "common/mem.h"
+#include "common/url.h"
 
 /* --- how a command ends -------------------------------------------------------------------- */
 
@@ -226,7 +227,7 @@ enum status client_list(struct client *c, const char *path, size_t limit, cJSON 
         buf_printf(&target, "%s%climit=%zu", path, strchr(path, '?') ? '&' : '?', page);
         if (cursor) {
             buf_puts(&target, "&cursor=");
-            request_escape(&target, cursor, false);
+            url_encode(&target, cursor, false);
         }
         mem_free(cursor);
         cursor = NULL;

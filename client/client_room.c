@@ -9,6 +9,7 @@
 #include "common/mem.h"
 #include "common/protocol.h"
 #include "common/reading.h"
+#include "common/url.h"
 
 #define PATIENCE_SEC 600.0 /* while the server is away */
 #define TRIES_MAX 4        /* pauses between looks grow up to 1.6 s */
@@ -92,7 +93,7 @@ enum status client_room_fetch(struct client_room *room, struct reply *reply, str
     struct buf path;
     buf_init(&path, 4096);
     buf_puts(&path, "/v1/scenes/");
-    request_escape(&path, room->scene, false);
+    url_encode(&path, room->scene, false);
     enum status status = request_get(room->client->request, buf_text(&path), reply, err);
     buf_release(&path);
     if (status != STATUS_OK)

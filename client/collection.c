@@ -6,6 +6,7 @@
 
 #include "client/retention.h"
 #include "common/nearest.h"
+#include "common/url.h"
 
 const struct command_option collection_options[] = {
     {"limit", 'n', OPTION_WHOLE, "N", "list at most so many (20); 0: all"},
@@ -74,7 +75,7 @@ static int one(struct client *c, const struct collection *what, const char *id, 
     reply_init(&reply);
     buf_init(&path, 4096);
     buf_printf(&path, "%s/", what->path);
-    request_escape(&path, id, false);
+    url_encode(&path, id, false);
     buf_puts(&path, dry_run ? "?dry_run=1" : "");
     struct request_call call = {.path = buf_text(&path), .method = methods[verb], .body = body};
     enum status status = request_run(c->request, &call, &reply, &err);

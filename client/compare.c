@@ -9,6 +9,7 @@
 #include "client/view.h"
 #include "common/mem.h"
 #include "common/protocol.h"
+#include "common/url.h"
 
 const struct command_option compare_options[] = {FORMAT_OPTION, {0}};
 
@@ -44,7 +45,7 @@ static enum status add_labelled(struct job_comparison *x, const char *label, str
     cJSON *items = NULL;
     buf_init(&path, 4096);
     buf_puts(&path, "/v1/jobs?label=");
-    request_escape(&path, label, false);
+    url_encode(&path, label, false);
     enum status status = client_list(x->client, buf_text(&path), 0, &items, reply, err);
     buf_release(&path);
     if (status == STATUS_OK && cJSON_GetArraySize(items) == 0) {

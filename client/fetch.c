@@ -12,6 +12,7 @@
 #include "common/clock.h"
 #include "common/file.h"
 #include "common/mem.h"
+#include "common/url.h"
 
 #define PATIENCE_SEC 60.0 /* without a byte, after which a download is given up; --retry sets it */
 #define VERSIONS_MAX 5    /* give up on a file that changes more often during the download */
@@ -113,7 +114,7 @@ static enum status request_rest(struct fetch *f) {
     char range[64], version[128];
     buf_init(&path, 8192);
     buf_printf(&path, "/v1/jobs/%lld/outputs/", (long long)f->job);
-    request_escape(&path, f->name, true);
+    url_encode(&path, f->name, true);
     snprintf(range, sizeof range, "Range: bytes=%llu-", (unsigned long long)f->have);
     snprintf(version, sizeof version, "If-Range: \"sha256-%s\"", f->sha256);
     struct request_call call = {.path = buf_text(&path), .sink = on_bytes, .user = f, .once = true};

@@ -9,6 +9,7 @@
 #include "common/mem.h"
 #include "common/nearest.h"
 #include "common/protocol.h"
+#include "common/url.h"
 
 const struct command_option list_options[] = {
     {"state", 's', OPTION_TEXT, "STATE", "only jobs that are queued, running, paused, succeeded, ..."},
@@ -108,7 +109,7 @@ static char *list_path(const char *state, const char *kind, const char *label) {
         if (!values[i])
             continue;
         buf_printf(&path, "%c%s=", separator, names[i]);
-        request_escape(&path, values[i], false);
+        url_encode(&path, values[i], false);
         separator = '&';
     }
     return buf_detach(&path);
@@ -385,7 +386,7 @@ int retry_run(struct client *c, const struct options *o) {
     buf_puts(&action, "retry");
     if (from) {
         buf_puts(&action, "?from=");
-        request_escape(&action, from, false);
+        url_encode(&action, from, false);
     }
     int code = act_on_all(c, o, buf_text(&action));
     buf_release(&action);

@@ -17,6 +17,7 @@
 #include "common/protocol.h"
 #include "common/render_settings.h"
 #include "common/sha256.h"
+#include "common/url.h"
 
 #define SENDING_PATIENCE_SEC 120.0 /* a connection on which nothing moves for so long is dead */
 
@@ -183,7 +184,7 @@ static enum status send_file(struct follow_up *f, const char *name, const char *
     snprintf(digest, sizeof digest, "X-Content-SHA256: %s", hex);
     buf_init(&path, 8192);
     buf_printf(&path, "/v1/jobs/%lld/files/", (long long)f->id);
-    request_escape(&path, name, false);
+    url_encode(&path, name, false);
     struct request_call call = {.method = "PUT",
                                 .path = buf_text(&path),
                                 .header = {digest},

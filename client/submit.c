@@ -19,6 +19,7 @@
 #include "common/protocol.h"
 #include "common/random_hex.h"
 #include "common/settings.h"
+#include "common/url.h"
 
 const struct command_option submit_options[] = {
     {"name", 'n', OPTION_TEXT, "NAME", "what people will call the job; else the room's name"},
@@ -64,7 +65,7 @@ static enum status join_group(struct submission *s, struct reply *reply, struct 
         struct buf path;
         buf_init(&path, 1024);
         buf_puts(&path, "/v1/jobs?label=" GROUP "%3D");
-        request_escape(&path, group_of(s), false);
+        url_encode(&path, group_of(s), false);
         enum status status = client_list(s->client, buf_text(&path), 0, &s->present, reply, err);
         buf_release(&path);
         return status;

@@ -1,4 +1,5 @@
 /* machine.c -- see machine.h. */
+#include "common/cgroup.h"
 #include "common/machine.h"
 
 #include <stdbool.h>
@@ -36,24 +37,19 @@ static uint64_t read_limit(const char *root, const char *mount, const char *grou
     return found ? (uint64_t)bytes : UINT64_MAX;
 }
 
-/* The least limit of a group and those around it, by a line of /proc/self/cgroup: "0::/a/b" (version 2) or
- * "4:memory:/a/b" (version 1). The mount itself is last: in a container it is the container's own group. */
+/* The least limit of the group that a line of /proc/self/cgroup names and those around it. The mount itself is last: in
+ * a container it is the container's own group. */
 static uint64_t group_limit(const char *root, char *line) {
     uint64_t least = UINT64_MAX;
-    line[strcspn(line, "\n")] = '\0';
-    char *controllers = strchr(line, ':'), *path = controllers ? strchr(controllers + 1, ':') : NULL;
-    if (!path)
+    struct cgroup group;
+    if (!cgroup_parse(line, &group))
         return least;
-    *path++ = '\0';
-    bool is_v2 = controllers[1] == '\0';
-    if (!is_v2 && strcmp(controllers + 1, "memory") != 0)
-        return least;
-    for (;;) {
+    for (char *path = group.path;;) {
         char *end = strrchr(path, '/');
         if (end && end[1] == '\0')
             *end = '\0';
-        least = lesser(least, is_v2 ? read_limit(root, "/sys/fs/cgroup", path, "memory.max")
-                                    : read_limit(root, "/sys/fs/cgroup/memory", path, "memory.limit_in_bytes"));
+        least = lesser(least,
+                       read_limit(root, group.mount, path, group.is_v2 ? "memory.max" : "memory.limit_in_bytes"));
         end = strrchr(path, '/');
         if (!end)
             return least;

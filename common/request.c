@@ -327,15 +327,3 @@ enum status request_get(struct http_request *r, const char *path, struct reply *
     error_set(err, STATUS_UNAVAILABLE, "%s%s answered %ld without JSON", r->server, path, reply->code);
     return error_hint(err, "is that server unbaked?");
 }
-
-void request_escape(struct buf *out, const char *text, bool keep_slash) {
-    for (; *text; text++) {
-        unsigned char c = (unsigned char)*text;
-        bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-                     strchr("-._~", c) != NULL || (keep_slash && c == '/');
-        if (plain)
-            buf_append(out, text, 1);
-        else
-            buf_printf(out, "%%%02X", c);
-    }
-}

@@ -81,7 +81,5 @@ enum status request_run(struct http_request *r, const struct request_call *call,
 /* GET of a JSON document. */
 enum status request_get(struct http_request *r, const char *path, struct reply *reply, struct error *err);
 
-/* Appends `text` percent-encoded; slashes stay if `keep_slash`. */
-void request_escape(struct buf *out, const char *text, bool keep_slash);
 
 #endif

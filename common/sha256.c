@@ -149,3 +149,7 @@ bool sha256_equal(const char *a, const char *b) {
         different = (unsigned char)(different | (left[i] ^ right[i]));
     return different == 0;
 }
+
+bool sha256_is_hex(const char *text) {
+    return strspn(text, "0123456789abcdef") == SHA256_HEX_SIZE - 1 && text[SHA256_HEX_SIZE - 1] == '\0';
+}

@@ -24,6 +24,7 @@ void sha256_hex(struct sha256 *s, char hex[SHA256_HEX_SIZE]);
 /* Whether two texts of SHA256_HEX_SIZE are the same, in a time that does not depend on where they
  * differ. One that is shorter equals no digest. */
 bool sha256_equal(const char *a, const char *b);
+bool sha256_is_hex(const char *text); /* whether it is a digest: 64 lower-case hex digits */
 void sha256_of(const void *data, size_t length, char hex[SHA256_HEX_SIZE]);
 enum status sha256_of_file(const char *path, char hex[SHA256_HEX_SIZE], struct error *err);
 

@@ -50,3 +50,15 @@ enum status url_parse(const char *text, struct url *url, struct error *err) {
     url->target = end;
     return STATUS_OK;
 }
+
+void url_encode(struct buf *out, const char *text, bool keep_slash) {
+    for (; *text; text++) {
+        unsigned char c = (unsigned char)*text;
+        bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                     strchr("-._~", c) != NULL || (keep_slash && c == '/');
+        if (plain)
+            buf_append(out, text, 1);
+        else
+            buf_printf(out, "%%%02X", c);
+    }
+}

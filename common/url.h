@@ -1,9 +1,10 @@
-/* url.h -- parses http and https URLs (RFC 3986, the parts used here). */
+/* url.h -- parses http and https URLs, and encodes what becomes a part of one (RFC 3986, the parts used here). */
 #ifndef UNBAKE_COMMON_URL_H
 #define UNBAKE_COMMON_URL_H
 
 #include <stdbool.h>
 
+#include "common/buf.h"
 #include "common/error.h"
 
 #define URL_MAX_BYTES 1000 /* of a whole URL */
@@ -17,5 +18,8 @@ struct url {
 
 /* STATUS_INPUT for other schemes, user names or passwords, fragments, and invalid characters. */
 enum status url_parse(const char *text, struct url *url, struct error *err);
+
+/* Appends `text` with all but unreserved characters percent-encoded (2.1, 2.3); slashes stay where keep_slash. */
+void url_encode(struct buf *out, const char *text, bool keep_slash);
 
 #endif

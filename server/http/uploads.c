@@ -9,6 +9,7 @@
 #include "common/base64.h"
 #include "common/mem.h"
 #include "common/protocol.h"
+#include "common/sha256.h"
 #include "common/utf8.h"
 #include "server/data/layout.h"
 #include "server/http/handlers.h"
@@ -52,7 +53,7 @@ static bool take_pair(struct upload_row *row, const char *key, size_t key_length
     bytes[used] = '\0';
     bool is_text = strlen(bytes) == used && utf8_valid(bytes, used, NULL);
     if (key_length == 6 && memcmp(key, "sha256", 6) == 0) {
-        if (!field_is_sha256(bytes) || !is_text)
+        if (!sha256_is_hex(bytes) || !is_text)
             return false;
         memcpy(row->sha256, bytes, SCENE_ID_SIZE);
     } else if (key_length == 7 && memcmp(key, "reading", 7) == 0) {
@@ -172,7 +173,7 @@ struct response *uploads_list(struct api *api, struct request *r) {
     struct response *refusal = NULL;
     const char *cursor = target_query(&r->target, "cursor"), *sha256 = target_query(&r->target, "sha256");
     size_t limit = view_limit(r, &refusal), count = 0;
-    if (!refusal && sha256 && !field_is_sha256(sha256))
+    if (!refusal && sha256 && !sha256_is_hex(sha256))
         refusal = problem(r, 400, "sha256 must be 64 lower-case hex digits");
     if (refusal)
         return refusal;

@@ -6,6 +6,7 @@
 
 #include "common/clock.h"
 #include "common/mem.h"
+#include "common/url.h"
 #include "server/net/field.h"
 #include "server/transport/problem.h"
 
@@ -124,12 +125,14 @@ static void add_facts(cJSON *v, const struct scene_row *row) {
     cJSON *facts = cJSON_Parse(row->facts), *preview;
     cJSON_ArrayForEach(preview, cJSON_GetObjectItemCaseSensitive(facts, "previews")) {
         const char *name = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(preview, "name"));
-        char *encoded = name ? target_encode(name, false) : NULL;
-        char *href = encoded ? mem_printf("/v1/scenes/%s/preview/%s", row->id, encoded) : NULL;
-        if (href)
-            json_add_string(preview, "href", href);
-        mem_free(href);
-        mem_free(encoded);
+        struct buf href;
+        if (!name)
+            continue;
+        buf_init(&href, SIZE_MAX / 2);
+        buf_printf(&href, "/v1/scenes/%s/preview/", row->id);
+        url_encode(&href, name, false);
+        json_add_string(preview, "href", buf_text(&href));
+        buf_release(&href);
     }
     json_add(v, "facts", facts ? facts : cJSON_CreateNull());
 }
@@ -187,11 +190,12 @@ cJSON *view_output(int64_t job_id, const struct output_row *row) {
     json_add_string(v, "content_type", row->content_type);
     view_add_time(v, "updated_at", row->updated_ms);
     json_add_int(v, "attempt", row->attempt);
-    char *name = target_encode(row->name, true);
-    char *href = mem_printf("/v1/jobs/%lld/outputs/%s", (long long)job_id, name);
-    json_add_string(v, "href", href);
-    mem_free(href);
-    mem_free(name);
+    struct buf href;
+    buf_init(&href, SIZE_MAX / 2);
+    buf_printf(&href, "/v1/jobs/%lld/outputs/", (long long)job_id);
+    url_encode(&href, row->name, true);
+    json_add_string(v, "href", buf_text(&href));
+    buf_release(&href);
     return v;
 }
 
@@ -216,14 +220,15 @@ struct response *view_page(const struct request *r, cJSON *items, const char *ne
     for (size_t i = 0; i < r->target.query_count; i++) {
         if (strcmp(r->target.names[i], "cursor") == 0)
             continue;
-        char *value = target_encode(r->target.values[i], false);
-        buf_printf(&link, "%s=%s&", r->target.names[i], value);
-        mem_free(value);
+        buf_printf(&link, "%s=", r->target.names[i]);
+        url_encode(&link, r->target.values[i], false);
+        buf_puts(&link, "&");
     }
-    char *cursor = target_encode(next, false);
-    buf_printf(&link, "cursor=%s>; rel=\"next\"", cursor);
-    mem_free(cursor);
-    response_field(reply, "Link", "%s", buf_text(&link));
+    buf_puts(&link, "cursor=");
+    url_encode(&link, next, false);
+    buf_puts(&link, ">; rel=\"next\"");
+    if (!link.overflowed) /* else `next` says it alone */
+        response_field(reply, "Link", "%s", buf_text(&link));
     buf_release(&link);
     return reply;
 }

@@ -5,8 +5,8 @@
 
 #include <stdbool.h>
 #include <stdio.h>
-#include <string.h>
 
+#include "common/cgroup.h"
 #include "common/mem.h"
 
 /* The number on the line "oom_kill N". */
@@ -26,21 +26,14 @@ static bool read_count(const char *root, const char *folder, const char *name, u
     return found;
 }
 
-/* From a line of /proc/self/cgroup, "0::/a/b" (version 2) or "4:memory:/a/b" (version 1). In a container the path may
- * be the host's; then the container's own group is mounted at the root. */
+/* Of the group that a line of /proc/self/cgroup names. */
 static bool read_group(const char *root, char *line, uint64_t *count) {
-    line[strcspn(line, "\n")] = '\0';
-    char *controllers = strchr(line, ':'), *path = controllers ? strchr(controllers + 1, ':') : NULL;
-    if (!path)
+    struct cgroup group;
+    if (!cgroup_parse(line, &group))
         return false;
-    *path++ = '\0';
-    bool is_v2 = controllers[1] == '\0';
-    if (!is_v2 && strcmp(controllers + 1, "memory") != 0)
-        return false;
-    const char *mount = is_v2 ? "/sys/fs/cgroup" : "/sys/fs/cgroup/memory";
-    const char *name = is_v2 ? "memory.events" : "memory.oom_control";
-    char *folder = mem_printf("%s%s", mount, path);
-    bool found = read_count(root, folder, name, count) || read_count(root, mount, name, count);
+    const char *name = group.is_v2 ? "memory.events" : "memory.oom_control";
+    char *folder = mem_printf("%s%s", group.mount, group.path);
+    bool found = read_count(root, folder, name, count) || read_count(root, group.mount, name, count);
     mem_free(folder);
     return found;
 }

@@ -139,8 +139,6 @@ bool field_number(const char *text, int64_t minimum, int64_t maximum, int64_t *v
     return *value >= minimum && *value <= maximum;
 }
 
-bool field_is_sha256(const char *text) { return strspn(text, "0123456789abcdef") == 64 && text[64] == '\0'; }
-
 bool field_host(const char *host, size_t *length) {
     const char *at = host;
     if (*at == '[') {

@@ -168,22 +168,3 @@ char *target_rest(const struct target *t, size_t first) {
         buf_printf(&rest, "%s%s", i > first ? "/" : "", t->segments[i]);
     return buf_detach(&rest);
 }
-
-char *target_encode(const char *text, int keep_slash) {
-    static const char digits[] = "0123456789ABCDEF";
-    char *out = mem_array(strlen(text) + 1, 3);
-    size_t used = 0;
-    for (; *text; text++) {
-        unsigned char c = (unsigned char)*text;
-        if ((c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || strchr("-._~", c) ||
-            (c == '/' && keep_slash)) {
-            out[used++] = (char)c;
-        } else {
-            out[used++] = '%';
-            out[used++] = digits[c >> 4];
-            out[used++] = digits[c & 15];
-        }
-    }
-    out[used] = '\0';
-    return out;
-}

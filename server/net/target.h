@@ -34,7 +34,5 @@ const char *target_query(const struct target *t, const char *name);
 /* The segments from `first` on, joined by slashes; the caller's (mem_free). */
 char *target_rest(const struct target *t, size_t first);
 
-/* `text` with all but unreserved characters percent-encoded; slashes too unless keep_slash. The caller's (mem_free). */
-char *target_encode(const char *text, int keep_slash);
 
 #endif

@@ -7,6 +7,7 @@
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
+#include "common/sha256.h"
 #include "server/net/field.h"
 
 static enum status from_scene(void *user, const char *name, int fd, struct error *err) {
@@ -29,7 +30,7 @@ enum status fetch_scene(struct relay *r, const char *cache_dir, uint64_t cache_b
     enum status status = link_list(&r->link, "scene", &list, err);
     if (status == STATUS_OK)
         status = json_string(list, "scene_id", "the list of files", "", &id, err);
-    if (status == STATUS_OK && !field_is_sha256(id))
+    if (status == STATUS_OK && !sha256_is_hex(id))
         status = error_set(err, STATUS_INPUT, "the daemon names a scene \"%.80s\"", id);
     if (status == STATUS_OK)
         status = scene_cache_take(scene, cache_dir, cache_bytes, id, cJSON_GetObjectItemCaseSensitive(list, "files"),

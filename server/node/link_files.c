@@ -7,6 +7,7 @@
 
 #include "common/clock.h"
 #include "common/mem.h"
+#include "common/url.h"
 #include "server/net/field.h"
 #include "server/node/link.h"
 
@@ -52,7 +53,7 @@ static char *path_of(const struct attempt_link *l, const char *what, const char 
     buf_printf(&path, "%s/%s", l->path, what);
     if (name) {
         buf_puts(&path, "/");
-        request_escape(&path, name, false); /* a slash within is one part of the path: names may be deep */
+        url_encode(&path, name, false); /* a slash within is one part of the path: names may be deep */
     }
     buf_puts(&path, query);
     return buf_detach(&path);

@@ -10,6 +10,7 @@
 
 #include "common/json.h"
 #include "common/mem.h"
+#include "common/sha256.h"
 #include "server/store/internal.h"
 
 #define COLUMNS                                                                                                        \
@@ -65,7 +66,7 @@ enum status store_output_put(struct store *store, int64_t job_id, int attempt, c
                              uint64_t bytes, const char *sha256, const char *content_type, struct error *err) {
     if (!store_output_is_name(name))
         return error_set(err, STATUS_INPUT, "\"%.100s\" is no name for an output", name);
-    if (strlen(sha256) != 64 || strspn(sha256, "0123456789abcdef") != 64)
+    if (!sha256_is_hex(sha256))
         return error_set(err, STATUS_INPUT, "output %s: \"%.70s\" is no SHA-256", name, sha256);
     enum status status = store_begin(store, err);
     if (status != STATUS_OK)

@@ -7,6 +7,7 @@
 #include "common/json.h"
 #include "common/mem.h"
 #include "common/protocol.h"
+#include "common/sha256.h"
 #include "server/store/transition.h"
 
 static enum status add_parts(struct store *store, int64_t id, int64_t pictures, int parts, const char *digest,
@@ -42,7 +43,7 @@ static enum status split(struct store *store, int64_t id, int attempt, int64_t p
 enum status store_job_split(struct store *store, int64_t id, int attempt, int64_t pictures, int parts,
                             const char *digest, struct error *err) {
     if (parts < 2 || parts > JOB_PARTS_MAX || pictures < parts || pictures > PICTURES_MAX ||
-        strspn(digest, "0123456789abcdef") != SHA256_HEX_SIZE - 1 || strlen(digest) != SHA256_HEX_SIZE - 1)
+        !sha256_is_hex(digest))
         return error_set(err, STATUS_INPUT, "%d parts of %lld pictures cannot be", parts, (long long)pictures);
     enum status status;
     do

@@ -2,6 +2,7 @@
 #include "server/net/field.h"
 
 #include "tests/check.h"
+#include "common/sha256.h"
 
 static void check_range(const char *text, uint64_t size, enum field_range wanted, uint64_t first, uint64_t count) {
     uint64_t found_first = 0, found_count = 0;
@@ -57,7 +58,7 @@ static void check_digests(void) {
     CHECK(!field_digest("sha-256=:ungWv48Bz+pBQUDeXa4iI7ADYaOWF3qctBD/YfIAFa=:", back));
     CHECK(!field_digest("sha-256=:ungWv48Bz+pBQUDeXa4iI7ADYaOWF3qctBD/YfIAF!0=:", back));
     CHECK(!field_digest("sha-256=", back));
-    CHECK(field_is_sha256(hex) && !field_is_sha256("ba78") && !field_is_sha256("BA7816"));
+    CHECK(sha256_is_hex(hex) && !sha256_is_hex("ba78") && !sha256_is_hex("BA7816"));
 }
 
 static void check_hosts(void) {

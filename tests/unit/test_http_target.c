@@ -2,6 +2,7 @@
 #include "server/net/target.h"
 
 #include "common/mem.h"
+#include "common/url.h"
 #include "tests/check.h"
 
 static void accept_path(const char *raw, size_t count, const char *rest) {
@@ -101,12 +102,14 @@ static void check_queries(void) {
 }
 
 static void check_encoded(void) {
-    char *text = target_encode("a b/\xC3\xA4~", 1);
-    CHECK_STRING(text, "a%20b/%C3%A4~");
-    mem_free(text);
-    text = target_encode("a/b", 0);
-    CHECK_STRING(text, "a%2Fb");
-    mem_free(text);
+    struct buf text;
+    buf_init(&text, 100);
+    url_encode(&text, "a b/\xC3\xA4~", true);
+    CHECK_STRING(buf_text(&text), "a%20b/%C3%A4~");
+    buf_clear(&text);
+    url_encode(&text, "a/b", false);
+    CHECK_STRING(buf_text(&text), "a%2Fb");
+    buf_release(&text);
 }
 
 int main(void) {
