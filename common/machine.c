@@ -48,8 +48,8 @@ static uint64_t group_limit(const char *root, char *line) {
         char *end = strrchr(path, '/');
         if (end && end[1] == '\0')
             *end = '\0';
-        least = lesser(least,
-                       read_limit(root, group.mount, path, group.is_v2 ? "memory.max" : "memory.limit_in_bytes"));
+        least =
+            lesser(least, read_limit(root, group.mount, path, group.is_v2 ? "memory.max" : "memory.limit_in_bytes"));
         end = strrchr(path, '/');
         if (!end)
             return least;

@@ -81,5 +81,4 @@ enum status request_run(struct http_request *r, const struct request_call *call,
 /* GET of a JSON document. */
 enum status request_get(struct http_request *r, const char *path, struct reply *reply, struct error *err);
 
-
 #endif

@@ -37,7 +37,6 @@ void field_digest_format(const char *hex, char text[64]);
 /* A decimal number in [minimum, maximum] and nothing else. */
 bool field_number(const char *text, int64_t minimum, int64_t maximum, int64_t *value);
 
-
 /* The first *length bytes of `host` are its name without the port; false when the syntax is bad. An IPv6 address
  * keeps its brackets. `host` is a Host field, or the host of an Origin. */
 bool field_host(const char *host, size_t *length);

@@ -34,5 +34,4 @@ const char *target_query(const struct target *t, const char *name);
 /* The segments from `first` on, joined by slashes; the caller's (mem_free). */
 char *target_rest(const struct target *t, size_t first);
 
-
 #endif

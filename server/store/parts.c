@@ -42,8 +42,7 @@ static enum status split(struct store *store, int64_t id, int attempt, int64_t p
 
 enum status store_job_split(struct store *store, int64_t id, int attempt, int64_t pictures, int parts,
                             const char *digest, struct error *err) {
-    if (parts < 2 || parts > JOB_PARTS_MAX || pictures < parts || pictures > PICTURES_MAX ||
-        !sha256_is_hex(digest))
+    if (parts < 2 || parts > JOB_PARTS_MAX || pictures < parts || pictures > PICTURES_MAX || !sha256_is_hex(digest))
         return error_set(err, STATUS_INPUT, "%d parts of %lld pictures cannot be", parts, (long long)pictures);
     enum status status;
     do
