@@ -35,11 +35,11 @@ static size_t held_out_costs(const struct light_fit *f, const double *x, double 
             continue;
         size_t first = f->o->start[p], count = f->o->start[p + 1] - first;
         double weight[OVERLAP_OBSERVATIONS_MAX], square[OVERLAP_OBSERVATIONS_MAX];
-        memcpy(weight, f->trust + first, count * sizeof *weight);
+        memcpy(weight, f->prior_weight + first, count * sizeof *weight);
         for (int round = 0; round < COST_ROUNDS; round++) {
             light_fit_residuals(f, x, p, weight, square);
             for (size_t i = 0; i < count; i++)
-                weight[i] = f->trust[first + i] / (1.0 + LIGHT_CAUCHY * square[i] / (scale * scale));
+                weight[i] = f->prior_weight[first + i] / (1.0 + LIGHT_CAUCHY * square[i] / (scale * scale));
         }
         cost[used] = 0.0;
         for (size_t i = 0; i < count; i++)

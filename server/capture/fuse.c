@@ -59,7 +59,7 @@ static void add_observation(const struct fuse_job *job, struct fuse_observations
     if (is_measured != l->is_measured)
         return;
     /* Noise at the same radiance for all photographs: by their own values bright noise would be preferred. */
-    float weight = view->weight * views_trust(v, view, triangle);
+    float weight = view->weight * views_edge_weight(v, view, triangle);
     size_t slot = top_k_put(&l->best, weight * noise_weight(job->noise, v, view, rgb_gray(v->median_radiance), 0.0f),
                             view->train);
     if (slot == TOP_K_NONE)

@@ -40,7 +40,7 @@ void light_fit_init(struct light_fit *f, const struct views *views, const struct
     *f = (struct light_fit){.o = o, .views = views, .frames = views->train_count, .scale = 1.0};
     f->exposure_known = mem_calloc(f->frames + 1, sizeof *f->exposure_known);
     f->radius = mem_calloc(observations + 1, sizeof *f->radius);
-    f->trust = mem_calloc(observations + 1, sizeof *f->trust);
+    f->prior_weight = mem_calloc(observations + 1, sizeof *f->prior_weight);
     f->weight = mem_calloc(observations + 1, sizeof *f->weight);
     for (size_t t = 0; t < f->frames; t++) {
         f->exposure_known[t] = views->scene->photograph[views->train[t]].exposure_known;
@@ -55,14 +55,15 @@ void light_fit_init(struct light_fit *f, const struct views *views, const struct
         f->radius[i][0] = s;
         f->radius[i][1] = s * s;
         f->radius[i][2] = s * s * s;
-        f->trust[i] = 1.0 / (OBSERVATION_SIGMA * OBSERVATION_SIGMA + grazing * grazing + 0.25 * contrast * contrast);
+        f->prior_weight[i] =
+            1.0 / (OBSERVATION_SIGMA * OBSERVATION_SIGMA + grazing * grazing + 0.25 * contrast * contrast);
     }
 }
 
 void light_fit_release(struct light_fit *f) {
     mem_free(f->exposure_known);
     mem_free(f->radius);
-    mem_free(f->trust);
+    mem_free(f->prior_weight);
     mem_free(f->weight);
 }
 
@@ -199,7 +200,7 @@ void light_fit_residuals(const struct light_fit *f, const double *x, size_t poin
             double predicted = (double)observation->value[c] - (y[i] - mean);
             bool usable =
                 predicted >= (double)observation->min_value[c] && predicted <= (double)observation->max_value[c];
-            square[i] += usable ? f->trust[first + i] * (y[i] - mean) * (y[i] - mean) / 3.0 : INFINITY;
+            square[i] += usable ? f->prior_weight[first + i] * (y[i] - mean) * (y[i] - mean) / 3.0 : INFINITY;
         }
     }
 }
@@ -221,7 +222,7 @@ static void reweight(struct light_fit *f, const double *x, bool is_convex) {
     for (size_t i = 0; i < observations; i++) {
         double e = square[i] / (f->scale * f->scale);
         double robust = is_convex ? 1.0 / sqrt(1.0 + e) : 1.0 / (1.0 + LIGHT_CAUCHY * e);
-        f->weight[i] = f->trust[i] * robust / (f->scale * f->scale);
+        f->weight[i] = f->prior_weight[i] * robust / (f->scale * f->scale);
     }
     mem_free(known);
     mem_free(square);
@@ -230,7 +231,7 @@ static void reweight(struct light_fit *f, const double *x, bool is_convex) {
 void light_fit_solve(struct light_fit *f, int model, double *x) {
     size_t observations = f->o->start[f->o->point_count];
     for (size_t i = 0; i < observations; i++)
-        f->weight[i] = f->trust[i];
+        f->weight[i] = f->prior_weight[i];
     for (int round = 0; round < ROUNDS; round++) {
         reweight(f, x, round < CONVEX_ROUNDS);
         solve_linear(f, model, x);

@@ -30,9 +30,9 @@ struct light_fit {
     size_t unknown_exposure_count; /* whose exposure is unknown */
     bool *exposure_known;          /* [frames]; owned, as all below */
     double (*radius)[3];           /* [observations] s, s^2, s^3 */
-    double *trust;                 /* [observations] inverse variance by contrast and angle */
-    double *weight;                /* [observations] trust times the robust weight; 0: held out */
-    double scale;                  /* of residuals, over what `trust` expects */
+    double *prior_weight;          /* [observations] inverse variance by contrast and angle */
+    double *weight;                /* [observations] prior_weight times the robust weight; 0: held out */
+    double scale;                  /* of residuals, over what `prior_weight` expects */
     bool all_points;               /* no point is held out */
 };
 

@@ -23,13 +23,13 @@ size_t robust_keep(struct robust_sample *sample, size_t count, float within) {
     return kept;
 }
 
-float robust_weigh(struct robust_sample *sample, size_t count, float trust, float scale) {
+float robust_weigh(struct robust_sample *sample, size_t count, float weight_power, float scale) {
     float half = 0.0f, below = 0.0f, weights = 0.0f;
     size_t middle = 0;
     qsort(sample, count, sizeof *sample, compare_gray);
     for (size_t i = 0; i < count; i++)
-        half += 0.5f * powf(sample[i].weight, trust);
-    while (middle + 1 < count && (below += powf(sample[middle].weight, trust)) < half)
+        half += 0.5f * powf(sample[i].weight, weight_power);
+    while (middle + 1 < count && (below += powf(sample[middle].weight, weight_power)) < half)
         middle++;
     float median = sample[middle].gray;
     for (size_t i = 0; i < count; i++) {

@@ -19,16 +19,16 @@ struct robust_sample {
     float mixing;
 };
 
-/* Cauchy weights: lowers the weights of samples off the weighted median of `gray` (weights to the power `trust` in [0,
- * 1]): to half at distance `scale`, or farther where noise explains it. count > 0; sorts the samples. Returns the sum
- * of the weights. */
-float robust_weigh(struct robust_sample *sample, size_t count, float trust, float scale);
+/* Cauchy weights: lowers the weights of samples off the weighted median of `gray` (weights to the power `weight_power`
+ * in [0, 1]): to half at distance `scale`, or farther where noise explains it. count > 0; sorts the samples. Returns
+ * the sum of the weights. */
+float robust_weigh(struct robust_sample *sample, size_t count, float weight_power, float scale);
 
 /* Keeps samples whose `gray` is less than `within` from its unweighted median. count > 0; sorts the samples; returns
  * how many are kept. */
 size_t robust_keep(struct robust_sample *sample, size_t count, float within);
 
-/* Weighted mean after robust_weigh with trust 1; count > 0. */
+/* Weighted mean after robust_weigh with weight_power 1; count > 0. */
 rgb robust_mean(struct robust_sample *sample, size_t count, float scale);
 
 #endif

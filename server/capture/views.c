@@ -13,7 +13,7 @@
  * degrees, as scans have, changes the cosine by a third. */
 #define MIN_COSINE 0.1f /* +25 %: 0 dB */
 /* Light of other surfaces: pixels around a look-up that are searched for brighter ones, as far as the edge
- * distances of `trust` reach; the ratio up to which these do not count, usual between two paints. */
+ * distances of views_edge_weight reach; the ratio up to which these do not count, usual between two paints. */
 #define MIXING_PIXELS 2.0f     /* +25 %: +0.02 dB */
 #define MIXING_FREE_RATIO 2.0f /* +25 %: +0.02 dB */
 /* bound of the relative variance: no more can have been added than is observed */
@@ -151,7 +151,7 @@ int views_edge(const struct views *v, const struct view *view, uint32_t triangle
     return nearest;
 }
 
-float views_trust(const struct views *v, const struct view *view, uint32_t triangle) {
+float views_edge_weight(const struct views *v, const struct view *view, uint32_t triangle) {
     /* By distance to the edge, 3 pixels and more first. From there on about as the inverse of the variances of
      * views_mixing, and less on the edge itself: such a look-up counts only where there are no others. */
     static const float trust[VIEWS_EDGE + 1] = {1.0f, 0.5f, 0.05f, 0.001f};

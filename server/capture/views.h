@@ -77,11 +77,11 @@ bool views_unoccluded(const struct views *v, uint32_t train, vec3 point, vec3 ge
 /* Unit direction from a point to the camera of training photograph `train`. */
 vec3 views_direction(const struct views *v, uint32_t train, vec3 point);
 
-/* views_edge: the greatest `edge` among the four pixels of a bilinear look-up at a point of the triangle. views_trust:
- * the weight of that look-up, in (0, 1]: lenses and reconstruction filters spread light a pixel or two over an edge. A
- * pixel that shows another segment (the triangle's is too thin for it) counts as mixed. */
+/* views_edge: the greatest `edge` among the four pixels of a bilinear look-up at a point of the triangle.
+ * views_edge_weight: the weight of that look-up, in (0, 1]: lenses and reconstruction filters spread light a pixel or
+ * two over an edge. A pixel that shows another segment (the triangle's is too thin for it) counts as mixed. */
 int views_edge(const struct views *v, const struct view *view, uint32_t triangle);
-float views_trust(const struct views *v, const struct view *view, uint32_t triangle);
+float views_edge_weight(const struct views *v, const struct view *view, uint32_t triangle);
 
 /* Relative variance of a look-up with radiance `observed` due to light of other surfaces: grows with the brightness
  * around it, and is at most 1, since no more can have been added than is observed. Neighbouring look-ups share it: no

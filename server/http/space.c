@@ -15,7 +15,7 @@ static struct response *check_room(struct api *api, const struct request *r, uin
     return status == STATUS_OK ? NULL : refuse(r, &err, STATUS_NO_SPACE);
 }
 
-struct response *space_check_room(struct api *api, const struct request *r, uint64_t bytes) {
+struct response *space_check_free(struct api *api, const struct request *r, uint64_t bytes) {
     uint64_t keep = api->config.min_free_bytes + (limits_bind(r) ? api->config.admin_free_bytes : 0);
     return check_room(api, r, keep, bytes);
 }

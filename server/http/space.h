@@ -8,7 +8,7 @@
 #include "server/transport/message.h"
 
 /* Refuses with a reply unless min_free_bytes + `bytes` are free. */
-struct response *space_check_room(struct api *api, const struct request *r, uint64_t bytes);
+struct response *space_check_free(struct api *api, const struct request *r, uint64_t bytes);
 /* The same for what a running job writes, on this machine or through its node: nothing is kept free for others. */
 struct response *space_check_job(struct api *api, const struct request *r, uint64_t bytes);
 /* Refuses when what the caller keeps, not counting the scene `but_scene` (NULL: none), plus what is arriving in other

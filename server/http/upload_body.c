@@ -65,7 +65,7 @@ struct response *upload_body_begin(struct api *api, struct request *r) {
         return problem(r, 413, "the upload needs %" PRIu64 " further bytes, not %lld", upload_writer_room(p->writer),
                        (long long)r->content_length);
     uint64_t unreserved = upload_writer_unreserved(p->writer);
-    return unreserved ? space_check_room(api, r, unreserved) : NULL;
+    return unreserved ? space_check_free(api, r, unreserved) : NULL;
 }
 
 struct response *upload_body_data(struct api *api, struct request *r, const void *data, size_t length) {

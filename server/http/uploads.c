@@ -121,7 +121,7 @@ static struct response *create(struct api *api, const struct request *r, struct 
     pthread_mutex_lock(&api->folder.scene_mutex); /* two at once would both find room */
     struct response *refusal = limits_check_upload(api, r, row->length);
     if (!refusal)
-        refusal = space_check_room(api, r, row->length);
+        refusal = space_check_free(api, r, row->length);
     if (!refusal)
         refusal = space_check_share(api, r, NULL, row->length);
     if (!refusal && resumable_create(api->resumables, row, api->config.user_max_uploads, &err) != STATUS_OK)

@@ -15,7 +15,7 @@ struct response *whole_body_begin(struct api *api, struct request *r, whole_body
     pthread_mutex_lock(&api->folder.scene_mutex); /* two at once would both find room */
     struct response *refusal = check(api, r, length);
     if (!refusal)
-        refusal = space_check_room(api, r, length);
+        refusal = space_check_free(api, r, length);
     if (!refusal)
         refusal = space_check_share(api, r, NULL, length);
     if (!refusal &&
@@ -31,7 +31,7 @@ struct response *whole_body_data(struct api *api, struct request *r, const void 
     if (upload_write(r->upload, data, length, &must_check_room, &err) != STATUS_OK)
         return problem_from(r, &err);
     atomic_fetch_add(&api->uploaded_bytes, length);
-    struct response *refusal = must_check_room ? space_check_room(api, r, 0) : NULL;
+    struct response *refusal = must_check_room ? space_check_free(api, r, 0) : NULL;
     return must_check_room && !refusal ? space_check_share(api, r, NULL, upload_bytes(r->upload)) : refusal;
 }
 

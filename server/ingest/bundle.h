@@ -1,8 +1,7 @@
 /* bundle.h -- turns an upload into a scene. Runs in workers only, never in the daemon.
  *
- * A bundle is a folder with cameras of some source (source/sources.h), the photographs that they name, and a mesh
- * (mesh_file.h): the key `mesh`; else ply_file_path if it has faces; else the only PLY with faces at the top level;
- * else the only file of another mesh format there. */
+ * A bundle is a folder with cameras of some source (source/sources.h), the photographs that they name, and a mesh,
+ * which mesh_choice.h chooses. */
 #ifndef UNBAKE_INGEST_BUNDLE_H
 #define UNBAKE_INGEST_BUNDLE_H
 

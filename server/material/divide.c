@@ -126,7 +126,7 @@ static void add_candidate(const struct divide *d, uint32_t segment, const struct
     c.mixing = views_mixing(d->views, &c.view, at->triangle, c.observed);
     c.sharp = !is_saturated(&c) && sharpen(d, &c.view, at->triangle, &c.observed);
     float times_typical = rgb_mean(c.observed) / fmaxf(rgb_mean(typical), MIN_LAMBERT * d->views->median_radiance);
-    c.weight = c.view.weight * views_trust(d->views, &c.view, at->triangle) *
+    c.weight = c.view.weight * views_edge_weight(d->views, &c.view, at->triangle) *
                noise_weight(d->noise, d->views, &c.view, typical, c.mixing * times_typical * times_typical);
     size_t slot = top_k_put(&of->best, c.weight, train);
     if (slot != TOP_K_NONE)

@@ -65,7 +65,7 @@ int main(void) {
         static const float trust[4] = {1.0f, 0.5f, 0.05f, 0.001f};
         struct view view = {.train = 0, .x = (float)EDGE_AT + 0.5f - (float)(4 - k), .y = HEIGHT / 2, .weight = 1.0f};
         CHECK(views_edge(&v, &view, 0) == k);
-        CHECK_NEAR(views_trust(&v, &view, 0), trust[k], 1e-6f);
+        CHECK_NEAR(views_edge_weight(&v, &view, 0), trust[k], 1e-6f);
     }
 
     /* As bright on both sides: only the distance from the edge counts. */

@@ -216,7 +216,7 @@ static struct response *submit(struct job_submission *s, bool dry_run) {
     if (!reply)
         reply = check_states(s);
     if (!reply && !dry_run)
-        reply = space_check_room(s->api, s->r, 0);
+        reply = space_check_free(s->api, s->r, 0);
     if (!reply && !dry_run)
         reply = space_check_share(s->api, s->r, NULL, 0);
     return reply ? reply : dry_run ? dry_run_reply(s) : add_job(s);
