@@ -8,6 +8,7 @@
 #include "client/table.h"
 #include "client/view.h"
 #include "common/mem.h"
+#include "common/output_names.h"
 #include "common/protocol.h"
 #include "common/url.h"
 
@@ -17,15 +18,15 @@ const struct command_option compare_options[] = {FORMAT_OPTION, {0}};
 static const struct job_figure {
     const char *kind, *output, *member, *heading;
 } figures[] = {
-    {JOB_KIND_RECONSTRUCT, "report.json", "metrics.psnr_db", "?>psnr_db"},
-    {JOB_KIND_RECONSTRUCT, "report.json", "metrics.ssim", "?>ssim"},
-    {JOB_KIND_RECONSTRUCT, "report.json", "metrics.msre", "?>msre"},
-    {JOB_KIND_RECONSTRUCT, "report.json", "grey_card.ratio", "?>grey_card"},
-    {JOB_KIND_EVALUATE, "evaluation.json", "base_color_psnr_db", "?>color_db"},
-    {JOB_KIND_EVALUATE, "evaluation.json", "roughness_rms_error", "?>roughness_rms"},
-    {JOB_KIND_EVALUATE, "evaluation.json", "specular_rms_error", "?>specular_rms"},
-    {JOB_KIND_EVALUATE, "evaluation.json", "emission_iou", "?>emission_iou"},
-    {JOB_KIND_EVALUATE, "evaluation.json", "msre", "?>truth_msre"},
+    {JOB_KIND_RECONSTRUCT, OUTPUT_REPORT, "metrics.psnr_db", "?>psnr_db"},
+    {JOB_KIND_RECONSTRUCT, OUTPUT_REPORT, "metrics.ssim", "?>ssim"},
+    {JOB_KIND_RECONSTRUCT, OUTPUT_REPORT, "metrics.msre", "?>msre"},
+    {JOB_KIND_RECONSTRUCT, OUTPUT_REPORT, "grey_card.ratio", "?>grey_card"},
+    {JOB_KIND_EVALUATE, OUTPUT_EVALUATION, "base_color_psnr_db", "?>color_db"},
+    {JOB_KIND_EVALUATE, OUTPUT_EVALUATION, "roughness_rms_error", "?>roughness_rms"},
+    {JOB_KIND_EVALUATE, OUTPUT_EVALUATION, "specular_rms_error", "?>specular_rms"},
+    {JOB_KIND_EVALUATE, OUTPUT_EVALUATION, "emission_iou", "?>emission_iou"},
+    {JOB_KIND_EVALUATE, OUTPUT_EVALUATION, "msre", "?>truth_msre"},
 };
 #define FIGURE_COUNT (sizeof figures / sizeof *figures)
 #define FIXED_COUNT 4                                             /* job, state, time, name */

@@ -10,8 +10,8 @@ struct cgroup {
     char *path;        /* of the group below the mount: "/a/b"; borrowed from the line */
 };
 
-/* Reads a line of /proc/self/cgroup, "0::/a/b" (version 2) or "4:memory:/a/b" (version 1); changes it. False where it is
- * about another controller. In a container the path may be the host's: then its group is the mount itself. */
+/* Reads a line of /proc/self/cgroup, "0::/a/b" (version 2) or "4:memory:/a/b" (version 1); changes it. False where it
+ * is about another controller. In a container the path may be the host's: then its group is the mount itself. */
 bool cgroup_parse(char *line, struct cgroup *group);
 
 #endif

@@ -22,8 +22,8 @@ static const struct server_command table[] = {
      "user's name; what is revoked stops working at once, in open streams too. While there has never\n"
      "been a token, whoever reaches the daemon may do everything; so the first one makes an admin, unless\n"
      "--role says otherwise, and later ones make users.\n",
-     "  unbaked token add alice --role admin\n  unbaked token add bob --expires 90d\n  unbaked token add wall-display --role viewer\n"
-     "  unbaked token revoke alice\n",
+     "  unbaked token add alice --role admin\n  unbaked token add bob --expires 90d\n"
+     "  unbaked token add wall-display --role viewer\n  unbaked token revoke alice\n",
      token_flags, token_command},
     {"check-config", "[FILE]", "say what is wrong with a configuration", "",
      "  unbaked check-config /etc/unbaked.conf\n", check_config_flags, check_config_command},

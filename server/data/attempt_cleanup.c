@@ -8,6 +8,7 @@
 
 #include "common/file.h"
 #include "common/mem.h"
+#include "common/output_names.h"
 #include "server/data/attempt_folder.h"
 #include "server/data/layout.h"
 #include "server/data/picture_record.h"
@@ -48,7 +49,7 @@ static enum status tidy_folder(struct tidying *t, const char *path, const char *
             status = tidy_folder(t, inner, output, err);
             if (status == STATUS_OK && rmdir(inner) != 0 && errno != ENOTEMPTY && errno != EEXIST)
                 status = error_set_errno(err, errno, "cannot remove %s", inner);
-        } else if (is_named(t, output) || strcmp(names[i], PICTURE_RECORD) == 0)
+        } else if (is_named(t, output) || strcmp(names[i], OUTPUT_RECORD) == 0)
             t->has_files = true;
         else
             status = file_remove_tree(inner, err);

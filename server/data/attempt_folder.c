@@ -10,6 +10,7 @@
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
+#include "common/output_names.h"
 #include "server/data/layout.h"
 #include "server/data/picture_record.h"
 
@@ -174,7 +175,7 @@ enum status attempt_folder_list_checkpoint(const char *data_dir, int64_t job_id,
 /* --- outputs of earlier attempts --------------------------------------------------------------- */
 
 /* Lines are appended to it in place, so it is not linked; it is kept though no row names it. */
-static bool is_record(const char *name) { return strcmp(name, PICTURE_RECORD) == 0; }
+static bool is_record(const char *name) { return strcmp(name, OUTPUT_RECORD) == 0; }
 
 static enum status link_files(const char *from, const char *to, struct error *err) {
     char **names = NULL;
@@ -214,8 +215,8 @@ enum status attempt_folder_carry_outputs(const char *data_dir, int64_t job_id, i
         mem_free(other);
     }
     for (size_t i = 0; i < count && status == STATUS_OK; i++) { /* oldest first: a later line of a picture counts */
-        char *other = layout_attempt(data_dir, job_id, numbers[i]), *from = layout_output(other, PICTURE_RECORD);
-        char *record = layout_output(dir, PICTURE_RECORD);
+        char *other = layout_attempt(data_dir, job_id, numbers[i]), *from = layout_output(other, OUTPUT_RECORD);
+        char *record = layout_output(dir, OUTPUT_RECORD);
         if (numbers[i] != number)
             status = picture_record_move(from, record, err);
         mem_free(record);

@@ -10,6 +10,7 @@
 #include "common/file.h"
 #include "common/json.h"
 #include "common/mem.h"
+#include "common/output_names.h"
 #include "server/data/layout.h"
 #include "server/store/outputs.h"
 
@@ -41,7 +42,7 @@ static bool has_files(const char *dir, const cJSON *files) {
 
 static void read_line(const struct record_reader *r, const char *text, size_t length) {
     cJSON *line = NULL;
-    if (json_parse(text, length, PICTURE_RECORD, &line, NULL) != STATUS_OK)
+    if (json_parse(text, length, OUTPUT_RECORD, &line, NULL) != STATUS_OK)
         return;
     const char *digest = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(line, "digest"));
     double number = cJSON_GetNumberValue(cJSON_GetObjectItemCaseSensitive(line, "picture"));
@@ -54,7 +55,7 @@ static void read_line(const struct record_reader *r, const char *text, size_t le
 
 static enum status read_record(const struct record_reader *r, struct error *err) {
     struct buf text;
-    char *out = layout_out(r->dir), *path = file_join(out, PICTURE_RECORD);
+    char *out = layout_out(r->dir), *path = file_join(out, OUTPUT_RECORD);
     buf_init(&text, RECORD_LIMIT);
     enum status status = file_read(path, &text, err);
     for (const char *at = buf_text(&text), *end; status == STATUS_OK && (end = strchr(at, '\n')) != NULL; at = end + 1)

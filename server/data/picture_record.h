@@ -13,8 +13,6 @@
 
 #include "common/error.h"
 
-#define PICTURE_RECORD "views.jsonl"
-
 /* How many of the `count` pictures from `first` on are done one after another, by records with that digest whose files
  * are there in their size. `numbers`: [number_count] attempts of the job that may have recorded them. */
 enum status picture_record_done(const char *data_dir, int64_t job_id, const int *numbers, size_t number_count,

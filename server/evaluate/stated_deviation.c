@@ -6,6 +6,7 @@
 
 #include "common/file.h"
 #include "common/mem.h"
+#include "common/output_names.h"
 #include "server/evaluate/pair_picture.h"
 #include "server/evaluate/score.h"
 #include "server/render/film.h"
@@ -13,10 +14,10 @@
 enum status stated_deviation_load(const char *outputs, const struct recovered *recovered, struct texture *deviation,
                                   struct error *err) {
     struct image image = {0};
-    char *path = file_join(outputs, "confidence.exr");
+    char *path = file_join(outputs, OUTPUT_CONFIDENCE);
     const struct texture *color = &recovered->materials.base_color;
     *deviation = (struct texture){0};
-    enum status status = file_is_in(outputs, "confidence.exr") ? image_read(path, &image, NULL, err) : STATUS_OK;
+    enum status status = file_is_in(outputs, OUTPUT_CONFIDENCE) ? image_read(path, &image, NULL, err) : STATUS_OK;
     if (status == STATUS_OK && image.pixel && image_channel(&image, "R") == 0 && image.channel_count == 3 &&
         image.width == color->width && image.height == color->height) {
         texture_init(deviation, &recovered->inverse, rgb_gray(0.0f));

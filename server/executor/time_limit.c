@@ -6,6 +6,7 @@
 
 #include "common/file.h"
 #include "common/mem.h"
+#include "common/output_names.h"
 #include "server/data/layout.h"
 #include "server/data/picture_record.h"
 
@@ -25,7 +26,7 @@ static bool is_newer(const char *path, const struct remote_row *row) {
  * time when a later attempt takes the folder over. */
 static bool has_saved(const char *data_dir, const struct remote_row *row) {
     char *dir = layout_attempt(data_dir, row->job_id, row->number), *folder = layout_checkpoint_folder(dir);
-    char *record = layout_output(dir, PICTURE_RECORD), **names = NULL;
+    char *record = layout_output(dir, OUTPUT_RECORD), **names = NULL;
     size_t count = 0;
     bool found = is_newer(record, row) || file_list(folder, &names, &count, NULL) != STATUS_OK;
     for (size_t i = 0; i < count; i++) {

@@ -3,6 +3,7 @@
 
 #include "common/file.h"
 #include "common/mem.h"
+#include "common/output_names.h"
 #include "server/export/glb.h"
 #include "server/export/mesh_obj.h"
 #include "server/export/mitsuba.h"
@@ -55,7 +56,7 @@ static enum status write_shapes(const char *dir, const struct export_input *inpu
 
 /* The map without a sun that is a light of its own. */
 static const char *sky_of(const struct export_input *input) {
-    return input->sun.is_there ? FORMATS_SKY : FORMATS_ENVIRONMENT;
+    return input->sun.is_there ? OUTPUT_SKY : OUTPUT_ENVIRONMENT;
 }
 
 static enum status write_usda(const char *dir, const struct export_input *input, const struct parts *parts,

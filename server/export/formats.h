@@ -5,13 +5,11 @@
 #include "server/export/input.h"
 #include "server/export/parts.h"
 
-/* These files must be in the folder first; the second (emission_texture.h) only if an emitter has a pattern, the next
- * where there is distant light, the last (sky.h) where there is also a sun. */
+/* These files must be in the folder first: the second (emission_texture.h) only if an emitter has a pattern; besides,
+ * OUTPUT_ENVIRONMENT where there is distant light, and OUTPUT_SKY (sky.h) where there is also a sun. */
 #define FORMATS_BASE_COLOR "base_color.png"
 #define FORMATS_EMISSION "emission.png"
 #define FORMATS_BAKED "uv_" /* begins the names of both in the input's own layout (uv_bake.h) */
-#define FORMATS_ENVIRONMENT "environment.exr"
-#define FORMATS_SKY "sky.exr"
 
 #define FORMATS_USD_LAYER "scene.usda"
 

@@ -10,6 +10,7 @@
 
 #include "common/json.h"
 #include "common/mem.h"
+#include "common/output_names.h"
 #include "common/protocol.h"
 #include "server/export/emission_texture.h"
 #include "server/export/glb_lights.h"
@@ -263,7 +264,7 @@ static void add_room(struct glb *g) {
     add_translation(room, g->in->mesh->offset, g->in->up);
     if (g->in->environment) {
         cJSON *extras = add_object(room, "extras");
-        json_add_string(extras, "environment", "environment.exr");
+        json_add_string(extras, "environment", OUTPUT_ENVIRONMENT);
         json_add_string(
             extras, "environment_layout",
             "(column + 1/2) over width = atan2(x, -z) / 2 pi modulo 1, row over (height - 1) = acos(y) / pi: "

@@ -8,6 +8,7 @@
 
 #include "common/file.h"
 #include "common/mem.h"
+#include "common/output_names.h"
 #include "common/protocol.h"
 #include "server/export/formats.h"
 #include "server/export/mesh_ply.h"
@@ -54,7 +55,7 @@ static enum status put_environment_preview(struct export *e, struct error *err) 
 static enum status put_sky(struct export *e, struct error *err) {
     struct image sky;
     sky_without_sun(e->input, &sky);
-    enum status status = output_files_image(&e->files, EVENT_OUTPUT, FORMATS_SKY, &sky, OUTPUT_EXR_FLOAT, RADIANCE_UNIT,
+    enum status status = output_files_image(&e->files, EVENT_OUTPUT, OUTPUT_SKY, &sky, OUTPUT_EXR_FLOAT, RADIANCE_UNIT,
                                             "distant light without the sun, for formats that have a sun", err);
     image_release(&sky);
     return status;
@@ -64,7 +65,7 @@ static enum status put_environment(struct export *e, struct error *err) {
     const struct export_input *in = e->input;
     if (!in->environment)
         return STATUS_OK;
-    enum status status = output_files_image(&e->files, EVENT_OUTPUT, FORMATS_ENVIRONMENT, in->environment,
+    enum status status = output_files_image(&e->files, EVENT_OUTPUT, OUTPUT_ENVIRONMENT, in->environment,
                                             OUTPUT_EXR_FLOAT, RADIANCE_UNIT, ENVIRONMENT_ABOUT, err);
     if (status == STATUS_OK)
         status = output_files_image(&e->files, EVENT_OUTPUT, "environment_confidence.exr", in->environment_confidence,
@@ -128,10 +129,10 @@ static enum status put_baked(struct export *e, struct error *err) {
 
 static enum status put_mesh(struct export *e, const char *type, struct error *err) {
     const struct export_input *in = e->input;
-    char *path = file_join(e->files.dir, "scene.ply");
+    char *path = file_join(e->files.dir, OUTPUT_MESH);
     enum status status = mesh_ply_write(path, in->mesh, in->segments, in->atlas, err);
     if (status == STATUS_OK)
-        status = output_files_list(&e->files, type, "scene.ply", MIME_PLY,
+        status = output_files_list(&e->files, type, OUTPUT_MESH, MIME_PLY,
                                    "the mesh with its atlas coordinates s, t and its segments", err);
     mem_free(path);
     return status;
@@ -182,7 +183,7 @@ static enum status put_json(struct export *e, const char *name, cJSON *tree, con
 }
 
 static enum status put_views(struct export *e, struct error *err) {
-    return put_json(e, "views.json",
+    return put_json(e, OUTPUT_VIEWS,
                     views_json(e->input->comparison, e->input->comparison_count, e->input->mesh->offset),
                     "the cameras of the held-out views, as transforms.json has them", err);
 }
@@ -190,7 +191,7 @@ static enum status put_views(struct export *e, struct error *err) {
 static enum status put_cameras(struct export *e, struct error *err) {
     if (e->input->camera_count == 0)
         return STATUS_OK;
-    return put_json(e, "cameras.json", cameras_json(e->input),
+    return put_json(e, OUTPUT_CAMERAS, cameras_json(e->input),
                     "the cameras of all photographs, corrected, as transforms.json has them", err);
 }
 
@@ -282,7 +283,7 @@ static enum status put_report(struct export *e, struct error *err) {
     if (e->files.left_out->child)
         json_add(report, "left_out", cJSON_Duplicate(e->files.left_out, true));
     char *text = json_page(report);
-    enum status status = output_files_bytes(&e->files, "report.json", MIME_JSON, text, strlen(text), NULL, err);
+    enum status status = output_files_bytes(&e->files, OUTPUT_REPORT, MIME_JSON, text, strlen(text), NULL, err);
     mem_free(text);
     if (status == STATUS_OK)
         status = put_page(e, report, err);
@@ -295,7 +296,7 @@ static enum status put_report(struct export *e, struct error *err) {
 /* The mesh as it is by now, once: what is drawn of the room while the job goes on. Of the texture's charts and the
  * triangles nothing changes later; segments may be split. */
 static enum status put_early_mesh(struct export *e, struct error *err) {
-    char *path = file_join(e->files.dir, "scene.ply");
+    char *path = file_join(e->files.dir, OUTPUT_MESH);
     bool is_there = access(path, F_OK) == 0;
     mem_free(path);
     return is_there ? STATUS_OK : put_mesh(e, EVENT_PREVIEW, err);

@@ -10,6 +10,7 @@
 #include "common/machine.h"
 #include "common/kept_pixels.h"
 #include "common/mem.h"
+#include "common/output_names.h"
 #include "common/settings.h"
 #include "server/job/memory_reduction.h"
 
@@ -134,7 +135,7 @@ static enum status need_of_render(const struct admission *a, struct store *store
     for (size_t i = 0; i < count; i++) {
         size_t length = strlen(rows[i].name);
         bool is_read = !strchr(rows[i].name, '/') && length > 4 &&
-                       (strcmp(rows[i].name + length - 4, ".exr") == 0 || strcmp(rows[i].name, JOB_SOURCE_OUTPUT) == 0);
+                       (strcmp(rows[i].name + length - 4, ".exr") == 0 || strcmp(rows[i].name, OUTPUT_MESH) == 0);
         bytes += is_read ? (double)rows[i].bytes : 0.0;
         output_row_release(&rows[i]);
     }

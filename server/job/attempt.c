@@ -8,6 +8,7 @@
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
+#include "common/output_names.h"
 #include "server/data/attempt_folder.h"
 #include "server/data/layout.h"
 #include "server/job/admission.h"
@@ -22,9 +23,9 @@
 static enum status find_outputs(struct store *store, int64_t source, char **folder, struct error *err) {
     struct output_row row = {0};
     *folder = NULL;
-    enum status status = store_source_look(store, source, err);
+    enum status status = store_source_check_readable(store, source, err);
     if (status == STATUS_OK)
-        status = store_output_get(store, source, JOB_SOURCE_OUTPUT, &row, err);
+        status = store_output_get(store, source, OUTPUT_MESH, &row, err);
     if (status == STATUS_OK) {
         char *dir = layout_attempt(NULL, source, row.attempt);
         *folder = layout_out(dir);

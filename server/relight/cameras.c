@@ -7,6 +7,7 @@
 
 #include "common/file.h"
 #include "common/mem.h"
+#include "common/output_names.h"
 #include "server/ingest/transforms.h"
 #include "server/relight/setting_files.h"
 #include "server/scene/coordinates.h"
@@ -83,9 +84,9 @@ static enum status add_frames(struct cameras *v, const struct frames *t, const c
 
 static char *cameras_path(const struct relight_job *job) {
     if (render_settings_is(job->settings, "cameras", "held_out"))
-        return file_join(job->outputs, "views.json");
+        return file_join(job->outputs, OUTPUT_VIEWS);
     if (render_settings_is(job->settings, "cameras", "photographs"))
-        return file_join(job->outputs, "cameras.json");
+        return file_join(job->outputs, OUTPUT_CAMERAS);
     return setting_files_path(job, render_settings_text(job->settings, "cameras"));
 }
 

@@ -8,6 +8,7 @@
 
 #include "common/file.h"
 #include "common/mem.h"
+#include "common/output_names.h"
 #include "server/relight/setting_files.h"
 #include "server/render/light.h"
 
@@ -96,7 +97,7 @@ static enum status read_sky(const struct relight_job *job, const struct compass 
  * sun. */
 static enum status read_found(const struct relight_job *job, enum distant_part part, struct image *picture,
                               struct error *err) {
-    char *whole = file_join(job->outputs, "environment.exr"), *without = file_join(job->outputs, "sky.exr");
+    char *whole = file_join(job->outputs, OUTPUT_ENVIRONMENT), *without = file_join(job->outputs, OUTPUT_SKY);
     bool has_sun = access(without, F_OK) == 0;
     struct image sky = {0};
     enum status status = STATUS_OK;

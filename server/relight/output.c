@@ -11,6 +11,7 @@
 
 #include "common/file.h"
 #include "common/mem.h"
+#include "common/output_names.h"
 
 #define RECORD_LIMIT ((size_t)1 << 30) /* bytes of views.jsonl */
 #define MIN_DIGITS 5                   /* of a picture's number in names */
@@ -37,9 +38,9 @@ static void digest_settings(struct sha256 *hash, const cJSON *settings) {
 /* The settings, the files that they name, and all that is read of the outputs: somebody may have painted a texture
  * over. */
 void output_digest(const struct relight_job *job, char digest[SHA256_HEX_SIZE]) {
-    static const char *const names[] = {"report.json",     "scene.ply",     "views.json",   "cameras.json",
-                                        "base_color.exr",  "roughness.exr", "specular.exr", "emission.exr",
-                                        "environment.exr", "sky.exr"};
+    static const char *const names[] = {OUTPUT_REPORT,      OUTPUT_MESH,      OUTPUT_VIEWS,    OUTPUT_CAMERAS,
+                                        OUTPUT_BASE_COLOR,  OUTPUT_ROUGHNESS, OUTPUT_SPECULAR, OUTPUT_EMISSION,
+                                        OUTPUT_ENVIRONMENT, OUTPUT_SKY};
     struct sha256 hash;
     char hex[SHA256_HEX_SIZE];
     sha256_init(&hash);

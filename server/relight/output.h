@@ -14,9 +14,6 @@
 #include "server/relight/passes.h"
 #include "server/relight/relight_job.h"
 
-#define OUTPUT_RECORD "views.jsonl"
-#define OUTPUT_VIEWS "views.json"
-
 struct output {
     const struct relight_job *job;
     const struct relight_watch *watch;

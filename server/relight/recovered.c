@@ -7,6 +7,7 @@
 #include "common/file.h"
 #include "common/image.h"
 #include "common/mem.h"
+#include "common/output_names.h"
 #include "server/ingest/mesh/ply_header.h"
 
 #define PLY_LIMIT ((size_t)1 << 34)
@@ -108,7 +109,7 @@ static enum status read_faces(struct charted *c, const struct ply_header *h, str
 static enum status read_scene_ply(const char *dir, struct charted *c, struct error *err) {
     struct buf file;
     struct ply_header header;
-    char *path = file_join(dir, "scene.ply");
+    char *path = file_join(dir, OUTPUT_MESH);
     buf_init(&file, PLY_LIMIT);
     enum status status = file_read(path, &file, err);
     struct ply_cursor at = {.name = path, .data = (const uint8_t *)file.data, .size = file.length};
@@ -211,7 +212,7 @@ static size_t *sample_texels(const struct recovered *r) {
 }
 
 static enum status take_segment_values(struct recovered *r, const char *dir, struct error *err) {
-    static const char *const name[2] = {"roughness.exr", "specular.exr"};
+    static const char *const name[2] = {OUTPUT_ROUGHNESS, OUTPUT_SPECULAR};
     float *const to[2] = {r->materials.roughness, r->materials.specular};
     size_t *texel = sample_texels(r);
     enum status status = STATUS_OK;
@@ -282,7 +283,7 @@ static void take_emission(struct recovered *r, const struct image *image) {
 
 static enum status read_emission(struct recovered *r, const char *dir, struct error *err) {
     struct image image;
-    enum status status = read_sized(dir, "emission.exr", &r->atlas, &image, err);
+    enum status status = read_sized(dir, OUTPUT_EMISSION, &r->atlas, &image, err);
     if (status != STATUS_OK)
         return status;
     take_emission(r, &image);
@@ -293,7 +294,7 @@ static enum status read_emission(struct recovered *r, const char *dir, struct er
 /* Distant light; most rooms have none. */
 static enum status take_environment(struct recovered *r, const char *dir, struct parallel *pool, struct error *err) {
     struct image map = {0};
-    char *path = file_join(dir, "environment.exr");
+    char *path = file_join(dir, OUTPUT_ENVIRONMENT);
     enum status status = image_read(path, &map, NULL, err);
     if (status == STATUS_OK)
         world_set_environment(&r->world, &map, pool);
@@ -307,7 +308,7 @@ enum status recovered_read(const char *dir, const struct mesh *mesh, struct para
     struct charted charted = {0};
     struct image base_color = {0};
     memset(r, 0, sizeof *r);
-    enum status status = read_texture(dir, "base_color.exr", &base_color, err);
+    enum status status = read_texture(dir, OUTPUT_BASE_COLOR, &base_color, err);
     if (status != STATUS_OK)
         return status;
     status = read_scene_ply(dir, &charted, err);

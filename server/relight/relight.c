@@ -8,6 +8,7 @@
 #include "common/clock.h"
 #include "common/file.h"
 #include "common/mem.h"
+#include "common/output_names.h"
 #include "common/protocol.h"
 #include "server/export/pictures.h"
 #include "server/export/views_json.h"
@@ -294,7 +295,7 @@ static enum status say_dark(struct error *err) {
 /* Views, room and output; what was made is released by run_close, also after a failure. */
 static enum status run_open(struct relight_state *r, struct error *err) {
     struct mesh mesh = {0};
-    char *scene = file_join(r->job->outputs, "scene.ply");
+    char *scene = file_join(r->job->outputs, OUTPUT_MESH);
     enum status status = check_denoiser(r, err);
     if (status == STATUS_OK)
         status = mesh_file_read(scene, scene, MESH_MAX_TRIANGLES, &mesh, NULL, err);

@@ -3,6 +3,7 @@
 
 #include "common/file.h"
 #include "common/mem.h"
+#include "common/output_names.h"
 
 #define REPORT_MAX_BYTES ((size_t)256 << 20)
 
@@ -12,7 +13,7 @@ char *setting_files_path(const struct relight_job *job, const char *name) {
 
 cJSON *setting_files_report(const struct relight_job *job) {
     cJSON *report = NULL;
-    char *path = file_join(job->outputs, "report.json");
+    char *path = file_join(job->outputs, OUTPUT_REPORT);
     if (json_read(path, REPORT_MAX_BYTES, &report, NULL) != STATUS_OK || !report)
         report = cJSON_CreateObject();
     mem_free(path);

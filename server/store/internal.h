@@ -131,9 +131,9 @@ enum status store_event_append(struct store *store, int64_t job_id, int attempt,
                                struct error *err);
 /* job_inputs.c, all inside a transaction: STATUS_CONFLICT unless job `id` is a reconstruction with results, which
  * another job may read. */
-enum status store_source_ready(struct store *store, int64_t id, struct error *err);
+enum status source_check_readable(struct store *store, int64_t id, struct error *err);
 /* STATUS_CONFLICT while a job that has not ended reads the outputs of job `id`, which therefore cannot be `action`. */
-enum status store_source_check(struct store *store, int64_t id, const char *action, struct error *err);
+enum status source_check_unread(struct store *store, int64_t id, const char *action, struct error *err);
 /* Adds the names of the job's files, or of those that are still to be sent, with commas between them. */
 enum status store_job_files_names(struct store *store, int64_t job_id, bool only_missing, struct buf *names,
                                   struct error *err);

@@ -1,6 +1,7 @@
 /* job_inputs.c -- whether a job has what it reads: files that its settings name (job_files.h) and the outputs of
  * another job, which stay as they are while it reads them. */
 #include "common/buf.h"
+#include "common/output_names.h"
 #include "server/store/job_files.h"
 #include "server/store/store.h"
 #include "server/store/transition.h"
@@ -29,7 +30,7 @@ enum status store_job_files_check(struct store *store, int64_t id, struct error 
     return status;
 }
 
-enum status store_source_ready(struct store *store, int64_t id, struct error *err) {
+enum status source_check_readable(struct store *store, int64_t id, struct error *err) {
     struct present now = {0};
     int64_t kind = 0, files = 0;
     enum status status = transition_look(store, id, &now, err);
@@ -47,27 +48,27 @@ enum status store_source_ready(struct store *store, int64_t id, struct error *er
     }
     if (status == STATUS_OK)
         status = sql_int(&store->sql, 0, &files, err, "SELECT count(*) FROM outputs WHERE job_id = ? AND name = ?",
-                         "it", id, JOB_SOURCE_OUTPUT);
+                         "it", id, OUTPUT_MESH);
     if (status == STATUS_OK && files == 0)
-        status = error_set(err, STATUS_CONFLICT, "job %lld has no output " JOB_SOURCE_OUTPUT, (long long)id);
+        status = error_set(err, STATUS_CONFLICT, "job %lld has no output " OUTPUT_MESH, (long long)id);
     return status;
 }
 
-enum status store_source_look(struct store *store, int64_t id, struct error *err) {
+enum status store_source_check_readable(struct store *store, int64_t id, struct error *err) {
     store_lock(store);
-    enum status status = store_source_ready(store, id, err);
+    enum status status = source_check_readable(store, id, err);
     store_unlock(store);
     return status;
 }
 
-enum status store_source_free(struct store *store, int64_t id, const char *action, struct error *err) {
+enum status store_source_check_unread(struct store *store, int64_t id, const char *action, struct error *err) {
     store_lock(store);
-    enum status status = store_source_check(store, id, action, err);
+    enum status status = source_check_unread(store, id, action, err);
     store_unlock(store);
     return status;
 }
 
-enum status store_source_check(struct store *store, int64_t id, const char *action, struct error *err) {
+enum status source_check_unread(struct store *store, int64_t id, const char *action, struct error *err) {
     int64_t reader = 0;
     enum status status =
         sql_int(&store->sql, 0, &reader, err,

@@ -139,7 +139,7 @@ static enum status check_scene(struct store *store, const struct job_new *job, s
 static enum status check_new(struct store *store, const struct job_new *job, size_t queue_limit, struct error *err) {
     enum status status = job->kind == JOB_RENDER ? STATUS_OK : check_scene(store, job, err);
     if (status == STATUS_OK && job->kind != JOB_RECONSTRUCT)
-        status = store_source_ready(store, job->source_id, err);
+        status = source_check_readable(store, job->source_id, err);
     if (status == STATUS_OK)
         status = check_kept(store, job, err);
     const struct count_limits limits = {queue_limit, job->user_queue_limit};
@@ -326,7 +326,7 @@ static enum status delete_job(struct store *store, int64_t id, struct error *err
         status = error_hint(err, "Cancel it first.");
     }
     if (status == STATUS_OK)
-        status = store_source_check(store, id, "deleted", err);
+        status = source_check_unread(store, id, "deleted", err);
     if (status == STATUS_OK)
         status = sql_run(&store->sql, err, "DELETE FROM jobs WHERE id = ?", "i", id);
     return store_end(store, status, id, err);

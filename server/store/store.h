@@ -164,10 +164,9 @@ enum status store_job_add(struct store *store, const struct job_new *job, size_t
 enum status store_job_get(struct store *store, int64_t id, struct job *job, struct error *err);
 /* Whether another job may read the outputs of this one: STATUS_CONFLICT unless it is a reconstruction that has
  * succeeded. As long as that other job has not ended, it cannot be deleted, retried or extended, nor does it expire. */
-enum status store_source_look(struct store *store, int64_t id, struct error *err);
+enum status store_source_check_readable(struct store *store, int64_t id, struct error *err);
 /* STATUS_CONFLICT while a job that has not ended reads the outputs of this one, which cannot be `action` therefore. */
-enum status store_source_free(struct store *store, int64_t id, const char *action, struct error *err);
-#define JOB_SOURCE_OUTPUT "scene.ply" /* every reconstruction leaves one; its attempt is that of all the outputs */
+enum status store_source_check_unread(struct store *store, int64_t id, const char *action, struct error *err);
 struct job_filter {
     int state, kind;   /* -1: all */
     int64_t source_id; /* 0: all */

@@ -120,9 +120,9 @@ static enum status revive(struct store *store, struct present *now, int max_atte
     if (status == STATUS_OK)
         status = sql_int(&store->sql, 0, &source, err, "SELECT source_id FROM jobs WHERE id = ?", "i", now->id);
     if (status == STATUS_OK && source)
-        status = store_source_ready(store, source, err);
+        status = source_check_readable(store, source, err);
     if (status == STATUS_OK)
-        status = store_source_check(store, now->id, "done again", err);
+        status = source_check_unread(store, now->id, "done again", err);
     if (status == STATUS_NOT_FOUND)
         status = err->status = STATUS_CONFLICT; /* not the job that was asked for */
     if (status != STATUS_OK)

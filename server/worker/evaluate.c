@@ -4,6 +4,7 @@
 
 #include "common/file.h"
 #include "common/mem.h"
+#include "common/output_names.h"
 #include "common/parallel.h"
 #include "common/protocol.h"
 #include "common/reading.h"
@@ -12,7 +13,6 @@
 #include "server/worker/announce.h"
 #include "server/worker/tasks.h"
 
-#define EVALUATION "evaluation.json"
 #define PICTURES "pictures"
 
 /* Announces the pictures, in the order of their names. */
@@ -33,10 +33,10 @@ static enum status announce_pictures(struct progress *progress, const char *fold
 static enum status write_figures(struct progress *progress, const char *out, const struct evaluation *evaluation,
                                  struct error *err) {
     cJSON *json = evaluate_to_json(evaluation);
-    char *text = json_text(json), *path = file_join(out, EVALUATION);
+    char *text = json_text(json), *path = file_join(out, OUTPUT_EVALUATION);
     enum status status = file_replace(path, text, strlen(text), err);
     if (status == STATUS_OK)
-        status = announce_file(progress, EVENT_OUTPUT, path, EVALUATION, MIME_JSON, NULL, err);
+        status = announce_file(progress, EVENT_OUTPUT, path, OUTPUT_EVALUATION, MIME_JSON, NULL, err);
     mem_free(path);
     mem_free(text);
     cJSON_Delete(json);

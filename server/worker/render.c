@@ -20,6 +20,7 @@
 #include "common/clock.h"
 #include "common/file.h"
 #include "common/mem.h"
+#include "common/output_names.h"
 #include "common/parallel.h"
 #include "common/protocol.h"
 #include "common/sha256.h"
@@ -32,8 +33,7 @@
 #include "server/worker/tasks.h"
 
 #define STAGE "render"
-#define RECORD "views.jsonl" /* of what is done (relight/output.h) */
-#define PREVIEWS "preview"   /* folder of out/ */
+#define PREVIEWS "preview" /* folder of out/ */
 #define PREVIEW PREVIEWS "/render.png"
 #define PROGRESS_INTERVAL_SEC 0.25 /* between two reports of progress, at least */
 #define RECORD_INTERVAL_SEC 2.0    /* between two words of the record: a part's has some 100 lines */
@@ -106,11 +106,11 @@ static void tell_progress(void *user, double done, double total) {
 
 /* The record has a line for every picture but the one that is being announced. */
 static void tell_record(struct render_run *run) {
-    char hex[SHA256_HEX_SIZE], *path = file_join(run->out_dir, RECORD);
+    char hex[SHA256_HEX_SIZE], *path = file_join(run->out_dir, OUTPUT_RECORD);
     double now = clock_sec();
     if (run->order->parts && now >= run->next_record && sha256_of_file(path, hex, NULL) == STATUS_OK) {
         run->next_record = now + RECORD_INTERVAL_SEC;
-        progress_record(run->progress, RECORD, hex);
+        progress_record(run->progress, OUTPUT_RECORD, hex);
     }
     mem_free(path);
 }

@@ -2,6 +2,8 @@
  * case; one that waits says why, and nothing behind it begins. */
 #include "server/job/admission.h"
 
+#include "common/output_names.h"
+
 #include "server/store/job_files.h"
 #include "tests/unit/fault_rig.h"
 
@@ -149,7 +151,7 @@ static void test_render(void) {
     int64_t source = add_job("{}", NULL);
     int number;
     OK(store_job_start(store, source, "process", &number, &err));
-    OK(store_output_put(store, source, number, EVENT_OUTPUT, JOB_SOURCE_OUTPUT, 100, HEX, "model/x", &err));
+    OK(store_output_put(store, source, number, EVENT_OUTPUT, OUTPUT_MESH, 100, HEX, "model/x", &err));
     OK(store_job_succeed(store, source, number, "", &err));
     CHECK_NEAR(more_with(source, insert, "m.glb", 100000), 1.2e8, 1.0); /* 1.6 megapixels of 75 bytes */
     CHECK_NEAR(more_with(source, insert, "m.glb", 100000000), 1.15 * GIB, 1.0);

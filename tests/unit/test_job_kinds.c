@@ -1,6 +1,8 @@
 /* test_job_kinds.c -- renders and evaluations in the store: what they read stays, files come before they begin, and
  * small renders have a lane of their own. */
 #include "server/store/job_files.h"
+
+#include "common/output_names.h"
 #include "tests/unit/store_rig.h"
 
 #define HEX "0123456789abcdef0123456789abcdef0123456789abcdef0123456789abcdef"
@@ -17,7 +19,7 @@ static int64_t add_source(void) {
     int64_t id = add_job(store, SCENE_A, 0);
     int attempt;
     OK(store_job_start(store, id, "process", &attempt, &err));
-    OK(store_output_put(store, id, attempt, EVENT_OUTPUT, JOB_SOURCE_OUTPUT, 100, HEX, "model/x", &err));
+    OK(store_output_put(store, id, attempt, EVENT_OUTPUT, OUTPUT_MESH, 100, HEX, "model/x", &err));
     OK(store_job_succeed(store, id, attempt, "", &err));
     return id;
 }
@@ -98,7 +100,7 @@ static void check_scenes(void) {
     int64_t source = add_job(store, SCENE_B, 0), id = 0;
     int attempt;
     OK(store_job_start(store, source, "process", &attempt, &err));
-    OK(store_output_put(store, source, attempt, EVENT_OUTPUT, JOB_SOURCE_OUTPUT, 100, HEX, "model/x", &err));
+    OK(store_output_put(store, source, attempt, EVENT_OUTPUT, OUTPUT_MESH, 100, HEX, "model/x", &err));
     OK(store_job_succeed(store, source, attempt, "", &err));
     struct job_new new = {.kind = JOB_RENDER,
                           .source_id = source,

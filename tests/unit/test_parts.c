@@ -5,6 +5,8 @@
 #include <unistd.h>
 
 #include "server/store/remote.h"
+
+#include "common/output_names.h"
 #include "server/store/store.h"
 #include "tests/unit/store_rig.h"
 
@@ -17,7 +19,7 @@ static int64_t add_render(void) {
     int attempt;
     bool replayed;
     OK(store_job_start(store, source, "process", &attempt, &err));
-    OK(store_output_put(store, source, attempt, EVENT_OUTPUT, JOB_SOURCE_OUTPUT, 100, DIGEST, "model/x", &err));
+    OK(store_output_put(store, source, attempt, EVENT_OUTPUT, OUTPUT_MESH, 100, DIGEST, "model/x", &err));
     OK(store_job_succeed(store, source, attempt, "", &err));
     struct job_new new = {.kind = JOB_RENDER,
                           .source_id = source,

@@ -7,6 +7,7 @@
 #include "common/buf.h"
 #include "common/file.h"
 #include "common/mem.h"
+#include "common/output_names.h"
 #include "tests/check.h"
 
 #define DIGEST "aa"
@@ -38,9 +39,9 @@ static int64_t done(int64_t first, int64_t count) {
 }
 
 static void check_done(void) {
-    put(1, PICTURE_RECORD,
+    put(1, OUTPUT_RECORD,
         LINE("10", DIGEST, "10.png", "3") LINE("12", DIGEST, "12.png", "3") LINE("13", "bb", "13.png", "3"));
-    put(2, PICTURE_RECORD,
+    put(2, OUTPUT_RECORD,
         LINE("11", DIGEST, "11.png", "3") "nonsense\n" LINE("14", DIGEST, "../../x", "3")
             LINE("-1e300", DIGEST, "10.png", "3") "{\"picture\":15,\"digest\":\"" DIGEST "\"}\n"
                                                   "{\"picture\":16,\"digest\":\"" DIGEST "\",\"fi");
@@ -58,14 +59,14 @@ static void check_done(void) {
 }
 
 static void check_move(void) {
-    char *one = path_of(1, PICTURE_RECORD), *two = path_of(2, PICTURE_RECORD), *to = path_of(3, PICTURE_RECORD);
+    char *one = path_of(1, OUTPUT_RECORD), *two = path_of(2, OUTPUT_RECORD), *to = path_of(3, OUTPUT_RECORD);
     struct buf text;
     put(3, "other", "");
     OK(picture_record_move(one, to, &err));
     OK(picture_record_move(one, to, &err)); /* it has gone */
     OK(picture_record_move(two, to, &err));
     CHECK(access(one, F_OK) != 0 && access(two, F_OK) != 0);
-    put(1, PICTURE_RECORD, LINE("1", DIGEST, "1.png", "1"));
+    put(1, OUTPUT_RECORD, LINE("1", DIGEST, "1.png", "1"));
     OK(picture_record_move(one, to, &err));
     buf_init(&text, 100000);
     OK(file_read(to, &text, &err));

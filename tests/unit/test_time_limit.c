@@ -6,6 +6,7 @@
 
 #include "common/file.h"
 #include "common/mem.h"
+#include "common/output_names.h"
 #include "server/data/layout.h"
 #include "server/data/picture_record.h"
 #include "server/executor/time_limit.h"
@@ -38,7 +39,7 @@ int main(void) {
     CHECK(utimensat(AT_FDCWD, part, times, 0) == 0);
     CHECK(!time_limit_is_futile(&minutes, dir, &row));
     CHECK(unlink(part) == 0 && time_limit_is_futile(&minutes, dir, &row));
-    char *out = layout_out(attempt), *record = layout_output(attempt, PICTURE_RECORD); /* a render's pictures */
+    char *out = layout_out(attempt), *record = layout_output(attempt, OUTPUT_RECORD); /* a render's pictures */
     CHECK(file_make_dirs(out, &err) == STATUS_OK && file_replace(record, "x", 1, &err) == STATUS_OK);
     CHECK(!time_limit_is_futile(&minutes, dir, &row));
     mem_free(record);

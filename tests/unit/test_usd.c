@@ -8,6 +8,7 @@
 #include "common/file.h"
 #include "common/image.h"
 #include "common/mem.h"
+#include "common/output_names.h"
 #include "server/demo/room.h"
 #include "server/export/emission_texture.h"
 #include "server/export/formats.h"
@@ -165,8 +166,8 @@ static void test_files(const char *dir, struct room *room, struct export_input *
     room->segments.is_given = true;
     sky_without_sun(in, &sky);
     test_sky(in, &sky);
-    write_picture(dir, FORMATS_ENVIRONMENT, &map);
-    write_picture(dir, FORMATS_SKY, &sky);
+    write_picture(dir, OUTPUT_ENVIRONMENT, &map);
+    write_picture(dir, OUTPUT_SKY, &sky);
     write_formats(dir, in, parts);
     test_archive(dir);
     if (!is_kept)

@@ -111,7 +111,7 @@ static struct response *check_states(struct job_submission *s) {
     struct error err;
     if (s->w.kind == JOB_RECONSTRUCT)
         return job_request_fit(s->r, &s->scene, &s->settings);
-    if (store_source_look(s->api->store, s->source.id, &err) != STATUS_OK)
+    if (store_source_check_readable(s->api->store, s->source.id, &err) != STATUS_OK)
         return problem_from(s->r, &err);
     if (s->w.kind == JOB_RENDER) {
         render_request_look(s->api, &s->render, s->source.id, s->params);

@@ -160,7 +160,7 @@ static struct response *measure_job(struct api *api, const struct request *r, in
     job_release(&job);
     if (is_running)
         return problem_full(r, 409, "the job is running", "Cancel it first.", NULL);
-    if (store_source_free(api->store, id, "deleted", &err) != STATUS_OK)
+    if (store_source_check_unread(api->store, id, "deleted", &err) != STATUS_OK)
         return problem_from(r, &err);
     char *path = layout_job(NULL, id);
     struct response *reply = retention_would_free(api, r, path);

@@ -6,15 +6,13 @@
 
 #include "common/buf.h"
 #include "common/mem.h"
+#include "common/output_names.h"
 #include "common/render_settings.h"
 #include "common/utf8.h"
 #include "server/data/work_file.h"
 #include "server/http/jobs/job_request.h"
 #include "server/transport/problem.h"
 
-#define VIEWS "views.json"              /* the cameras of a reconstruction's held-out views, as an output */
-#define CAMERAS "cameras.json"          /* those of all photographs */
-#define REPORT "report.json"            /* what it found: its segments, and which of them emit */
 #define OUTPUT_LIMIT ((size_t)64 << 20) /* bytes of either */
 
 /* Notes the files; their names become names in a folder and in paths of URLs. */
@@ -128,8 +126,8 @@ static double cost_of(const cJSON *settings, const cJSON *frames) {
 /* The cameras that the settings mean; NULL: a file has them that is still to come. The caller's. */
 static cJSON *read_cameras(struct api *api, const cJSON *settings, int64_t source) {
     if (render_settings_is(settings, "cameras", "held_out"))
-        return read_output(api, source, VIEWS);
-    return render_settings_is(settings, "cameras", "photographs") ? read_output(api, source, CAMERAS) : NULL;
+        return read_output(api, source, OUTPUT_VIEWS);
+    return render_settings_is(settings, "cameras", "photographs") ? read_output(api, source, OUTPUT_CAMERAS) : NULL;
 }
 
 void render_request_look(struct api *api, struct render_request *q, int64_t source, cJSON *params) {
@@ -137,7 +135,7 @@ void render_request_look(struct api *api, struct render_request *q, int64_t sour
     const cJSON *settings = q->settings ? q->settings : none;
     bool needs_report = render_settings_bool(settings, "per_light") || render_settings_need_report(settings);
     cJSON *views = read_cameras(api, settings, source);
-    cJSON *report = needs_report ? read_output(api, source, REPORT) : NULL;
+    cJSON *report = needs_report ? read_output(api, source, OUTPUT_REPORT) : NULL;
     const cJSON *frames = cJSON_GetObjectItemCaseSensitive(views, "frames"),
                 *segments = cJSON_GetObjectItemCaseSensitive(report, "segments");
     if (render_settings_check_room(settings, report, frames, problems, NULL) != STATUS_OK)

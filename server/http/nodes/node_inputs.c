@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "common/mem.h"
+#include "common/output_names.h"
 #include "common/sha256.h"
 #include "server/data/scene_files.h"
 #include "server/data/work_file.h"
@@ -29,7 +30,7 @@ static void add_file(cJSON *list, char *name, double bytes, const char *sha256) 
 static enum status add_outputs(struct api *api, int64_t source, cJSON *list, struct error *err) {
     struct output_row *rows = NULL, first = {0};
     size_t count = 0;
-    enum status status = store_output_get(api->store, source, JOB_SOURCE_OUTPUT, &first, err);
+    enum status status = store_output_get(api->store, source, OUTPUT_MESH, &first, err);
     if (status == STATUS_OK)
         status = store_output_list(api->store, source, &rows, &count, err);
     for (size_t i = 0; i < count; i++) {
@@ -72,7 +73,7 @@ enum status node_inputs_list(struct api *api, const struct job *job, char id[SCE
 
 static enum status open_output(struct api *api, int64_t source, const char *name, int *fd, struct error *err) {
     struct output_row row = {0}, first = {0};
-    enum status status = store_output_get(api->store, source, JOB_SOURCE_OUTPUT, &first, err);
+    enum status status = store_output_get(api->store, source, OUTPUT_MESH, &first, err);
     if (status == STATUS_OK) /* the row says that there is such an output: no other file of the folder is given out */
         status = store_output_get(api->store, source, name, &row, err);
     if (status == STATUS_OK)
