@@ -8,20 +8,23 @@
 #include "server/scene/by_segment.h"
 #include "server/scene/surface.h"
 
+/* Texels of a segment, and photographs of each, of which the median is taken. */
 #define TEXELS_PER_SEGMENT 256
 #define VIEWS_PER_TEXEL 4
 /* Observations that an edge class must have for its median to be used. */
 #define MIN_OBSERVATIONS 12
 /* The same for a segment observed only in mixed pixels; fewer may be noise. */
 #define MIN_OBSERVATIONS_MIXED 3
+/* Surroundings that an observation near an edge is compared with: pixels on this circle. */
 #define RING_PIXELS 4.0f
+/* An observation of a mixed pixel counts if it is so many times brighter than all around it. */
 #define OUTSHINES 1.3f
 /* A saturated pixel must be so much brighter than all around it: a bar before a white sky is as white as the sky. */
 #define OUTSHINES_SATURATED 1.05f
 /* Least part of a segment's observations that are not outshone by their surroundings. Lamps in a row outshine each
  * other in many. */
 #define MIN_OWN_PART 0.25f
-/* Standard errors by which the mean of the looks must be below what most of them show. */
+/* Standard errors by which the mean of the observations must be below their median. */
 #define SURELY_LESS 2.0f
 /* Segments this many times brighter than the median of the room outshine it. */
 #define BRIGHT 4.0f
@@ -39,58 +42,58 @@ struct channel_values {
     size_t count;
 };
 
-/* Looks where nothing saturates, and what was fused at their texels: sums. */
-struct looks {
-    double radiance[3];
-    double look, fused, look_look, look_fused, fused_fused; /* of the channels' means, and of products of these */
+/* Sums over unsaturated observations, and over fused radiance at their texels. */
+struct ratio_sums {
+    double radiance[3];                                 /* observed, by channel */
+    double own, fused, own_own, own_fused, fused_fused; /* of the channels' means, and of products of these */
     size_t count;
 };
 
-/* What the looks of one class of distance from an edge (views_edge) show. */
-struct shown_values {
+/* Observations of one class of distance from an edge (views_edge). */
+struct edge_class {
     struct channel_values channel[3];
-    struct looks looks;
-    size_t outshone_count; /* looks left out since something beside was as bright */
+    struct ratio_sums sums;
+    size_t outshone_count; /* observations left out since something beside was as bright */
 };
 
 static void add_value(struct channel_values *v, float radiance, bool saturated) {
     v->value[v->count++] = (struct bounded){radiance, saturated};
 }
 
-static void add_look(const struct reconstruction *r, uint32_t texel, const struct photograph_sample *s,
-                     struct looks *looks) {
+static void add_to_sums(const struct reconstruction *r, uint32_t texel, const struct photograph_sample *s,
+                        struct ratio_sums *sums) {
     double fused =
         r->fused.radiance && !r->fused.is_bound[texel] ? (double)rgb_mean(fused_radiance(&r->fused, texel)) : 0.0;
-    double look = (double)rgb_mean(s->radiance);
+    double own = (double)rgb_mean(s->radiance);
     if (!(fused > 0.0) || photograph_sample_saturates(s))
         return;
-    looks->look += look;
-    looks->fused += fused;
-    looks->look_look += look * look;
-    looks->look_fused += look * fused;
-    looks->fused_fused += fused * fused;
+    sums->own += own;
+    sums->fused += fused;
+    sums->own_own += own * own;
+    sums->own_fused += own * fused;
+    sums->fused_fused += fused * fused;
     for (int c = 0; c < 3; c++)
-        looks->radiance[c] += (double)(&s->radiance.r)[c];
-    looks->count++;
+        sums->radiance[c] += (double)(&s->radiance.r)[c];
+    sums->count++;
 }
 
-/* Whether the mean of the looks is surely less than what most of them show, fused radiance: something that the mesh
- * lacks, such as the bars of a window, stands before the surface in some. The standard error is that of a ratio of sums
- * (Cochran 1977, eq. 6.13). */
-static bool is_obstructed(const struct looks *looks) {
-    if (looks->count < MIN_OBSERVATIONS)
+/* Whether the mean of the observations is surely below fused radiance, their median: something that the mesh lacks, such
+ * as the bars of a window, stands before the surface in some. The standard error is that of a ratio of sums (Cochran
+ * 1977, eq. 6.13). */
+static bool is_obstructed(const struct ratio_sums *sums) {
+    if (sums->count < MIN_OBSERVATIONS)
         return false;
-    double n = (double)looks->count, ratio = looks->look / looks->fused;
-    double squares = looks->look_look - 2.0 * ratio * looks->look_fused + ratio * ratio * looks->fused_fused;
-    double error = sqrt(fmax(squares, 0.0) * n / (n - 1.0)) / looks->fused;
+    double n = (double)sums->count, ratio = sums->own / sums->fused;
+    double squares = sums->own_own - 2.0 * ratio * sums->own_fused + ratio * ratio * sums->fused_fused;
+    double error = sqrt(fmax(squares, 0.0) * n / (n - 1.0)) / sums->fused;
     return ratio + (double)SURELY_LESS * error < 1.0;
 }
 
-/* The mean of the looks, which is what the room gets of a lamp; not more than their median. */
-static rgb mean_radiance(const struct looks *looks, rgb median) {
+/* The mean of the observations, which is what the room gets of a lamp; not more than their median. */
+static rgb mean_radiance(const struct ratio_sums *sums, rgb median) {
     float mean[3];
     for (int c = 0; c < 3; c++)
-        mean[c] = fminf((float)(looks->radiance[c] / (double)looks->count), (&median.r)[c]);
+        mean[c] = fminf((float)(sums->radiance[c] / (double)sums->count), (&median.r)[c]);
     return rgb_make(mean[0], mean[1], mean[2]);
 }
 
@@ -108,7 +111,7 @@ static bool outshines(const struct photograph *photo, const struct view *view, c
     return own * ring.count >= (is_saturated ? OUTSHINES_SATURATED : 1.0f) * ring.sum;
 }
 
-static void observe_texel(const struct evidence_job *job, uint32_t texel, struct shown_values *shown) {
+static void observe_texel(const struct evidence_job *job, uint32_t texel, struct edge_class *class) {
     const struct reconstruction *r = job->r;
     struct surface_point at;
     struct view view[VIEWS_PER_TEXEL];
@@ -122,60 +125,65 @@ static void observe_texel(const struct evidence_job *job, uint32_t texel, struct
         if (!photograph_sample(photo, view[k].x, view[k].y, &sample))
             continue;
         if (!outshines(photo, &view[k], &sample, edge)) {
-            shown[edge].outshone_count++;
+            class[edge].outshone_count++;
             continue;
         }
-        add_look(r, texel, &sample, &shown[edge].looks);
-        struct channel_values *channel = shown[edge].channel;
+        add_to_sums(r, texel, &sample, &class[edge].sums);
+        struct channel_values *channel = class[edge].channel;
         add_value(&channel[0], sample.radiance.r, sample.saturated[0]);
         add_value(&channel[1], sample.radiance.g, sample.saturated[1]);
         add_value(&channel[2], sample.radiance.b, sample.saturated[2]);
     }
 }
 
-static size_t outshone_count(const struct shown_values *shown) {
+static size_t outshone_count(const struct edge_class *class) {
     size_t count = 0;
     for (int edge = 0; edge <= VIEWS_EDGE; edge++)
-        count += shown[edge].outshone_count;
+        count += class[edge].outshone_count;
     return count;
+}
+
+/* The class farthest from edges that has enough observations. */
+static struct edge_class *choose_class(struct edge_class *class) {
+    struct edge_class *best = class;
+    for (int edge = 1; edge <= VIEWS_EDGE && best->channel[0].count < MIN_OBSERVATIONS; edge++)
+        best = &class[edge];
+    return best;
+}
+
+static void fill_evidence(struct emitter_evidence *e, struct edge_class *class) {
+    struct edge_class *best = choose_class(class);
+    size_t count = best->channel[0].count, least = best == &class[VIEWS_EDGE] ? MIN_OBSERVATIONS_MIXED : 1;
+    e->is_seen = count >= least && (float)count >= MIN_OWN_PART * (float)(count + best->outshone_count);
+    e->is_outshone = !e->is_seen && outshone_count(class) >= MIN_OBSERVATIONS;
+    if (!e->is_seen)
+        best = class; /* mostly outshone: no value */
+    e->only_mixed = best == &class[VIEWS_EDGE];
+    float value[3] = {0};
+    for (int c = 0; c < 3; c++)
+        e->saturated[c] = best->channel[c].count > 0 &&
+                          !quantile_bounded_median(best->channel[c].value, best->channel[c].count, &value[c]);
+    e->observed = rgb_make(value[0], value[1], value[2]);
+    if (e->is_unbounded)
+        return;
+    bool is_measured = !(e->saturated[0] || e->saturated[1] || e->saturated[2]);
+    /* Near edges dark observations are left out as outshone: only those away from them have an unbiased mean. */
+    bool obstructed = best == class && e->is_seen && is_measured && is_obstructed(&class->sums);
+    evidence_set_radiance(e, obstructed ? mean_radiance(&class->sums, e->observed) : e->observed);
 }
 
 static void observe_segment(void *user, size_t segment, int thread) {
     (void)thread;
     struct evidence_job *job = user;
     if (job->evidence[segment].is_hidden)
-        return; /* it is known from elsewhere */
-    struct shown_values *shown = mem_calloc(VIEWS_EDGE + 1, sizeof *shown);
+        return; /* its radiance is estimated, not observed */
+    struct edge_class *class = mem_calloc(VIEWS_EDGE + 1, sizeof *class);
     size_t count = by_segment_count(&job->texels, segment);
     size_t wanted = count < TEXELS_PER_SEGMENT ? count : TEXELS_PER_SEGMENT;
     for (size_t i = 0; i < wanted; i++)
-        observe_texel(job, by_segment_spaced(&job->texels, segment, i, wanted), shown);
-    /* The class farthest from edges that has enough observations. */
-    struct shown_values *best = shown;
-    for (int edge = 1; edge <= VIEWS_EDGE; edge++) {
-        if (best->channel[0].count < MIN_OBSERVATIONS)
-            best = &shown[edge];
-    }
-    size_t told = best->channel[0].count;
-    size_t least = best == &shown[VIEWS_EDGE] ? MIN_OBSERVATIONS_MIXED : 1;
-    bool is_own = told >= least && (float)told >= MIN_OWN_PART * (float)(told + best->outshone_count);
-    if (!is_own)
-        best = &shown[0]; /* mostly outshone: no value */
-    struct emitter_evidence *e = &job->evidence[segment];
-    e->is_seen = is_own;
-    e->is_outshone = !is_own && outshone_count(shown) >= MIN_OBSERVATIONS;
-    e->only_mixed = best == &shown[VIEWS_EDGE];
-    float value[3] = {0};
-    for (int c = 0; c < 3; c++)
-        e->saturated[c] = best->channel[c].count > 0 &&
-                          !quantile_bounded_median(best->channel[c].value, best->channel[c].count, &value[c]);
-    e->observed = rgb_make(value[0], value[1], value[2]);
-    bool is_measured = !(e->saturated[0] || e->saturated[1] || e->saturated[2]);
-    /* Near edges dark looks are left out as outshone: only those away from them tell. */
-    bool obstructed = best == shown && is_own && is_measured && is_obstructed(&shown->looks);
-    if (!e->is_unbounded)
-        evidence_set_radiance(e, obstructed ? mean_radiance(&shown->looks, e->observed) : e->observed);
-    mem_free(shown);
+        observe_texel(job, by_segment_spaced(&job->texels, segment, i, wanted), class);
+    fill_evidence(&job->evidence[segment], class);
+    mem_free(class);
 }
 
 void emitters_observe(const struct reconstruction *r, const struct views *views, struct emitter_evidence *evidence) {
@@ -190,10 +198,10 @@ bool emitters_outshine(float radiance, float median_radiance) { return radiance 
 void emitters_light_bright(struct reconstruction *r, const struct views *views,
                            const struct emitter_evidence *evidence) {
     for (size_t i = 0; i < r->segments.count; i++) {
-        rgb shown = evidence[i].radiance;
-        bool shines = evidence[i].is_hidden || evidence[i].is_unbounded ||
-                      emitters_outshine(rgb_mean(shown), views->median_radiance);
-        r->materials.emission[i] = shines ? shown : rgb_gray(0.0f);
+        rgb radiance = evidence[i].radiance;
+        bool emits = evidence[i].is_hidden || evidence[i].is_unbounded ||
+                     emitters_outshine(rgb_mean(radiance), views->median_radiance);
+        r->materials.emission[i] = emits ? radiance : rgb_gray(0.0f);
     }
     world_update_lights(&r->world);
 }

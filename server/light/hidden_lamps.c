@@ -52,16 +52,16 @@ static void choose_few(struct lamp_search *s) {
 /* Makes the fit of the few points one of the sources that there are by now. */
 static void renew_few(struct lamp_search *s) {
     const struct light_model *m = s->m;
-    float *lit = mem_array(s->few_count + 1, sizeof *lit);
+    float *column = mem_array(s->few_count + 1, sizeof *column);
     joint_fit_release(&s->fit);
     joint_fit_init(&s->fit, s->joint, s->few_count, m->fit.source_count, m->r->pool);
     s->fit.source[0] = m->fit.source[0];
     for (size_t j = 1; j < m->fit.source_count; j++) {
         for (size_t i = 0; i < s->few_count; i++)
-            lit[i] = m->fit.response[spaced(i, m->points.count, s->few_count) * m->fit.source_most + j];
-        joint_fit_add(&s->fit, &m->fit.source[j], lit);
+            column[i] = m->fit.response[spaced(i, m->points.count, s->few_count) * m->fit.source_most + j];
+        joint_fit_add(&s->fit, &m->fit.source[j], column);
     }
-    mem_free(lit);
+    mem_free(column);
 }
 
 /* --- candidates -------------------------------------------------------------------------------------------- */
@@ -116,7 +116,7 @@ static double odds(struct light_model *m, double gain, size_t count) {
 }
 
 /* Gives what unseen surfaces send its prior value: it must not keep explaining what a lamp explains better. */
-static void forget_guesses(struct joint_fit *fit, size_t first) {
+static void reset_regions(struct joint_fit *fit, size_t first) {
     for (size_t k = first; k < first + LIGHT_REGIONS; k++)
         fit->source[k].value = fit->source[k].mean;
 }
@@ -125,7 +125,7 @@ static void forget_guesses(struct joint_fit *fit, size_t first) {
 static size_t find_likeliest(struct lamp_search *s) {
     struct light_model *m = s->m;
     s->all = false;
-    forget_guesses(&s->fit, m->first_guess);
+    reset_regions(&s->fit, m->first_region);
     parallel_for(m->r->pool, s->count, try_candidate, s);
     qsort(s->candidate, s->count, sizeof *s->candidate, by_gain);
     size_t likeliest = s->count < LIKELIEST ? s->count : LIKELIEST;
@@ -137,7 +137,7 @@ static size_t find_likeliest(struct lamp_search *s) {
         light_model_respond_hidden(m, c->segment, c->all);
     }
     s->all = true;
-    forget_guesses(&m->fit, m->first_guess);
+    reset_regions(&m->fit, m->first_region);
     parallel_for(m->r->pool, likeliest, try_candidate, s);
     qsort(s->candidate, likeliest, sizeof *s->candidate, by_gain);
     return likeliest < LIKELIEST / 2 ? likeliest : LIKELIEST / 2;
@@ -160,7 +160,7 @@ static bool add_best(struct lamp_search *s) {
         }
         joint_fit_remove(&m->fit, sources);
         memcpy(m->fit.source, kept, bytes - sizeof *kept);
-        forget_guesses(&m->fit, m->first_guess);
+        reset_regions(&m->fit, m->first_region);
     }
     memcpy(m->fit.source, kept, bytes - sizeof *kept);
     if (best < SIZE_MAX) {

@@ -53,10 +53,10 @@ void joint_fit_release(struct joint_fit *f) {
     *f = (struct joint_fit){0};
 }
 
-void joint_fit_add(struct joint_fit *f, const struct joint_source *source, const float *lit) {
+void joint_fit_add(struct joint_fit *f, const struct joint_source *source, const float *column) {
     assert(f->source_count < f->source_most);
     for (size_t i = 0; i < f->point_count; i++)
-        f->response[i * f->source_most + f->source_count] = lit[i];
+        f->response[i * f->source_most + f->source_count] = column[i];
     f->source[f->source_count++] = *source;
 }
 

@@ -27,8 +27,8 @@ void joint_fit_init(struct joint_fit *f, const struct joint_point *point, size_t
                     struct parallel *pool);
 void joint_fit_release(struct joint_fit *f);
 
-/* Appends a source; `lit` is its column of R. Its value is to be set, at least `least`. */
-void joint_fit_add(struct joint_fit *f, const struct joint_source *source, const float *lit);
+/* Appends a source; `column` is its column of R. Its value is to be set, at least `least`. */
+void joint_fit_add(struct joint_fit *f, const struct joint_source *source, const float *column);
 /* Removes a source; the last one takes its place. It must not be tied. */
 void joint_fit_remove(struct joint_fit *f, size_t index);
 
@@ -45,8 +45,8 @@ double joint_fit_solve(struct joint_fit *f, int steps);
 /* Sets the sources' errors: the curvature at their values. */
 void joint_fit_errors(struct joint_fit *f);
 
-/* A further source with column `lit`: sets its value to the best one, the others' being what they are, and returns by
+/* A further source of that column of R: sets its value to the best one, the others' being what they are, and returns by
  * how much the loss falls; 0 where no value helps. May run on several threads at once. */
-double joint_fit_try(const struct joint_fit *f, struct joint_source *source, const float *lit);
+double joint_fit_try(const struct joint_fit *f, struct joint_source *source, const float *column);
 
 #endif

@@ -14,7 +14,7 @@ static double square(double x) { return x * x; }
 
 struct trial {
     const struct joint_fit *f;
-    const float *lit;
+    const float *column;
     double *light; /* [point_count] by all other sources */
     bool *reaches; /* [block_count] */
     struct joint_scratch scratch;
@@ -29,19 +29,20 @@ static double loss_with(struct trial *t, double x) {
         if (!t->reaches[k])
             continue;
         for (size_t i = b->first; i < b->end; i++)
-            t->scratch.base[i - b->first] = log((double)f->point[i].observed / (t->light[i] + x * (double)t->lit[i]));
+            t->scratch.base[i - b->first] =
+                log((double)f->point[i].observed / (t->light[i] + x * (double)t->column[i]));
         loss += joint_settle(f, b, &t->scratch);
     }
     return loss;
 }
 
 static double faintest(const struct trial *t) {
-    double light = 0.0, lit = 0.0;
+    double light = 0.0, response = 0.0;
     for (size_t i = 0; i < t->f->point_count; i++) {
-        light += t->lit[i] > 0.0f ? t->light[i] : 0.0;
-        lit += (double)t->lit[i];
+        light += t->column[i] > 0.0f ? t->light[i] : 0.0;
+        response += (double)t->column[i];
     }
-    return lit > 0.0 ? TRIED_FAINTEST * light / lit : 0.0;
+    return response > 0.0 ? TRIED_FAINTEST * light / response : 0.0;
 }
 
 static double search(struct trial *t, struct joint_source *source) {
@@ -61,8 +62,8 @@ static double search(struct trial *t, struct joint_source *source) {
     return before - least;
 }
 
-double joint_fit_try(const struct joint_fit *f, struct joint_source *source, const float *lit) {
-    struct trial t = {.f = f, .lit = lit, .light = mem_array(f->point_count + 1, sizeof *t.light)};
+double joint_fit_try(const struct joint_fit *f, struct joint_source *source, const float *column) {
+    struct trial t = {.f = f, .column = column, .light = mem_array(f->point_count + 1, sizeof *t.light)};
     double *x = joint_fit_radiances(f);
     bool reaches = false;
     t.reaches = mem_calloc(f->block_count + 1, sizeof *t.reaches);
@@ -70,7 +71,7 @@ double joint_fit_try(const struct joint_fit *f, struct joint_source *source, con
     for (size_t k = 0; k < f->block_count; k++) {
         for (size_t i = f->block[k].first; i < f->block[k].end; i++) {
             t.light[i] = joint_fit_light(f, i, x);
-            t.reaches[k] = t.reaches[k] || lit[i] > 0.0f;
+            t.reaches[k] = t.reaches[k] || column[i] > 0.0f;
         }
         reaches = reaches || t.reaches[k];
     }

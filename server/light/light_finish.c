@@ -22,8 +22,8 @@ static void fit_channel(struct light_model *m, int channel) {
         float known = (&p->known.r)[channel];
         for (size_t k = 0; k < light_sky_cells(&m->sky) && m->has_sky && p->sky; k++)
             known += p->sky[k] * (float)exp(m->fit.source[m->first_cell + k].value);
-        for (size_t k = 0; k < LIGHT_REGIONS && p->guessed; k++)
-            known += p->guessed[3 * k + (size_t)channel] * (float)exp(m->fit.source[m->first_guess + k].value);
+        for (size_t k = 0; k < LIGHT_REGIONS && p->unobserved; k++)
+            known += p->unobserved[3 * k + (size_t)channel] * (float)exp(m->fit.source[m->first_region + k].value);
         joint[i] = (struct joint_point){p->segment, p->patch, (&p->observed.r)[channel], known, m->joint[i].deviation};
     }
     joint_fit_init(&fit, joint, m->points.count, 1 + m->lamps.count, m->r->pool);
@@ -40,7 +40,7 @@ static void fit_channel(struct light_model *m, int channel) {
             source.mean = least, source.value = least, source.deviation = MEASURED_DEVIATION;
         }
         source.value = fmax(source.value, source.least);
-        joint_fit_add(&fit, &source, lamp->lit);
+        joint_fit_add(&fit, &source, lamp->column);
     }
     joint_fit_solve(&fit, JOINT_STEPS_NEAR);
     for (size_t i = 0; i < m->lamps.count; i++)

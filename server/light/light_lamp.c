@@ -30,7 +30,7 @@ void light_lamps_init(struct light_lamps *l, const struct reconstruction *r, flo
 
 void light_lamps_release(struct light_lamps *l) {
     for (size_t i = 0; i < l->count; i++)
-        mem_free(l->lamp[i].lit);
+        mem_free(l->lamp[i].column);
     segment_light_release(&l->light);
     mem_free(l->is_lamp);
     *l = (struct light_lamps){0};
@@ -98,7 +98,7 @@ void light_lamps_remove(struct light_lamps *l, size_t index) {
     struct light_lamp *lamp = &l->lamp[index];
     for (size_t i = 0; i < lamp->segment_count; i++)
         l->is_lamp[lamp->segment[i]] = false;
-    mem_free(lamp->lit);
+    mem_free(lamp->column);
     *lamp = l->lamp[--l->count];
 }
 
@@ -225,11 +225,12 @@ struct joint_source light_lamps_prior(const struct light_lamps *l, const struct 
 }
 
 void light_lamps_respond(const struct light_lamps *l, struct light_lamp *lamp, const struct light_points *points) {
-    lamp->lit = mem_calloc(points->count + 1, sizeof *lamp->lit);
+    lamp->column = mem_calloc(points->count + 1, sizeof *lamp->column);
     for (size_t k = 0; k < lamp->segment_count; k++)
-        segment_light_add(&l->light, points->point, points->count, lamp->segment[k], SEGMENT_LIGHT_POINTS, lamp->lit);
+        segment_light_add(&l->light, points->point, points->count, lamp->segment[k], SEGMENT_LIGHT_POINTS,
+                          lamp->column);
     for (size_t half = 0; half < ENVIRONMENT_HALVES; half++) {
         for (size_t i = 0; i < points->count && lamp->kind == kind_of_half[half]; i++)
-            lamp->lit[i] = points->point[i].saturated[half];
+            lamp->column[i] = points->point[i].saturated[half];
     }
 }

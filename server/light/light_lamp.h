@@ -29,7 +29,7 @@ struct light_lamp {
     rgb radiance;        /* the estimate */
     float deviation;     /* standard deviation of its logarithm */
     size_t source;       /* in the fit */
-    float *lit;          /* [point count] column of the response; owned */
+    float *column;       /* [point count] column of the response; owned */
 };
 
 struct light_lamps {

@@ -57,7 +57,7 @@ static size_t half_filled_from(const struct light_model *m, size_t half) {
 }
 
 /* The fill continues what is seen: as far as that saturates, the fill is as much brighter as it is. */
-static void add_cell(struct light_model *m, size_t k, const float *lit) {
+static void add_cell(struct light_model *m, size_t k, const float *column) {
     const struct environment *e = &m->r->environment;
     size_t half = half_filled_from(m, sky_cells_half(k));
     const struct light_lamp *bound = light_lamps_half(&m->lamps, half);
@@ -71,7 +71,7 @@ static void add_cell(struct light_model *m, size_t k, const float *lit) {
         source.deviation = deviation / sqrt(fmax(1.0 - part, 0.01));
         tie(m, m->first_cell + k, bound->source, mean, deviation / sqrt(part));
     }
-    joint_fit_add(&m->fit, &source, lit);
+    joint_fit_add(&m->fit, &source, column);
 }
 
 /* By the radiances of saturated sky and ground. */
@@ -83,20 +83,20 @@ static void tie_ground(struct light_model *m) {
 }
 
 static void add_cells(struct light_model *m) {
-    float *lit = mem_calloc(m->points.count + 1, sizeof *lit);
+    float *column = mem_calloc(m->points.count + 1, sizeof *column);
     struct joint_source around = light_lamps_opening_prior(&m->lamps);
     around.value = log(fmax((double)m->lamps.median_radiance, 1e-20)); /* of dim ones none would tell at first */
     m->first_cell = m->fit.source_count;
     m->has_sky = true;
     for (size_t k = 0; k < light_sky_cells(&m->sky); k++) {
         for (size_t i = 0; i < m->points.count; i++)
-            lit[i] = m->points.point[i].sky ? m->points.point[i].sky[k] : 0.0f;
+            column[i] = m->points.point[i].sky ? m->points.point[i].sky[k] : 0.0f;
         if (m->sky.surround)
-            joint_fit_add(&m->fit, &around, lit);
+            joint_fit_add(&m->fit, &around, column);
         else
-            add_cell(m, k, lit);
+            add_cell(m, k, column);
     }
-    mem_free(lit);
+    mem_free(column);
 }
 
 static void tie_cells(struct light_model *m) {
@@ -108,22 +108,22 @@ static void tie_cells(struct light_model *m) {
     }
 }
 
-static float guess_mean(const struct light_point *p, size_t region) {
-    const float *g = p->guessed + 3 * region;
-    return (g[0] + g[1] + g[2]) / 3.0f;
+static float region_mean(const struct light_point *p, size_t region) {
+    const float *radiance = p->unobserved + 3 * region;
+    return (radiance[0] + radiance[1] + radiance[2]) / 3.0f;
 }
 
 /* What surfaces send that no photograph shows, by region, as a factor of their fill. */
-static void add_guesses(struct light_model *m) {
-    float *lit = mem_calloc(m->points.count + 1, sizeof *lit);
+static void add_regions(struct light_model *m) {
+    float *column = mem_calloc(m->points.count + 1, sizeof *column);
     const struct joint_source source = {.deviation = FILL_DEVIATION, .least = -INFINITY};
-    m->first_guess = m->fit.source_count;
+    m->first_region = m->fit.source_count;
     for (size_t k = 0; k < LIGHT_REGIONS; k++) {
         for (size_t i = 0; i < m->points.count; i++)
-            lit[i] = m->points.point[i].guessed ? guess_mean(&m->points.point[i], k) : 0.0f;
-        joint_fit_add(&m->fit, &source, lit);
+            column[i] = m->points.point[i].unobserved ? region_mean(&m->points.point[i], k) : 0.0f;
+        joint_fit_add(&m->fit, &source, column);
     }
-    mem_free(lit);
+    mem_free(column);
 }
 
 /* Adds to the points' deviations what a highlight may add to albedo, which makes dark surfaces less alike. How dark a
@@ -152,12 +152,12 @@ static struct segment_light_disc *find_bounced(const struct light_model *m, uint
     return disc;
 }
 
-void light_model_respond_hidden(const struct light_model *m, uint32_t segment, float *lit) {
+void light_model_respond_hidden(const struct light_model *m, uint32_t segment, float *column) {
     const struct light_points *p = &m->points;
     size_t count;
     struct segment_light_disc *disc = find_bounced(m, segment, &count);
-    segment_light_add(&m->lamps.light, p->point, p->count, segment, SEGMENT_LIGHT_POINTS, lit);
-    segment_light_add_discs(&m->lamps.light, p->point, p->count, disc, count, lit);
+    segment_light_add(&m->lamps.light, p->point, p->count, segment, SEGMENT_LIGHT_POINTS, column);
+    segment_light_add_discs(&m->lamps.light, p->point, p->count, disc, count, column);
     mem_free(disc);
 }
 
@@ -186,11 +186,11 @@ static void take_bounced_off(struct light_model *m, const struct light_lamp *lam
         memset(bounced, 0, points * sizeof *bounced);
         segment_light_add_discs(&m->lamps.light, m->points.point, points, disc, of_region, bounced);
         for (size_t i = 0; i < points; i++) {
-            float *guessed = m->points.point[i].guessed ? m->points.point[i].guessed + 3 * k : NULL;
-            for (size_t c = 0; c < 3 && guessed; c++)
-                guessed[c] = fmaxf(guessed[c] - bounced[i] * (&lamp->radiance.r)[c], 0.0f);
-            if (guessed)
-                m->fit.response[i * m->fit.source_most + m->first_guess + k] = guess_mean(&m->points.point[i], k);
+            float *unobserved = m->points.point[i].unobserved ? m->points.point[i].unobserved + 3 * k : NULL;
+            for (size_t c = 0; c < 3 && unobserved; c++)
+                unobserved[c] = fmaxf(unobserved[c] - bounced[i] * (&lamp->radiance.r)[c], 0.0f);
+            if (unobserved)
+                m->fit.response[i * m->fit.source_most + m->first_region + k] = region_mean(&m->points.point[i], k);
         }
     }
     mem_free(bounced);
@@ -203,8 +203,8 @@ static void respond(struct light_model *m, struct light_lamp *lamp) {
         light_lamps_respond(&m->lamps, lamp, &m->points);
         return;
     }
-    lamp->lit = mem_calloc(m->points.count + 1, sizeof *lamp->lit);
-    light_model_respond_hidden(m, lamp->segment[0], lamp->lit);
+    lamp->column = mem_calloc(m->points.count + 1, sizeof *lamp->column);
+    light_model_respond_hidden(m, lamp->segment[0], lamp->column);
     take_bounced_off(m, lamp);
 }
 
@@ -216,7 +216,7 @@ static void add_lamps(struct light_model *m, bool hidden) {
             continue;
         respond(m, lamp);
         lamp->source = m->fit.source_count;
-        joint_fit_add(&m->fit, &source, lamp->lit);
+        joint_fit_add(&m->fit, &source, lamp->column);
     }
 }
 
@@ -239,7 +239,7 @@ static void make_fit(struct light_model *m) {
         add_cells(m);
     if (any_escapes && !m->sky.surround)
         tie_cells(m);
-    add_guesses(m);
+    add_regions(m);
     allow_for_highlights(m);
     add_lamps(m, true);
 }
@@ -262,10 +262,10 @@ void light_model_survey(struct light_model *m, const struct views *views, const 
     make_fit(m);
 }
 
-void light_model_add_hidden(struct light_model *m, uint32_t segment, const struct joint_source *source, float *lit) {
+void light_model_add_hidden(struct light_model *m, uint32_t segment, const struct joint_source *source, float *column) {
     struct light_lamp *lamp = light_lamps_add_hidden(&m->lamps, segment);
-    lamp->source = m->fit.source_count, lamp->lit = lit;
-    joint_fit_add(&m->fit, source, lit);
+    lamp->source = m->fit.source_count, lamp->column = column;
+    joint_fit_add(&m->fit, source, column);
 }
 
 void light_model_remove_hidden(struct light_model *m, size_t index) {

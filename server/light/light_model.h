@@ -17,7 +17,7 @@ struct light_model {
     double patches_alike;                    /* so many patches are worth one (joint_alike.h) */
     bool has_sky;                            /* unseen sky, or what surrounds a scan, lights the points: */
     size_t first_cell;                       /* its sources in the fit, of each cell */
-    size_t first_guess;                      /* unseen surfaces: LIGHT_REGIONS factors of their fill */
+    size_t first_region;                     /* unseen surfaces: LIGHT_REGIONS factors of their fill */
     struct joint_tie tie[3 * SKY_CELLS + 1]; /* between them, with saturated sky and ground, and of these */
 };
 
@@ -29,12 +29,12 @@ void light_model_release(struct light_model *m);
 void light_model_survey(struct light_model *m, const struct views *views, const struct light_field *field,
                         const struct fused *observed);
 
-/* Adds to lit[points.count] the response of a hidden lamp: its own light and what unseen surfaces reflect of it. */
-void light_model_respond_hidden(const struct light_model *m, uint32_t segment, float *lit);
+/* Adds to column[points.count] the response of a hidden lamp: its own light and what unseen surfaces reflect of it. */
+void light_model_respond_hidden(const struct light_model *m, uint32_t segment, float *column);
 
-/* Adds a hidden lamp of which `lit` is the column of the response; takes it over. Its radiance is of the fit's
+/* Adds a hidden lamp of which `column` is the column of the response; takes it over. Its radiance is of the fit's
  * value. */
-void light_model_add_hidden(struct light_model *m, uint32_t segment, const struct joint_source *source, float *lit);
+void light_model_add_hidden(struct light_model *m, uint32_t segment, const struct joint_source *source, float *column);
 /* Removes a hidden lamp. */
 void light_model_remove_hidden(struct light_model *m, size_t lamp);
 

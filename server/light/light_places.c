@@ -10,7 +10,7 @@
 #include "server/render/sampler.h"
 
 #define RAYS_PER_POINT 128 /* directions a point */
-/* Bound of a residual, logarithm of base colour. */
+/* Bound of a residual, in the logarithm of base colour: a factor of e. */
 #define MAX_RESIDUAL 1.0f
 
 struct places_gathering {
@@ -27,14 +27,14 @@ static void gather_place(void *user, size_t index, int thread) {
     struct irradiance light;
     *p = (struct light_place){
         .segment = reconstruction_segment(r, texel),
-        .shown = fused_around(&r->fused, &r->atlas, &r->inverse, texel, r->atlas.width / SURVEY_AROUND),
+        .observed = fused_around(&r->fused, &r->atlas, &r->inverse, texel, r->atlas.width / SURVEY_AROUND),
         .weight = 1.0f};
     if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &p->at))
         return;
     irradiance_gather(&light, &survey->scratch[thread], &survey->field, &p->at, sampler_key(SURVEY_KEY, texel, 0),
                       RAYS_PER_POINT);
     sun_add_light(&r->sun, r->world.accel, &p->at, &light);
-    p->white = irradiance_diffuse(&light, p->at.shading, 1.0f, p->at.shading);
+    p->lambert = irradiance_diffuse(&light, p->at.shading, 1.0f, p->at.shading);
 }
 
 static int by_segment(const void *a, const void *b) {
@@ -62,16 +62,16 @@ size_t light_places_above(const struct light_places *s, float residual) {
 static void floor_light(struct light_places *s) {
     float *mean = mem_array(s->count + 1, sizeof *mean);
     for (size_t i = 0; i < s->count; i++)
-        mean[i] = rgb_mean(s->place[i].shown);
+        mean[i] = rgb_mean(s->place[i].observed);
     float dark = fmaxf(SURVEY_DARK * quantile(mean, s->count, 0.5), 1e-20f);
     for (size_t i = 0; i < s->count; i++) {
-        s->place[i].shown = rgb_add(s->place[i].shown, rgb_gray(dark));
-        s->place[i].white = rgb_add(s->place[i].white, rgb_gray(dark));
+        s->place[i].observed = rgb_add(s->place[i].observed, rgb_gray(dark));
+        s->place[i].lambert = rgb_add(s->place[i].lambert, rgb_gray(dark));
     }
     mem_free(mean);
 }
 
-static float log_base(const struct light_place *p) { return logf(rgb_mean(p->shown) / rgb_mean(p->white)); }
+static float log_base(const struct light_place *p) { return logf(rgb_mean(p->observed) / rgb_mean(p->lambert)); }
 
 void light_places_leave_out_lamps(struct light_places *s) {
     size_t kept = 0;
@@ -86,7 +86,7 @@ void light_places_leave_out_lamps(struct light_places *s) {
     s->count = kept;
 }
 
-static void find_odd(struct light_places *s) {
+static void find_residuals(struct light_places *s) {
     float *sorted = mem_array(s->count + 1, sizeof *sorted);
     for (size_t first = 0, end; first < s->count; first = end) {
         end = light_places_end(s, first);
@@ -106,7 +106,7 @@ void light_places_take(struct light_places *s, struct light_place *place, size_t
     *s = (struct light_places){.count = count, .place = place};
     qsort(s->place, s->count, sizeof *s->place, by_segment);
     floor_light(s);
-    find_odd(s);
+    find_residuals(s);
 }
 
 void light_places_init(struct light_places *s, const struct survey *survey) {

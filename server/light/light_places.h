@@ -10,18 +10,18 @@
 #include "server/light/survey.h"
 #include "server/scene/surface.h"
 
-/* What is so much brighter than its segment or white paint, in the logarithm, is bright. */
+/* A place is bright if its residual exceeds this: a factor of 1.6 in base colour. */
 #define PLACE_BRIGHT 0.5f
 
 struct light_place {
     uint32_t segment;
     struct surface_point at;
-    rgb shown, white;
+    rgb observed, lambert;
     float residual; /* log(base colour / (median of the segment, or that of white paint)), without missing light */
     /* Of the search: */
-    float weight; /* at most 1 */
-    float lit;    /* Lambert radiance at albedo 1 by the hypothetical light at strength 1 */
-    float open;   /* visible part of the disc of the hypothetical sun */
+    float weight;   /* at most 1 */
+    float response; /* Lambert radiance at albedo 1 by the hypothetical light at strength 1 */
+    float visible;  /* part of the disc of the hypothetical sun */
 };
 
 struct light_places {
@@ -32,7 +32,7 @@ struct light_places {
 /* Makes the places from a survey; observed radiance is the mean around each. */
 #define LIGHT_PLACES 16384
 void light_places_init(struct light_places *places, const struct survey *survey);
-/* From place[count] of which segment, at, shown, white and weight are known, in any order; takes it over. */
+/* From place[count] whose segment, at, observed, lambert and weight are set, in any order; takes it over. */
 void light_places_take(struct light_places *places, struct light_place *place, size_t count);
 /* Drops segments of which most is brighter than white paint could be: probably lamps. */
 void light_places_leave_out_lamps(struct light_places *places);

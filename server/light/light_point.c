@@ -56,8 +56,8 @@ size_t light_points_region(const struct light_points *p, vec3 place) {
     return region;
 }
 
-/* Moves light of surfaces that no photograph shows from `known` to `guessed`: the rays of the last gathering again. */
-static void set_guesses_apart(const struct gathering *g, struct incident *in, struct light_point *p) {
+/* Moves light of unobserved surfaces from `known` to `unobserved`, by the rays of the last gathering again. */
+static void separate_unobserved(const struct gathering *g, struct incident *in, struct light_point *p) {
     const struct reconstruction *r = g->survey->r;
     float light[LIGHT_REGIONS][3] = {{0}};
     rgb sum = rgb_gray(0.0f);
@@ -86,8 +86,8 @@ static void set_guesses_apart(const struct gathering *g, struct incident *in, st
     if (rgb_is_black(sum))
         return;
     p->known = rgb_clamp(rgb_sub(p->known, sum), 0.0f, INFINITY);
-    p->guessed = mem_array(3 * LIGHT_REGIONS, sizeof *p->guessed);
-    memcpy(p->guessed, light, sizeof light);
+    p->unobserved = mem_array(3 * LIGHT_REGIONS, sizeof *p->unobserved);
+    memcpy(p->unobserved, light, sizeof light);
 }
 
 /* The part of the sky that is seen from a point: where a ray of the last gathering escaped many more are traced. */
@@ -140,7 +140,7 @@ static void gather_point(void *user, size_t index, int thread) {
     float all = light.moment[0][0] + light.moment[0][1] + light.moment[0][2];
     if (!(all > 0.0f))
         return; /* also inside closed bodies, where the directions in `in` are those of another point */
-    set_guesses_apart(g, in, p);
+    separate_unobserved(g, in, p);
     p->deviation = 3.0f * rgb_mean(light.noise) / all; /* one draw of it */
 }
 
@@ -174,7 +174,7 @@ static void average_arrays(struct light_point *p, size_t count, size_t length,
 }
 
 static float **sky_of(struct light_point *p) { return &p->sky; }
-static float **guessed_of(struct light_point *p) { return &p->guessed; }
+static float **unobserved_of(struct light_point *p) { return &p->unobserved; }
 
 /* What the rays of a patch's points found, averaged: few of a point's rays find a window, and noise of a response would
  * make its source too faint (regression dilution). */
@@ -191,7 +191,7 @@ static void average_patch(struct light_point *p, size_t count) {
             p[i].saturated[half] = (float)saturated[half];
     }
     average_arrays(p, count, LIGHT_CELLS, sky_of);
-    average_arrays(p, count, 3 * LIGHT_REGIONS, guessed_of);
+    average_arrays(p, count, 3 * LIGHT_REGIONS, unobserved_of);
 }
 
 /* The deviation of a patch's points: the root mean square of their draws, and of light that is not modelled. */
@@ -229,7 +229,7 @@ void light_points_init(struct light_points *p, const struct survey *survey, cons
 
 void light_points_release(struct light_points *p) {
     for (size_t i = 0; i < p->count; i++)
-        mem_free(p->point[i].sky), mem_free(p->point[i].guessed);
+        mem_free(p->point[i].sky), mem_free(p->point[i].unobserved);
     mem_free(p->point);
     *p = (struct light_points){0};
 }

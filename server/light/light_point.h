@@ -16,7 +16,7 @@ struct light_point {
     rgb observed, known; /* outgoing radiance; that of a surface of albedo 1 by known light */
     float deviation;     /* standard deviation of log `known` by noise and by light that is not modelled */
     float escaping;      /* part of its cosine-distributed rays that leave the room in unseen directions */
-    float *guessed;      /* [LIGHT_REGIONS][3] the same by surfaces of each region that no photograph shows, which
+    float *unobserved;   /* [LIGHT_REGIONS][3] the same by surfaces of each region that no photograph shows, which
                                  * `known` goes without; NULL: none; owned, as the next */
     float *sky;          /* [LIGHT_CELLS] parts of these rays that go to each cell; NULL: none do */
     float saturated[ENVIRONMENT_HALVES]; /* radiance of a surface of albedo 1 by saturated directions */

@@ -7,16 +7,16 @@
 #include "common/quantile.h"
 #include "server/light/albedo.h"
 
-/* Strengths tried: from one on that adds this share of the light that is known to what is lit, on average, octaves
+/* Strengths tried: from one on that adds this share of known light to the places it reaches, on average, octaves
  * apart; then nearer and nearer to the best. */
 #define FAINTEST 0.01
 #define NEARER 5
-/* Rounds in which the strength tells what places it is asked of, and they tell the strength. */
+/* Rounds of weights by the last strength, and of the strength by these weights. */
 #define ROUNDS 4
 /* Points of which the median of a segment is taken. */
 #define MEDIAN_POINTS 512
 
-static void ask_all(struct missing_light *m) {
+static void weigh_equally(struct missing_light *m) {
     for (size_t i = 0; i < m->places->count; i++)
         m->weight[i] = 1.0f;
 }
@@ -35,7 +35,7 @@ void missing_light_init(struct missing_light *m, const struct light_places *plac
     m->sorted = mem_array(MISSING_STRENGTHS * places->count + 1, sizeof *m->sorted);
     m->misfit = mem_array(MISSING_STRENGTHS * m->segment_count + 1, sizeof *m->misfit);
     m->weight = mem_array(places->count + 1, sizeof *m->weight);
-    ask_all(m);
+    weigh_equally(m);
 }
 
 void missing_light_release(struct missing_light *m) {
@@ -53,13 +53,13 @@ static float channel_of(rgb value, int channel) {
 
 /* The share of a place's light in a channel that a strength of the one that is tried would be. */
 static float part_of(const struct light_place *p, float strength, int channel) {
-    float light = strength * p->lit;
-    return light > 0.0f ? light / (light + channel_of(p->white, channel)) : 0.0f;
+    float light = strength * p->response;
+    return light > 0.0f ? light / (light + channel_of(p->lambert, channel)) : 0.0f;
 }
 
 /* Robust loss in [0, 1) (Geman and McClure). */
-static double oddity(float off, float spread) {
-    double e = (double)(off / spread);
+static double robust_loss(float residual, float spread) {
+    double e = (double)(residual / spread);
     return e * e / (1.0 + e * e);
 }
 
@@ -74,8 +74,8 @@ static float median_of(const float *base, size_t count, float *sorted) {
 /* Fills base[count] with logarithms. */
 static void find_base(const struct light_place *place, size_t count, float strength, int channel, float *base) {
     for (size_t i = 0; i < count; i++)
-        base[i] =
-            logf(channel_of(place[i].shown, channel) / (channel_of(place[i].white, channel) + strength * place[i].lit));
+        base[i] = logf(channel_of(place[i].observed, channel) /
+                       (channel_of(place[i].lambert, channel) + strength * place[i].response));
 }
 
 /* Spread of base colours about a median: a highlight, not known yet, makes dark surfaces less alike. */
@@ -83,8 +83,8 @@ static float spread_about(float median) { return (float)ALBEDO_WITHIN + ALBEDO_H
 
 /* Misfit of place i, given its base colour's logarithm and the median of its segment's. */
 static double place_misfit(const struct missing_light *m, size_t i, float base, float median, float spread) {
-    double within = oddity(base - median, spread);
-    double beyond = oddity(fmaxf(base - logf((float)ALBEDO_WHITE), 0.0f), (float)ALBEDO_PATCH);
+    double within = robust_loss(base - median, spread);
+    double beyond = robust_loss(fmaxf(base - logf((float)ALBEDO_WHITE), 0.0f), (float)ALBEDO_PATCH);
     return (double)(m->weight[i] * m->places->place[i].weight) * (within + beyond);
 }
 
@@ -105,7 +105,7 @@ static void find_misfit(void *user, size_t index, int thread) {
     (void)thread;
     m->misfit[index] = 0.0;
     for (size_t i = first; i < first + count; i++)
-        any = any || m->places->place[i].lit > 0.0f;
+        any = any || m->places->place[i].response > 0.0f;
     if (!any)
         return;
     find_base(m->places->place + first, count, s->strength[row], s->channel, base);
@@ -126,13 +126,13 @@ static void misfits(const struct missing_light *m, const float *strength, size_t
 }
 
 static float faintest_strength(const struct missing_light *m, int channel) {
-    double light = 0.0, lit = 0.0, lit_count = 0.0;
+    double light = 0.0, response = 0.0, reached = 0.0;
     for (size_t i = 0; i < m->places->count; i++) {
-        light += (double)channel_of(m->places->place[i].white, channel);
-        lit += (double)m->places->place[i].lit;
-        lit_count += m->places->place[i].lit > 0.0f;
+        light += (double)channel_of(m->places->place[i].lambert, channel);
+        response += (double)m->places->place[i].response;
+        reached += m->places->place[i].response > 0.0f;
     }
-    return lit > 0.0 ? (float)(FAINTEST * light / (double)m->places->count * lit_count / lit) : 0.0f;
+    return response > 0.0 ? (float)(FAINTEST * light / (double)m->places->count * reached / response) : 0.0f;
 }
 
 float missing_light_strength(const struct missing_light *m, int channel, double *explained) {
@@ -162,7 +162,7 @@ float missing_light_strength(const struct missing_light *m, int channel, double 
     return best;
 }
 
-static void ask_by_share(struct missing_light *m, float strength, int channel) {
+static void weigh_by_share(struct missing_light *m, float strength, int channel) {
     for (size_t i = 0; i < m->places->count; i++) {
         float share = part_of(&m->places->place[i], strength, channel);
         m->weight[i] = share * share;
@@ -173,10 +173,10 @@ static float strength_by_share(struct missing_light *m, int channel) {
     double explained;
     float strength = missing_light_strength(m, channel, &explained);
     for (int i = 0; i < ROUNDS && strength > 0.0f; i++) {
-        ask_by_share(m, strength, channel);
+        weigh_by_share(m, strength, channel);
         strength = missing_light_strength(m, channel, &explained);
     }
-    ask_all(m);
+    weigh_equally(m);
     return strength;
 }
 

@@ -15,7 +15,7 @@
 
 struct missing_light {
     const struct light_places *places; /* borrowed */
-    float *weight;                     /* [places->count] 1, or how far a place is asked; owned */
+    float *weight;                     /* [places->count] 1, or by the share of its light; owned */
     struct parallel *pool;             /* borrowed */
     size_t segment_count;              /* of those that any place is of */
     size_t *first;                     /* [segment_count + 1] first place of each; owned, as the next */
@@ -28,8 +28,8 @@ struct missing_light {
 void missing_light_init(struct missing_light *m, const struct light_places *places, struct parallel *pool);
 void missing_light_release(struct missing_light *m);
 
-/* Strength of the light with which misfit is least, `lit` times strength being added to a place's light; 0: no strength
- * helps. *explained: reduction of misfit over all lit segments, in places. */
+/* Strength of the light with which misfit is least, `response` times strength being added to a place's light; 0: no
+ * strength helps. *explained: reduction of misfit over all segments that it reaches, in places. */
 float missing_light_strength(const struct missing_light *m, int channel, double *explained);
 
 /* The strength by channel of light that is known to be missing. A place counts by the square of the share of its light

@@ -28,7 +28,7 @@ void segment_light_release(struct segment_light *l) {
 struct lighting {
     const struct accel *accel;
     const struct light_point *point;
-    float *lit;
+    float *column;
     size_t disc_count;
     const struct segment_light_disc *disc;
 };
@@ -58,7 +58,7 @@ static void light_point(void *user, size_t index, int thread) {
         const struct segment_light_disc *disc = &l->disc[i];
         float light = disc->radiance * disc_light(&disc->at, at, disc->area_m2);
         if (light > 0.0f && !is_between(l->accel, &disc->at, at))
-            l->lit[index] += light;
+            l->column[index] += light;
     }
 }
 
@@ -90,13 +90,13 @@ size_t segment_light_spread(const struct segment_light *l, uint32_t segment, siz
 }
 
 void segment_light_add_discs(const struct segment_light *l, const struct light_point *point, size_t count,
-                             const struct segment_light_disc *disc, size_t disc_count, float *lit) {
-    struct lighting job = {l->r->world.accel, point, lit, disc_count, disc};
+                             const struct segment_light_disc *disc, size_t disc_count, float *column) {
+    struct lighting job = {l->r->world.accel, point, column, disc_count, disc};
     parallel_for(l->r->pool, count, light_point, &job);
 }
 
 void segment_light_add(const struct segment_light *l, const struct light_point *point, size_t count, uint32_t segment,
-                       size_t points, float *lit) {
+                       size_t points, float *column) {
     struct segment_light_disc disc[SEGMENT_LIGHT_POINTS];
-    segment_light_add_discs(l, point, count, disc, segment_light_spread(l, segment, points, disc), lit);
+    segment_light_add_discs(l, point, count, disc, segment_light_spread(l, segment, points, disc), column);
 }

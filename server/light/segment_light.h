@@ -25,13 +25,13 @@ struct segment_light_disc {
 size_t segment_light_spread(const struct segment_light *l, uint32_t segment, size_t wanted,
                             struct segment_light_disc *disc);
 
-/* Adds to lit[count] what a surface of albedo 1 at each point would send of the light of discs. */
+/* Adds to column[count] what a surface of albedo 1 at each point would send of the light of discs. */
 void segment_light_add_discs(const struct segment_light *l, const struct light_point *point, size_t count,
-                             const struct segment_light_disc *disc, size_t disc_count, float *lit);
+                             const struct segment_light_disc *disc, size_t disc_count, float *column);
 
 /* The same of a radiance of 1 from the front of the whole segment, by so many discs, SEGMENT_LIGHT_POINTS at most. */
 #define SEGMENT_LIGHT_POINTS 32
 void segment_light_add(const struct segment_light *l, const struct light_point *point, size_t count, uint32_t segment,
-                       size_t points, float *lit);
+                       size_t points, float *column);
 
 #endif

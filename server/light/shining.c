@@ -130,7 +130,7 @@ static void look_around(void *user, size_t index, int thread) {
     struct unseen_point *p = &survey->point[index];
     struct accel_ray ray[RAYS_PER_POINT];
     struct accel_hit hit[RAYS_PER_POINT];
-    *p = (struct unseen_point){.segment = s->r->segments.of_triangle[triangle], .shown = s->light->mean[triangle]};
+    *p = (struct unseen_point){.segment = s->r->segments.of_triangle[triangle], .observed = s->light->mean[triangle]};
     trace_ways(s, &s->room[index], sampler_key(KEY_RAYS, triangle, 0), ray, hit);
     for (size_t i = 0; i < RAYS_PER_POINT; i++) {
         vec3 direction = ray[i].direction;
@@ -177,7 +177,7 @@ static void find_unseen_light(struct shining *s) {
     s->room_count = choose_places(mesh, shown, count, POINTS, s->room);
     parallel_for(r->pool, s->room_count, look_around, survey);
     s->unseen_share = (float)unseen_share(survey->point, s->room_count);
-    size_t kept = unseen_keep_telling(survey->point, s->room_count);
+    size_t kept = unseen_keep_informative(survey->point, s->room_count);
     if (kept >= UNSEEN_LEAST_POINTS) {
         unseen_fit(survey->point, kept, r->segments.count, s->log_unseen);
         s->has_unseen = true;

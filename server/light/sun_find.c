@@ -11,19 +11,20 @@
 #include "server/render/bsdf.h"
 #include "server/scene/latlong.h"
 
-/* So many bright points must be there, and be lit. */
+/* Least number of bright places, in the room and of those that the sun reaches. */
 #define LEAST_BRIGHT 12
-/* Directions asked: so far apart, in degrees, at so many bright points and others, of which the likeliest ones
- * are fitted. */
-#define ASKED_DEGREES 3.0
-#define ASKED_POINTS 768
+/* Directions are screened so far apart, in degrees, by up to so many bright places and as many others; the likeliest
+ * ones are fitted. */
+#define SCREEN_DEGREES 3.0
+#define SCREEN_PLACES 768
 #define CANDIDATES 24
 /* Half the angles of discs tried, in degrees: first the sun's own; in haze it is wider. What is best explained by
  * the last one is no disc, but a sky that no photograph shows. */
 static const float radius_degrees[] = {0.27f, 0.6f, 1.2f, 2.0f, 3.0f, 4.5f, 6.0f};
 #define RADII (sizeof radius_degrees / sizeof *radius_degrees)
 #define DISC_RAYS 16
-/* A sun must explain this share of what it could, were all that it lights odd without it and as usual with it. */
+/* Least reduction of misfit by a sun, as a share of the greatest one possible: every place that it reaches from the
+ * greatest loss to none. */
 #define EXPLAINS 0.7
 /* Where the best of the likeliest directions explains less than this part of that there is none. */
 #define HOPEFUL 0.25
@@ -37,7 +38,7 @@ struct sun_search {
     struct light_places places;
     struct missing_light missing;
     struct sun sun; /* that is tried */
-    int rays;       /* a point, to see how much of it is open */
+    int rays;       /* a place, for the visible part of the disc */
 };
 
 /* A direction and the misfit of the places that it lights. */
@@ -48,18 +49,18 @@ struct sun_candidate {
 
 /* --- directions ------------------------------------------------------------------------------------ */
 
-struct asked {
+struct screening {
     const struct sun_search *s;
     size_t count;
     uint32_t *place;        /* [count] */
     float *weight;          /* [count] places of the room that it stands for */
-    double mean, deviation; /* of how odd places are */
+    double mean, deviation; /* of the residuals of all places */
     struct sun_candidate *candidate;
 };
 
-static void ask_direction(void *user, size_t index, int thread) {
+static void score_direction(void *user, size_t index, int thread) {
     (void)thread;
-    const struct asked *a = user;
+    const struct screening *a = user;
     struct sun_candidate *c = &a->candidate[index];
     struct sun sun = {.direction = c->direction};
     double sum = 0.0, weights = 0.0;
@@ -72,10 +73,10 @@ static void ask_direction(void *user, size_t index, int thread) {
     c->score = sum / (sqrt(weights + 1.0) * a->deviation);
 }
 
-/* Up to ASKED_POINTS places that are bright, or not. */
-static void choose_asked(struct asked *a, bool bright) {
+/* Up to SCREEN_PLACES places that are bright, or not. */
+static void choose_places(struct screening *a, bool bright) {
     size_t above = light_places_above(&a->s->places, PLACE_BRIGHT), all = bright ? above : a->s->places.count - above;
-    struct spacing spacing = {.all = all, .wanted = all < ASKED_POINTS ? all : ASKED_POINTS};
+    struct spacing spacing = {.all = all, .wanted = all < SCREEN_PLACES ? all : SCREEN_PLACES};
     for (size_t i = 0; i < a->s->places.count; i++) {
         if ((a->s->places.place[i].residual > PLACE_BRIGHT) == bright && spacing_takes(&spacing)) {
             a->weight[a->count] = (float)all / (float)spacing.wanted;
@@ -90,11 +91,11 @@ static int by_score(const void *a, const void *b) {
 }
 
 /* Fills candidate[CANDIDATES] with the likeliest unseen directions; returns their number. */
-static size_t ask_directions(const struct sun_search *s, struct sun_candidate candidate[CANDIDATES]) {
-    struct asked a = {.s = s};
-    size_t rows = (size_t)(180.0 / ASKED_DEGREES), count = 0;
-    a.place = mem_array(2 * ASKED_POINTS, sizeof *a.place);
-    a.weight = mem_array(2 * ASKED_POINTS, sizeof *a.weight);
+static size_t screen_directions(const struct sun_search *s, struct sun_candidate candidate[CANDIDATES]) {
+    struct screening a = {.s = s};
+    size_t rows = (size_t)(180.0 / SCREEN_DEGREES), count = 0;
+    a.place = mem_array(2 * SCREEN_PLACES, sizeof *a.place);
+    a.weight = mem_array(2 * SCREEN_PLACES, sizeof *a.weight);
     a.candidate = mem_array(2 * rows * rows, sizeof *a.candidate);
     for (size_t row = 0; row < rows; row++) {
         double down = ((double)row + 0.5) / (double)rows;
@@ -111,9 +112,9 @@ static size_t ask_directions(const struct sun_search *s, struct sun_candidate ca
         squares += (double)(s->places.place[i].residual * s->places.place[i].residual) / (double)s->places.count;
     }
     a.deviation = sqrt(fmax(squares - a.mean * a.mean, 1e-12));
-    choose_asked(&a, true);
-    choose_asked(&a, false);
-    parallel_for(s->r->pool, count, ask_direction, &a);
+    choose_places(&a, true);
+    choose_places(&a, false);
+    parallel_for(s->r->pool, count, score_direction, &a);
     qsort(a.candidate, count, sizeof *a.candidate, by_score);
     count = count < CANDIDATES ? count : CANDIDATES;
     memcpy(candidate, a.candidate, count * sizeof *candidate);
@@ -125,20 +126,20 @@ static size_t ask_directions(const struct sun_search *s, struct sun_candidate ca
 
 /* --- fit --------------------------------------------------------------------------------------------- */
 
-static void shine_on(void *user, size_t index, int thread) {
+static void find_response(void *user, size_t index, int thread) {
     (void)thread;
     struct sun_search *s = user;
     struct light_place *p = &s->places.place[index];
-    p->open = sun_visibility(&s->sun, s->r->world.accel, &p->at, s->rays);
+    p->visible = sun_visibility(&s->sun, s->r->world.accel, &p->at, s->rays);
     float cosine = vec3_dot(s->sun.direction, p->at.shading);
-    p->lit = p->open > 0.0f ? p->open * cosine * irradiance_matt(cosine) : 0.0f;
+    p->response = p->visible > 0.0f ? p->visible * cosine * irradiance_matt(cosine) : 0.0f;
 }
 
 /* Reduction of misfit by a sun in a direction. */
 static double try_direction(struct sun_search *s, vec3 direction) {
     double explained;
     s->sun.direction = direction;
-    parallel_for(s->r->pool, s->places.count, shine_on, s);
+    parallel_for(s->r->pool, s->places.count, find_response, s);
     missing_light_strength(&s->missing, MISSING_MEAN, &explained);
     return explained;
 }
@@ -164,16 +165,16 @@ static void walk(struct sun_search *s, struct sun_candidate *best, double degree
 }
 
 /* Sunlit places of a greater residual, each weighted by the visible part of the disc. */
-static double count_lit(const struct sun_search *s, float residual) {
-    double lit = 0.0;
+static double count_reached(const struct sun_search *s, float residual) {
+    double reached = 0.0;
     for (size_t i = 0; i < s->places.count; i++)
-        lit += s->places.place[i].residual > residual ? (double)s->places.place[i].open : 0.0;
-    return lit;
+        reached += s->places.place[i].residual > residual ? (double)s->places.place[i].visible : 0.0;
+    return reached;
 }
 
 static struct sun_candidate best_direction(struct sun_search *s) {
     struct sun_candidate candidate[CANDIDATES], best = {.score = 0.0};
-    size_t count = ask_directions(s, candidate);
+    size_t count = screen_directions(s, candidate);
     s->rays = 1;
     for (size_t i = 0; i < count; i++) {
         candidate[i].score = try_direction(s, candidate[i].direction);
@@ -182,7 +183,7 @@ static struct sun_candidate best_direction(struct sun_search *s) {
     }
     if (best.score > 0.0)
         try_direction(s, best.direction);
-    if (best.score <= HOPEFUL * EXPLAINS * count_lit(s, -INFINITY))
+    if (best.score <= HOPEFUL * EXPLAINS * count_reached(s, -INFINITY))
         best.score = 0.0;
     else
         walk(s, &best, 2.0, 0.25);
@@ -214,11 +215,11 @@ static void look_for_sun(struct sun_search *s, double *explains) {
         return;
     bool is_disc = find_radius(s, &best);
     try_direction(s, best.direction);
-    *explains = best.score / fmax(count_lit(s, -INFINITY), 1.0);
-    rgb white = missing_light_color(&s->missing);
-    s->sun.is_there = is_disc && count_lit(s, PLACE_BRIGHT) >= LEAST_BRIGHT && *explains > EXPLAINS &&
-                      rgb_mean(white) < BRIGHTEST * s->median_radiance;
-    s->sun.irradiance = rgb_scale(white, BSDF_PI);
+    *explains = best.score / fmax(count_reached(s, -INFINITY), 1.0);
+    rgb strength = missing_light_color(&s->missing);
+    s->sun.is_there = is_disc && count_reached(s, PLACE_BRIGHT) >= LEAST_BRIGHT && *explains > EXPLAINS &&
+                      rgb_mean(strength) < BRIGHTEST * s->median_radiance;
+    s->sun.irradiance = rgb_scale(strength, BSDF_PI);
 }
 
 static cJSON *report_found(const struct reconstruction *r) {
@@ -231,7 +232,7 @@ static cJSON *report_found(const struct reconstruction *r) {
 static void report(const struct sun_search *s, double explains) {
     cJSON *figures = report_found(s->r);
     json_add_number(figures, "explains", explains);
-    json_add_number(figures, "lights_share", count_lit(s, -INFINITY) / fmax((double)s->places.count, 1.0));
+    json_add_number(figures, "lights_share", count_reached(s, -INFINITY) / fmax((double)s->places.count, 1.0));
 }
 
 void sun_report(const struct reconstruction *r) {

@@ -13,7 +13,7 @@
 /* Greatest factor by which a channel is changed; a greater one means another error. */
 #define CHANGE_MOST 2.0f
 
-static bool tells(const struct divide *d, uint32_t texel) {
+static bool is_usable(const struct divide *d, uint32_t texel) {
     return d->fused->count[texel] > 0.0f && !d->fused->is_bound[texel] &&
            !d->is_emitter[surface_segment(&d->surface, texel)];
 }
@@ -23,10 +23,10 @@ static size_t choose_texels(const struct divide *d, uint32_t texel[LIGHT_PLACES]
     const struct inverse_uv *inverse = d->surface.inverse;
     size_t all = 0, count = 0;
     for (size_t i = 0; i < inverse->valid_count; i++)
-        all += tells(d, inverse->valid[i]);
+        all += is_usable(d, inverse->valid[i]);
     struct spacing spacing = {.all = all, .wanted = all < LIGHT_PLACES ? all : LIGHT_PLACES};
     for (size_t i = 0; i < inverse->valid_count; i++) {
-        if (tells(d, inverse->valid[i]) && spacing_takes(&spacing))
+        if (is_usable(d, inverse->valid[i]) && spacing_takes(&spacing))
             texel[count++] = inverse->valid[i];
     }
     return count;
@@ -38,8 +38,8 @@ struct placing {
     struct light_place *place;
 };
 
-/* What it shows of its base colour alone, and what a white surface there would, without the sun and of the sun; of no
- * weight where that was not measured. */
+/* Diffuse radiance, Lambert radiance without the sun, and response to the sun; weight 0 where base colour was not
+ * measured. */
 static void place_texel(void *user, size_t index, int thread) {
     (void)thread;
     const struct placing *job = user;
@@ -48,19 +48,19 @@ static void place_texel(void *user, size_t index, int thread) {
     const struct measurement *m = &d->measured[job->texel[index]];
     struct light_place *p = &job->place[index];
     struct irradiance light = {0};
-    rgb white;
+    rgb lambert;
     *p = (struct light_place){.segment = surface_segment(s, job->texel[index])};
-    if (!(m->weight > 0.0f) || !divide_lambert(d, job->texel[index], &white) ||
+    if (!(m->weight > 0.0f) || !divide_lambert(d, job->texel[index], &lambert) ||
         !surface_at_texel(s->mesh, s->atlas, s->inverse, job->texel[index], &p->at))
         return;
     sun_add_light(d->sun, d->accel, &p->at, &light);
     rgb of_sun = irradiance_diffuse(&light, p->at.shading, 1.0f, p->at.shading);
     p->weight = 1.0f;
-    p->shown = rgb_clamp(rgb_mul(measurement_value(m), white), 0.0f, INFINITY);
-    p->white = rgb_clamp(rgb_sub(white, of_sun), 0.0f, INFINITY);
-    p->open = sun_visibility(d->sun, d->accel, &p->at, 0);
+    p->observed = rgb_clamp(rgb_mul(measurement_value(m), lambert), 0.0f, INFINITY);
+    p->lambert = rgb_clamp(rgb_sub(lambert, of_sun), 0.0f, INFINITY);
+    p->visible = sun_visibility(d->sun, d->accel, &p->at, 0);
     float cosine = vec3_dot(d->sun->direction, p->at.shading);
-    p->lit = p->open * cosine * irradiance_matt(cosine);
+    p->response = p->visible * cosine * irradiance_matt(cosine);
 }
 
 static void find_places(struct divide *d, struct light_places *places) {

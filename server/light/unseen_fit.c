@@ -10,12 +10,12 @@
 #include "server/light/albedo.h"
 
 #define CELLS SKY_CELLS
-/* Part of a point's rays that must be unseen for it to tell of them. */
+/* Least share of a point's rays in unseen directions for it to count in the fit. */
 #define SHARE_LEAST 0.1f
-/* The part of the points that is no whiter than white paint. In scans that is not near 1: in creases of a
+/* The share of the points whose base colour is at most that of white paint. In scans it is not near 1: in creases of a
  * fused mesh too little light is found. */
-#define NO_WHITER 0.9
-/* Deviations at which a point has a quarter of its influence: emitters are no surfaces lit. Beyond white it
+#define BELOW_WHITE 0.9
+/* Deviations at which a point has a quarter of its robust_weight: emitters are no surfaces lit. Beyond white it
  * comes later, or a room that is much too dark would be taken for one of lamps. */
 #define OUTLIER 2.0
 #define OUTLIER_BEYOND 5.0
@@ -42,7 +42,7 @@ void unseen_add_ray(struct unseen_point *p, vec3 direction, float share, float f
         p->share[c.cell[k]] += share * c.weight[k];
 }
 
-size_t unseen_keep_telling(struct unseen_point *point, size_t count) {
+size_t unseen_keep_informative(struct unseen_point *point, size_t count) {
     size_t kept = 0;
     for (size_t i = 0; i < count; i++) {
         if (point[i].unseen >= SHARE_LEAST)
@@ -70,28 +70,28 @@ double unseen_base_color(const struct unseen_point *point, size_t count, double 
     for (size_t i = 0; i < count; i++) {
         const struct unseen_point *p = &point[i];
         double light = log_radiance ? arrived(p, log_radiance) : (double)(p->known + p->filled);
-        base[i] = (float)((double)p->shown / fmax(light, FAINTEST));
+        base[i] = (float)((double)p->observed / fmax(light, FAINTEST));
     }
     double found = (double)quantile(base, count, below);
     mem_free(base);
     return found;
 }
 
-/* Multiplies the map so that nearly all is no whiter than white. */
-static void make_white(struct fit *f) {
+/* Scales the map so that BELOW_WHITE of the base colours are at most that of white paint. */
+static void scale_to_white(struct fit *f) {
     double low = -20.0, high = 20.0, cell[CELLS];
     for (int i = 0; i < 40; i++) {
         double middle = 0.5 * (low + high);
         for (size_t k = 0; k < CELLS; k++)
             cell[k] = f->cell[k] + middle;
-        *(unseen_base_color(f->point, f->count, NO_WHITER, cell) > ALBEDO_WHITE ? &low : &high) = middle;
+        *(unseen_base_color(f->point, f->count, BELOW_WHITE, cell) > ALBEDO_WHITE ? &low : &high) = middle;
     }
     for (size_t k = 0; k < CELLS; k++)
         f->cell[k] += high;
 }
 
 /* Geman and McClure's weight of a residual in deviations. */
-static double influence(double deviations, double outlier) {
+static double robust_weight(double deviations, double outlier) {
     double e = deviations / outlier, w = 1.0 / (1.0 + e * e);
     return w * w;
 }
@@ -102,7 +102,7 @@ static void means_of_segments(const struct fit *f, const double *log_base, doubl
     double *weight = mem_calloc(segments, sizeof *weight);
     memset(mean, 0, segments * sizeof *mean);
     for (size_t i = 0; i < f->count; i++) {
-        double w = influence(fmax(log_base[i] - log(ALBEDO_WHITE), 0.0) / ALBEDO_PATCH, OUTLIER_BEYOND);
+        double w = robust_weight(fmax(log_base[i] - log(ALBEDO_WHITE), 0.0) / ALBEDO_PATCH, OUTLIER_BEYOND);
         mean[f->point[i].segment] += w * log_base[i];
         weight[f->point[i].segment] += w;
     }
@@ -116,7 +116,7 @@ struct normal {
 };
 
 /* Pulls the difference of two unknowns, or of one and a constant, to zero. */
-static void tie(struct normal *n, size_t a, size_t b, double difference, double weight) {
+static void pull(struct normal *n, size_t a, size_t b, double difference, double weight) {
     n->matrix[a][a] += weight;
     n->residual[a] -= weight * difference;
     if (a == b)
@@ -130,8 +130,8 @@ static void tie(struct normal *n, size_t a, size_t b, double difference, double 
 static void add_point(struct normal *n, const struct unseen_point *p, const double cell[CELLS], double log_base,
                       double mean) {
     double within = log_base - mean, beyond = fmax(log_base - log(ALBEDO_WHITE), 0.0);
-    double within_weight = influence(within / ALBEDO_WITHIN, OUTLIER) / (ALBEDO_WITHIN * ALBEDO_WITHIN);
-    double beyond_weight = influence(beyond / ALBEDO_PATCH, OUTLIER_BEYOND) / (ALBEDO_PATCH * ALBEDO_PATCH);
+    double within_weight = robust_weight(within / ALBEDO_WITHIN, OUTLIER) / (ALBEDO_WITHIN * ALBEDO_WITHIN);
+    double beyond_weight = robust_weight(beyond / ALBEDO_PATCH, OUTLIER_BEYOND) / (ALBEDO_PATCH * ALBEDO_PATCH);
     double pull = within_weight * within + beyond_weight * beyond;
     double weight = within_weight + (beyond > 0.0 ? beyond_weight : 0.0);
     double slope[CELLS], all = arrived(p, cell);
@@ -151,16 +151,16 @@ static void step(struct fit *f, struct normal *n, double *log_base, double *mean
     double inertia = INERTIA * (double)f->count, smoothness = SMOOTHNESS * (double)f->count;
     memset(n, 0, sizeof *n);
     for (size_t i = 0; i < f->count; i++)
-        log_base[i] = log(fmax((double)f->point[i].shown, FAINTEST) / arrived(&f->point[i], cell));
+        log_base[i] = log(fmax((double)f->point[i].observed, FAINTEST) / arrived(&f->point[i], cell));
     means_of_segments(f, log_base, mean);
     for (size_t i = 0; i < f->count; i++)
         add_point(n, &f->point[i], cell, log_base[i], mean[f->point[i].segment]);
     for (size_t k = 0; k < CELLS; k++) {
         size_t right = sky_cells_right(k), below = sky_cells_below(k);
-        tie(n, k, k, cell[k] - f->start[k], inertia);
-        tie(n, k, right, cell[k] - cell[right], smoothness);
+        pull(n, k, k, cell[k] - f->start[k], inertia);
+        pull(n, k, right, cell[k] - cell[right], smoothness);
         if (below < CELLS)
-            tie(n, k, below, cell[k] - cell[below], smoothness);
+            pull(n, k, below, cell[k] - cell[below], smoothness);
     }
     if (!cholesky_factor(CELLS, CELLS, &n->matrix[0][0]))
         return;
@@ -175,11 +175,11 @@ void unseen_fit(const struct unseen_point *point, size_t count, size_t segment_c
     double *mean = mem_array(segment_count, sizeof *mean);
     struct normal *n = mem_array(1, sizeof *n);
     memset(log_radiance, 0, CELLS * sizeof *log_radiance);
-    make_white(&f);
+    scale_to_white(&f);
     memcpy(f.start, f.cell, sizeof f.start);
     for (int i = 0; i < STEPS; i++)
         step(&f, n, log_base, mean);
-    make_white(&f);
+    scale_to_white(&f);
     mem_free(n);
     mem_free(mean);
     mem_free(log_base);

@@ -15,16 +15,16 @@
  * of its cosine-distributed rays that go to each cell. Means of the channels. */
 struct unseen_point {
     uint32_t segment;
-    float shown, known, filled;
+    float observed, known, filled;
     float unseen, share[SKY_CELLS]; /* unseen: the sum of the shares */
 };
 
 /* Adds a ray of weight `share` that leaves in an unobserved unit direction, with the filled-in radiance from there. */
 void unseen_add_ray(struct unseen_point *p, vec3 direction, float share, float filled);
 
-/* Moves the points that tell of unobserved directions to the front; returns their number. */
-size_t unseen_keep_telling(struct unseen_point *point, size_t count);
-/* So many of these must be there. */
+/* Moves the points that unobserved directions light noticeably to the front; returns their number. */
+size_t unseen_keep_informative(struct unseen_point *point, size_t count);
+/* Least number of these. */
 #define UNSEEN_LEAST_POINTS 64
 
 /* The part of all the points' rays that is unseen. */

@@ -32,9 +32,9 @@ struct unseen {
     struct light_sky sky; /* what of the fill is kept */
 };
 
-/* --- looking around ------------------------------------------------------------------------------- */
+/* --- gathering ------------------------------------------------------------------------------------ */
 
-static void look_from(const struct unseen *u, uint32_t texel, int thread, struct unseen_point *p) {
+static void gather_point(const struct unseen *u, uint32_t texel, int thread, struct unseen_point *p) {
     const struct reconstruction *r = u->r;
     const struct light_field *field = &u->survey->field;
     struct incident *in = &u->survey->scratch[thread];
@@ -59,12 +59,12 @@ static void look_from(const struct unseen *u, uint32_t texel, int thread, struct
     irradiance_gather(&light, in, field, &at, key, SURVEY_RAYS);
     sun_add_light(&r->sun, r->world.accel, &at, &light);
     p->known = fmaxf(rgb_mean(irradiance_diffuse(&light, at.shading, 1.0f, at.shading)) - p->filled, 0.0f);
-    p->shown = rgb_mean(fused_radiance(&r->fused, texel));
+    p->observed = rgb_mean(fused_radiance(&r->fused, texel));
 }
 
-static void look_around(void *user, size_t index, int thread) {
+static void gather_surveyed(void *user, size_t index, int thread) {
     struct unseen *u = user;
-    look_from(u, u->survey->texel[index], thread, &u->point[index]);
+    gather_point(u, u->survey->texel[index], thread, &u->point[index]);
 }
 
 /* --- the whole ------------------------------------------------------------------------------------ */
@@ -88,9 +88,9 @@ static void gather_points(struct unseen *u, const struct views *views) {
     u->survey = &survey;
     u->count = survey.count;
     u->point = mem_array(u->count + 1, sizeof *u->point);
-    parallel_for(u->r->pool, u->count, look_around, u);
+    parallel_for(u->r->pool, u->count, gather_surveyed, u);
     if (u->r->grey_card.is_given)
-        look_from(u, u->r->grey_card.texel, 0, &u->card);
+        gather_point(u, u->r->grey_card.texel, 0, &u->card);
     survey_release(&survey);
 }
 
@@ -103,7 +103,7 @@ static void scale_by_card(struct unseen *u) {
     double unseen = 0.0;
     for (size_t k = 0; k < SKY_CELLS; k++)
         unseen += (double)p->share[k] * exp(u->log_radiance[k]);
-    double wanted = (double)p->shown / card->pixel.value - (double)p->known;
+    double wanted = (double)p->observed / card->pixel.value - (double)p->known;
     if (!card->is_given || !(unseen > 0.0) || unseen < CARD_LEAST * (unseen + (double)p->known) || !(wanted > 0.0))
         return;
     card->light_factor = wanted / unseen;
@@ -128,7 +128,7 @@ void unseen_light_estimate(struct reconstruction *r, const struct views *views) 
     light_sky_init(&u.sky, &r->environment);
     gather_points(&u, views);
     r->unseen_share = unseen_share(u.point, u.count);
-    u.count = unseen_keep_telling(u.point, u.count);
+    u.count = unseen_keep_informative(u.point, u.count);
     double base_color = unseen_base_color(u.point, u.count, NOT_IMPOSSIBLE, NULL);
     bool matters = !r->is_surrounded && u.count >= UNSEEN_LEAST_POINTS &&
                    (base_color > IMPOSSIBLE_BASE_COLOR || r->unseen_share > MOSTLY_UNSEEN);

@@ -19,8 +19,11 @@ static void place_room(struct light_place place[WALL + DESK]) {
         float part = fmaxf(along - 0.6f, 0.0f) / 0.4f, known = 1.0f;
         float lit = is_desk ? (part > 0.0f ? 0.3f + part : 0.0f) : 0.01f * part;
         float light = known * (is_desk ? 1.0f : 1.0f + 0.2f * part) + STRENGTH * lit;
-        place[i] = (struct light_place){
-            .segment = is_desk, .shown = rgb_gray(0.5f * light), .white = rgb_gray(known), .weight = 1.0f, .lit = lit};
+        place[i] = (struct light_place){.segment = is_desk,
+                                        .observed = rgb_gray(0.5f * light),
+                                        .lambert = rgb_gray(known),
+                                        .weight = 1.0f,
+                                        .response = lit};
     }
 }
 

@@ -59,7 +59,7 @@ static double make_points(struct unseen_point *point, float white[POINTS]) {
         /* Base colours from .2 to .85, the last two segments white, with a texture of a tenth. */
         float base = p->segment + 2 < SEGMENTS ? 0.2f + 0.05f * (float)p->segment : 0.85f;
         white[i] = light + KNOWN;
-        p->shown = base * white[i] * (p->segment + 2 < SEGMENTS ? 0.9f + 0.2f * number(i, 1) : 1.0f);
+        p->observed = base * white[i] * (p->segment + 2 < SEGMENTS ? 0.9f + 0.2f * number(i, 1) : 1.0f);
         mean += (double)light / POINTS;
     }
     return mean;
@@ -87,7 +87,7 @@ int main(void) {
     CHECK(unseen_base_color(point, POINTS, 0.8, NULL) > 3.0);
     double plain = fit_error(point, white);
     for (size_t i = 0; i < POINTS; i += 25)
-        point[i].shown *= 20.0f; /* they emit */
+        point[i].observed *= 20.0f; /* they emit */
     double with = fit_error(point, white);
     printf("light off by %.3f, with emitters by %.3f\n", plain, with);
     CHECK_THAT(plain < 0.12, "light off by %g", plain);
