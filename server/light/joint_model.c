@@ -9,7 +9,6 @@
 /* Degrees of freedom of Student's t: tails wide enough for lamps and pictures on walls. */
 #define FREEDOM 4.0
 #define SETTLE_ROUNDS 6
-#define MEDIAN_POINTS 512 /* of a segment, of which its first mean is the median */
 
 static double square(double x) { return x * x; }
 
@@ -73,10 +72,10 @@ struct joint_white joint_whiteness(double beyond, double variance) {
 static double variance_of(const struct joint_point *p) { return square(ALBEDO_POINT) + square((double)p->deviation); }
 
 static double median_of(const struct joint_block *b, struct joint_scratch *s) {
-    size_t count = b->end - b->first, stride = (count + MEDIAN_POINTS - 1) / MEDIAN_POINTS, taken = 0;
-    for (size_t i = 0; i < count; i += stride)
-        s->sorted[taken++] = (float)s->base[i];
-    return (double)quantile(s->sorted, taken, 0.5);
+    size_t count = b->end - b->first;
+    for (size_t i = 0; i < count; i++)
+        s->sorted[i] = (float)s->base[i];
+    return (double)quantile(s->sorted, count, 0.5);
 }
 
 /* Weighted sums over the points of a patch. */

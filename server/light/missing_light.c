@@ -2,6 +2,7 @@
 #include "server/light/missing_light.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "common/mem.h"
 #include "common/quantile.h"
@@ -13,8 +14,6 @@
 #define NEARER 5
 /* Rounds of weights by the last strength, and of the strength by these weights. */
 #define ROUNDS 4
-/* Points of which the median of a segment is taken. */
-#define MEDIAN_POINTS 512
 
 static void weigh_equally(struct missing_light *m) {
     for (size_t i = 0; i < m->places->count; i++)
@@ -63,14 +62,6 @@ static double robust_loss(float residual, float spread) {
     return e * e / (1.0 + e * e);
 }
 
-/* Median of base[count], of MEDIAN_POINTS of them at most. */
-static float median_of(const float *base, size_t count, float *sorted) {
-    size_t stride = (count + MEDIAN_POINTS - 1) / MEDIAN_POINTS, taken = 0;
-    for (size_t i = 0; i < count; i += stride)
-        sorted[taken++] = base[i];
-    return quantile(sorted, taken, 0.5);
-}
-
 /* Fills base[count] with logarithms. */
 static void find_base(const struct light_place *place, size_t count, float strength, int channel, float *base) {
     for (size_t i = 0; i < count; i++)
@@ -109,7 +100,8 @@ static void find_misfit(void *user, size_t index, int thread) {
     if (!any)
         return;
     find_base(m->places->place + first, count, s->strength[row], s->channel, base);
-    float median = median_of(base, count, sorted), spread = spread_about(median);
+    memcpy(sorted, base, count * sizeof *sorted);
+    float median = quantile(sorted, count, 0.5), spread = spread_about(median);
     for (size_t i = 0; i < count; i++)
         m->misfit[index] += place_misfit(m, first + i, base[i], median, spread);
 }
