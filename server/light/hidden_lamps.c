@@ -6,63 +6,29 @@
 #include <string.h>
 
 #include "common/mem.h"
-#include "common/spaced.h"
 #include "server/state/evidence.h"
 
-/* A few points of the room are asked about every candidate and few points of it; all are asked about the likeliest. */
-#define FEW_POINTS 2048
-#define FEW_SOURCE_POINTS 8
-#define LIKELIEST 8 /* half of which are fitted together with all other sources */
+/* Points of a candidate that represent its area while all are screened; the likeliest get SEGMENT_LIGHT_POINTS. */
+#define SCREEN_POINTS 8
+/* Candidates that are tried with their whole response, half of which are fitted together with all other sources. */
+#define LIKELIEST 8
 /* Logarithm of the odds that are asked for: 20 to 1, as a false lamp costs more than a missed one. */
 #define SURE 3.0
 #define NO_LIGHT (-1e3) /* the logarithm of no radiance to speak of */
 
 struct lamp_candidate {
     uint32_t segment;
-    double gain;      /* nats */
-    float *few, *all; /* columns of the response for the few and, when it was likely, for all points; owned */
+    double gain;   /* nats */
+    bool is_whole; /* `column` is that of light_model_respond_hidden, and not of SCREEN_POINTS */
+    float *column; /* of the response; owned */
     struct joint_source source;
 };
 
 struct lamp_search {
     struct light_model *m;
-    size_t few_count;
-    struct light_point *few;   /* [few_count] copies */
-    struct joint_point *joint; /* [few_count] */
-    struct joint_fit fit;      /* of these */
     size_t count;
     struct lamp_candidate *candidate;
-    bool all; /* all points are asked in place of the few */
 };
-
-/* --- the few points ---------------------------------------------------------------------------------------- */
-
-static void choose_few(struct lamp_search *s) {
-    const struct light_model *m = s->m;
-    s->few_count = m->points.count < FEW_POINTS ? m->points.count : FEW_POINTS;
-    s->few = mem_array(s->few_count + 1, sizeof *s->few);
-    s->joint = mem_array(s->few_count + 1, sizeof *s->joint);
-    for (size_t i = 0; i < s->few_count; i++) {
-        size_t from = spaced(i, m->points.count, s->few_count);
-        s->few[i] = m->points.point[from];
-        s->joint[i] = m->joint[from];
-    }
-}
-
-/* Makes the fit of the few points one of the sources that there are by now. */
-static void renew_few(struct lamp_search *s) {
-    const struct light_model *m = s->m;
-    float *column = mem_array(s->few_count + 1, sizeof *column);
-    joint_fit_release(&s->fit);
-    joint_fit_init(&s->fit, s->joint, s->few_count, m->fit.source_count, m->r->pool);
-    s->fit.source[0] = m->fit.source[0];
-    for (size_t j = 1; j < m->fit.source_count; j++) {
-        for (size_t i = 0; i < s->few_count; i++)
-            column[i] = m->fit.response[spaced(i, m->points.count, s->few_count) * m->fit.source_most + j];
-        joint_fit_add(&s->fit, &m->fit.source[j], column);
-    }
-    mem_free(column);
-}
 
 /* --- candidates -------------------------------------------------------------------------------------------- */
 
@@ -87,8 +53,8 @@ static void find_candidates(struct lamp_search *s) {
             continue;
         struct lamp_candidate *c = &s->candidate[s->count++];
         c->segment = (uint32_t)i;
-        c->few = mem_calloc(s->few_count + 1, sizeof *c->few);
-        segment_light_add(&m->lamps.light, s->few, s->few_count, c->segment, FEW_SOURCE_POINTS, c->few);
+        c->column = mem_calloc(m->points.count + 1, sizeof *c->column);
+        segment_light_add(&m->lamps.light, m->points.point, m->points.count, c->segment, SCREEN_POINTS, c->column);
     }
 }
 
@@ -97,7 +63,7 @@ static void try_candidate(void *user, size_t index, int thread) {
     const struct lamp_search *s = user;
     struct lamp_candidate *c = &s->candidate[index];
     c->source = light_lamps_hidden_prior(&s->m->lamps);
-    c->gain = joint_fit_try(s->all ? &s->m->fit : &s->fit, &c->source, s->all ? c->all : c->few);
+    c->gain = joint_fit_try(&s->m->fit, &c->source, c->column);
 }
 
 static int by_gain(const void *a, const void *b) {
@@ -121,25 +87,26 @@ static void reset_regions(struct joint_fit *fit, size_t first) {
         fit->source[k].value = fit->source[k].mean;
 }
 
-/* Sorts the likeliest candidates to the front, by what each gains with all other sources as they are. */
+/* Sorts the first `count` candidates by what each gains with all other sources as they are. */
+static void sort_candidates(struct lamp_search *s, size_t count) {
+    reset_regions(&s->m->fit, s->m->first_region);
+    parallel_for(s->m->r->pool, count, try_candidate, s);
+    qsort(s->candidate, count, sizeof *s->candidate, by_gain);
+}
+
+/* Sorts the likeliest candidates to the front; returns how many are to be fitted. */
 static size_t find_likeliest(struct lamp_search *s) {
-    struct light_model *m = s->m;
-    s->all = false;
-    reset_regions(&s->fit, m->first_region);
-    parallel_for(m->r->pool, s->count, try_candidate, s);
-    qsort(s->candidate, s->count, sizeof *s->candidate, by_gain);
     size_t likeliest = s->count < LIKELIEST ? s->count : LIKELIEST;
+    sort_candidates(s, s->count);
     for (size_t i = 0; i < likeliest; i++) {
         struct lamp_candidate *c = &s->candidate[i];
-        if (c->all)
+        if (c->is_whole)
             continue;
-        c->all = mem_calloc(m->points.count + 1, sizeof *c->all);
-        light_model_respond_hidden(m, c->segment, c->all);
+        memset(c->column, 0, s->m->points.count * sizeof *c->column);
+        light_model_respond_hidden(s->m, c->segment, c->column);
+        c->is_whole = true;
     }
-    s->all = true;
-    reset_regions(&m->fit, m->first_region);
-    parallel_for(m->r->pool, likeliest, try_candidate, s);
-    qsort(s->candidate, likeliest, sizeof *s->candidate, by_gain);
+    sort_candidates(s, likeliest);
     return likeliest < LIKELIEST / 2 ? likeliest : LIKELIEST / 2;
 }
 
@@ -152,7 +119,7 @@ static bool add_best(struct lamp_search *s) {
     memcpy(kept, m->fit.source, bytes - sizeof *kept);
     size_t likeliest = find_likeliest(s);
     for (size_t i = 0; i < likeliest && s->candidate[i].gain > 0.0; i++) {
-        joint_fit_add(&m->fit, &s->candidate[i].source, s->candidate[i].all);
+        joint_fit_add(&m->fit, &s->candidate[i].source, s->candidate[i].column);
         double likely = odds(m, without - joint_fit_solve(&m->fit, JOINT_STEPS_NEAR), s->count);
         if (likely > greatest) {
             greatest = likely, best = i;
@@ -165,11 +132,9 @@ static bool add_best(struct lamp_search *s) {
     memcpy(m->fit.source, kept, bytes - sizeof *kept);
     if (best < SIZE_MAX) {
         struct lamp_candidate *c = &s->candidate[best];
-        light_model_add_hidden(m, c->segment, &c->source, c->all);
+        light_model_add_hidden(m, c->segment, &c->source, c->column);
         memcpy(m->fit.source, fitted, bytes);
-        mem_free(c->few);
         *c = s->candidate[--s->count];
-        renew_few(s);
     }
     mem_free(fitted);
     mem_free(kept);
@@ -202,19 +167,12 @@ static bool remove_one(struct lamp_search *s) {
 void hidden_lamps_find(struct light_model *m) {
     struct lamp_search s = {.m = m};
     size_t before = m->lamps.count;
-    choose_few(&s);
     find_candidates(&s);
-    renew_few(&s);
     while (s.count > 0 && m->lamps.count - before < LIGHT_MOST && add_best(&s))
         continue;
     while (m->lamps.count > before && remove_one(&s))
         continue;
-    for (size_t i = 0; i < s.count; i++) {
-        mem_free(s.candidate[i].few);
-        mem_free(s.candidate[i].all);
-    }
+    for (size_t i = 0; i < s.count; i++)
+        mem_free(s.candidate[i].column);
     mem_free(s.candidate);
-    joint_fit_release(&s.fit);
-    mem_free(s.joint);
-    mem_free(s.few);
 }
