@@ -12,13 +12,13 @@
 #define PLACES 64
 #define POINTS 1024        /* all over the room */
 #define RAYS_PER_POINT 256 /* directions at a place */
-#define BRIGHTER_PLACES 0.75
+#define LAMBERT_QUANTILE 0.75
 #define KEY_PLACES 31 /* keep these random numbers apart from others of the triangle */
 #define KEY_RAYS 37
 #define KEY_SUN 41
 /* Assumed ratio of true to observed radiance where all photographs saturate. High, since overestimated light only makes
  * fewer splits. */
-#define PERHAPS_BRIGHTER 16.0f
+#define SATURATED_FACTOR 16.0f
 /* The sun is looked for in so many directions; from the best ones on in steps that grow smaller. */
 #define SUN_DIRECTIONS 2048
 #define SUN_BEST 8
@@ -56,9 +56,9 @@ static size_t choose_places(const struct mesh *mesh, const uint32_t *triangle, s
     return chosen;
 }
 
-/* --- what arrives --------------------------------------------------------------------------------- */
+/* --- incident light ------------------------------------------------------------------------------- */
 
-static void trace_ways(const struct shining *s, const struct surface_point *place, uint32_t key,
+static void trace_rays(const struct shining *s, const struct surface_point *place, uint32_t key,
                        struct accel_ray ray[RAYS_PER_POINT], struct accel_hit hit[RAYS_PER_POINT]) {
     incident_cosine_rays(place, key, RAYS_PER_POINT, ray);
     accel_intersect_many(s->r->world.accel, RAYS_PER_POINT, ray, hit);
@@ -67,7 +67,7 @@ static void trace_ways(const struct shining *s, const struct surface_point *plac
 static float radiance_of(const struct shining *s, uint32_t triangle) {
     float mean = s->light->mean[triangle];
     if (s->light->is_bound[triangle])
-        return PERHAPS_BRIGHTER * mean;
+        return SATURATED_FACTOR * mean;
     return mean >= 0.0f ? mean : s->segment_mean[s->r->segments.of_triangle[triangle]];
 }
 
@@ -80,7 +80,7 @@ static float distant_radiance(const struct shining *s, vec3 direction) {
     float radiance = rgb_mean(lights_environment(s->r->world.lights, direction));
     bool seen = is_seen(s, direction);
     if (seen && !environment_is_measured(&s->r->environment, direction))
-        return PERHAPS_BRIGHTER * radiance;
+        return SATURATED_FACTOR * radiance;
     if (!s->has_unseen || seen)
         return radiance;
     return fmaxf(radiance, (float)sky_cells_radiance(s->log_unseen, direction));
@@ -93,11 +93,11 @@ static float sun_radiance(const struct shining *s, const struct surface_point *p
     return rgb_mean(irradiance_diffuse(&light, place->shading, 1.0f, place->shading));
 }
 
-static float white_at(const struct shining *s, const struct surface_point *place, uint32_t key) {
+static float lambert_at(const struct shining *s, const struct surface_point *place, uint32_t key) {
     struct accel_ray ray[RAYS_PER_POINT];
     struct accel_hit hit[RAYS_PER_POINT];
     double sum = 0.0;
-    trace_ways(s, place, key, ray, hit);
+    trace_rays(s, place, key, ray, hit);
     for (size_t i = 0; i < RAYS_PER_POINT; i++) {
         bool far = hit[i].triangle == ACCEL_NONE;
         sum += (double)(far ? distant_radiance(s, ray[i].direction) : radiance_of(s, hit[i].triangle));
@@ -105,16 +105,16 @@ static float white_at(const struct shining *s, const struct surface_point *place
     return (float)(sum / RAYS_PER_POINT) + sun_radiance(s, place);
 }
 
-float shining_white(const struct shining *s, const uint32_t *triangle, size_t count) {
+float shining_lambert(const struct shining *s, const uint32_t *triangle, size_t count) {
     struct surface_point place[PLACES];
-    float white[PLACES];
+    float lambert[PLACES];
     size_t places = choose_places(&s->r->scene->mesh, triangle, count, PLACES, place);
     for (size_t i = 0; i < places; i++)
-        white[i] = white_at(s, &place[i], sampler_key(KEY_RAYS, triangle[0], (uint32_t)i));
-    return quantile(white, places, BRIGHTER_PLACES);
+        lambert[i] = lambert_at(s, &place[i], sampler_key(KEY_RAYS, triangle[0], (uint32_t)i));
+    return quantile(lambert, places, LAMBERT_QUANTILE);
 }
 
-/* --- light from directions that nobody sees ------------------------------------------------------- */
+/* --- light from unobserved directions ------------------------------------------------------------- */
 
 struct shining_survey {
     const struct shining *shining;
@@ -122,7 +122,7 @@ struct shining_survey {
 };
 
 /* Lambert radiance at a place, by known and unknown light. */
-static void look_around(void *user, size_t index, int thread) {
+static void gather_point(void *user, size_t index, int thread) {
     (void)thread;
     struct shining_survey *survey = user;
     const struct shining *s = survey->shining;
@@ -131,7 +131,7 @@ static void look_around(void *user, size_t index, int thread) {
     struct accel_ray ray[RAYS_PER_POINT];
     struct accel_hit hit[RAYS_PER_POINT];
     *p = (struct unseen_point){.segment = s->r->segments.of_triangle[triangle], .observed = s->light->mean[triangle]};
-    trace_ways(s, &s->room[index], sampler_key(KEY_RAYS, triangle, 0), ray, hit);
+    trace_rays(s, &s->room[index], sampler_key(KEY_RAYS, triangle, 0), ray, hit);
     for (size_t i = 0; i < RAYS_PER_POINT; i++) {
         vec3 direction = ray[i].direction;
         if (hit[i].triangle != ACCEL_NONE || is_seen(s, direction)) {
@@ -167,22 +167,22 @@ static void find_unseen_light(struct shining *s) {
     const struct reconstruction *r = s->r;
     const struct mesh *mesh = &r->scene->mesh;
     struct shining_survey *survey = mem_alloc(sizeof *survey);
-    uint32_t *shown = mem_array(mesh->triangle_count + 1, sizeof *shown);
+    uint32_t *observed = mem_array(mesh->triangle_count + 1, sizeof *observed);
     size_t count = 0;
     survey->shining = s;
     for (size_t t = 0; t < mesh->triangle_count; t++) {
         if (s->light->observed[t] >= 0.0f)
-            shown[count++] = (uint32_t)t;
+            observed[count++] = (uint32_t)t;
     }
-    s->room_count = choose_places(mesh, shown, count, POINTS, s->room);
-    parallel_for(r->pool, s->room_count, look_around, survey);
+    s->room_count = choose_places(mesh, observed, count, POINTS, s->room);
+    parallel_for(r->pool, s->room_count, gather_point, survey);
     s->unseen_share = (float)unseen_share(survey->point, s->room_count);
     size_t kept = unseen_keep_informative(survey->point, s->room_count);
     if (kept >= UNSEEN_LEAST_POINTS) {
         unseen_fit(survey->point, kept, r->segments.count, s->log_unseen);
         s->has_unseen = true;
     }
-    mem_free(shown);
+    mem_free(observed);
     mem_free(survey);
 }
 
@@ -203,8 +203,8 @@ void shining_release(struct shining *s) {
 struct sunlight {
     const struct shining *shining;
     const struct accel *accel;
-    struct surface_point lit[PLACES], beside[PLACES];
-    size_t lit_count, beside_count;
+    struct surface_point part[PLACES], beside[PLACES];
+    size_t part_count, beside_count;
 };
 
 /* Whether light may come from far away in a direction. */
@@ -222,28 +222,28 @@ static float share_open(const struct sunlight *sun, const struct surface_point *
 
 /* Visibility of a direction from the part, less that from beside it. */
 static float contrast(const struct sunlight *sun, vec3 direction) {
-    float lit = share_open(sun, sun->lit, sun->lit_count, direction);
-    return lit > SUN_CONTRAST ? lit - share_open(sun, sun->beside, sun->beside_count, direction) : lit - 1.0f;
+    float share = share_open(sun, sun->part, sun->part_count, direction);
+    return share > SUN_CONTRAST ? share - share_open(sun, sun->beside, sun->beside_count, direction) : share - 1.0f;
 }
 
-/* The places of `unlit` that are beside the part. */
-static size_t choose_beside(struct sunlight *sun, const struct mesh *mesh, const uint32_t *unlit, size_t count) {
+/* The places of `darker` that are beside the part. */
+static size_t choose_beside(struct sunlight *sun, const struct mesh *mesh, const uint32_t *darker, size_t count) {
     vec3 middle = {0, 0, 0}, normal = {0, 0, 0};
     float reach_m = 0.0f;
-    for (size_t i = 0; i < sun->lit_count; i++) {
-        middle = vec3_mad(middle, 1.0f / (float)sun->lit_count, sun->lit[i].position);
-        normal = vec3_add(normal, sun->lit[i].normal);
+    for (size_t i = 0; i < sun->part_count; i++) {
+        middle = vec3_mad(middle, 1.0f / (float)sun->part_count, sun->part[i].position);
+        normal = vec3_add(normal, sun->part[i].normal);
     }
     normal = vec3_normalize(normal);
-    for (size_t i = 0; i < sun->lit_count; i++)
-        reach_m = fmaxf(reach_m, 2.0f * vec3_length(vec3_sub(sun->lit[i].position, middle)));
+    for (size_t i = 0; i < sun->part_count; i++)
+        reach_m = fmaxf(reach_m, 2.0f * vec3_length(vec3_sub(sun->part[i].position, middle)));
     uint32_t *near = mem_array(count + 1, sizeof *near);
     size_t near_count = 0;
     for (size_t i = 0; i < count; i++) {
-        vec3 at = mesh_point(mesh, unlit[i], 1.0f / 3.0f, 1.0f / 3.0f);
+        vec3 at = mesh_point(mesh, darker[i], 1.0f / 3.0f, 1.0f / 3.0f);
         if (vec3_length(vec3_sub(at, middle)) < reach_m &&
-            vec3_dot(vec3_normalize(mesh_cross(mesh, unlit[i])), normal) > BESIDE_COSINE)
-            near[near_count++] = unlit[i];
+            vec3_dot(vec3_normalize(mesh_cross(mesh, darker[i])), normal) > BESIDE_COSINE)
+            near[near_count++] = darker[i];
     }
     size_t chosen = near_count > 0 ? choose_places(mesh, near, near_count, PLACES, sun->beside) : 0;
     mem_free(near);
@@ -285,19 +285,19 @@ static bool is_contradicted(const struct sunlight *sun, vec3 direction) {
            quantile(value[1], count[1], 0.5) < SUN_BRIGHTER * quantile(value[0], count[0], 0.5);
 }
 
-bool shining_is_sunlit(const struct shining *s, const uint32_t *lit, size_t lit_count, const uint32_t *unlit,
-                       size_t unlit_count) {
+bool shining_is_sunlit(const struct shining *s, const uint32_t *part, size_t part_size, const uint32_t *darker,
+                       size_t darker_count) {
     const struct mesh *mesh = &s->r->scene->mesh;
     struct sunlight sun = {.shining = s, .accel = s->r->world.accel};
     struct shining_candidate best[SUN_BEST];
-    sun.lit_count = choose_places(mesh, lit, lit_count, PLACES, sun.lit);
-    sun.beside_count = choose_beside(&sun, mesh, unlit, unlit_count);
+    sun.part_count = choose_places(mesh, part, part_size, PLACES, sun.part);
+    sun.beside_count = choose_beside(&sun, mesh, darker, darker_count);
     if (sun.beside_count == 0)
         return false;
     for (int k = 0; k < SUN_BEST; k++)
-        best[k] = (struct shining_candidate){.direction = sun.lit[0].normal, .contrast = -2.0f};
-    uint32_t key = sampler_key(KEY_SUN, lit[0], 0);
-    vec3 frame[3] = {[2] = sun.lit[0].normal};
+        best[k] = (struct shining_candidate){.direction = sun.part[0].normal, .contrast = -2.0f};
+    uint32_t key = sampler_key(KEY_SUN, part[0], 0);
+    vec3 frame[3] = {[2] = sun.part[0].normal};
     vec3_frame(frame[2], &frame[0], &frame[1]);
     for (uint32_t i = 0; i < SUN_DIRECTIONS; i++) {
         struct shining_candidate c = {.direction = incident_cosine_direction(frame, sampler_pair(key, i, 0))};
@@ -311,7 +311,7 @@ bool shining_is_sunlit(const struct shining *s, const uint32_t *lit, size_t lit_
         }
     }
     for (uint32_t k = 0; k < SUN_BEST; k++) {
-        climb(&sun, &best[k], sampler_key(KEY_SUN, lit[0], k + 1));
+        climb(&sun, &best[k], sampler_key(KEY_SUN, part[0], k + 1));
         if (best[k].contrast >= SUN_CONTRAST && !is_contradicted(&sun, best[k].direction))
             return true;
     }

@@ -1,6 +1,6 @@
 /* shining.h -- tests whether a part of the surface may emit, from photographs alone, before materials are known.
  *
- * Two tests. Is it brighter than a white surface could be there? Incident light is gathered by rays that read the
+ * Two tests. Is its radiance beyond the Lambert radiance at albedo 1? Incident light is gathered by rays that read the
  * observed radiance of the triangles they meet. If so, may it be sunlit through an opening? Then there is a direction
  * that is unoccluded from the part and occluded beside it, and everything else that this direction reaches is brighter
  * than the rest of the room. */
@@ -18,7 +18,7 @@
 struct shining {
     const struct reconstruction *r; /* borrowed, both; needs world and environment */
     const struct triangle_light *light;
-    float *segment_mean; /* [segment_count] what a triangle that nobody sees shows; owned */
+    float *segment_mean; /* [segment_count] of a triangle that no photograph shows; owned */
     size_t room_count;
     struct surface_point *room; /* [room_count] places all over the room; owned */
     float unseen_share;         /* of rays from surfaces: those that go where nothing is known */
@@ -31,10 +31,10 @@ void shining_release(struct shining *s);
 
 /* Upper quartile over count > 0 triangles of Lambert radiance at albedo 1, mean of the channels. Thread-safe, as is the
  * next. */
-float shining_white(const struct shining *s, const uint32_t *triangle, size_t count);
+float shining_lambert(const struct shining *s, const uint32_t *triangle, size_t count);
 
-/* Whether light from one direction may fall on the triangles `lit` and not on those of `unlit` that are near them. */
-bool shining_is_sunlit(const struct shining *s, const uint32_t *lit, size_t lit_count, const uint32_t *unlit,
-                       size_t unlit_count);
+/* Whether light from one direction may fall on the triangles `part` and not on those of `darker` that are near them. */
+bool shining_is_sunlit(const struct shining *s, const uint32_t *part, size_t part_size, const uint32_t *darker,
+                       size_t darker_count);
 
 #endif

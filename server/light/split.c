@@ -1,8 +1,8 @@
 /* split.c -- see split.h.
  *
- * Segment by segment, at rising levels of brightness: the connected sets of triangles that show at least the
- * level are looked at, until the level is more than a white surface there could send out. So a part is as
- * large as it can be, and nothing in it may only reflect. */
+ * Segment by segment, at rising levels of radiance: connected sets of triangles of at least the level's observed radiance
+ * are tested, until the level exceeds the Lambert radiance at albedo 1 there. So a part is as large as it can be, and
+ * all of it is brighter than what it could reflect. */
 #include "server/light/split.h"
 
 #include <math.h>
@@ -17,11 +17,12 @@
 #include "server/scene/adjacency.h"
 #include "server/scene/by_segment.h"
 
-#define FIRST_LEVEL 1.5f /* of the median of the photographs */
-#define LEVEL_STEP 1.25f
-/* A set whose white was that far above its level is looked at again when the level comes near. */
+#define FIRST_LEVEL 1.5f /* over the photographs' median radiance; no part is dimmer */
+#define LEVEL_STEP 1.25f /* from a level to the next; smaller steps find larger parts and take longer */
+/* A set whose Lambert radiance was above its level is tested again from this part of it on, for time. */
 #define NEAR 0.8f
-/* A part and what is left are that large in photographs, at least, and differ by so much. */
+/* Least size of a part and of the rest, in pixels of all photographs; that of the rest over the part's; least ratio of
+ * their median radiances. */
 #define LEAST_PIXELS 100.0f
 #define LEAST_SHARE 0.05f
 #define LEAST_CONTRAST 2.0f
@@ -40,8 +41,8 @@ struct split_job {
     uint32_t *parent; /* [triangle_count] connected sets at the present level, written by segment */
     float *size;      /* [triangle_count] of a root of those: pixels or m^2 */
     uint32_t *part;   /* [triangle_count] number of the part among its segment's, from 1; 0: the rest */
-    bool *settled;    /* [triangle_count] is known to shine */
-    float *needed;    /* [triangle_count] levels below this are known not to be beyond white */
+    bool *settled;    /* [triangle_count] belongs to no further part */
+    float *needed;    /* [triangle_count] no level below this is tested */
     uint32_t *count;  /* [segment_count] parts found */
 };
 
@@ -51,9 +52,9 @@ struct split_level {
     const uint32_t *triangle; /* [triangle_count] of the segment */
     size_t triangle_count;
     uint32_t segment;
-    float bright;
-    uint32_t *lit, *unlit; /* [triangle_count] scratch: a part; what is darker than the level */
-    float *value;          /* [triangle_count] scratch, as below */
+    float radiance;          /* least observed radiance of a part at this level */
+    uint32_t *part, *darker; /* [triangle_count] scratch: a possible part; what is darker than the level */
+    float *value;            /* [triangle_count] scratch, as below */
     struct member *member;
 };
 
@@ -65,11 +66,11 @@ static uint32_t root_of(uint32_t *parent, uint32_t t) {
     return t;
 }
 
-static bool is_lit(const struct split_level *l, uint32_t t) {
-    return !l->job->settled[t] && l->job->light.observed[t] >= l->bright;
+static bool is_bright(const struct split_level *l, uint32_t t) {
+    return !l->job->settled[t] && l->job->light.observed[t] >= l->radiance;
 }
 
-static bool is_rest(const struct split_level *l, uint32_t t) { return l->job->part[t] == 0; }
+static bool is_remainder(const struct split_level *l, uint32_t t) { return l->job->part[t] == 0; }
 
 /* Joins neighbouring triangles of the set. */
 static void connect(const struct split_level *l, bool (*belongs)(const struct split_level *l, uint32_t t)) {
@@ -91,7 +92,7 @@ static void connect(const struct split_level *l, bool (*belongs)(const struct sp
 /* --- a part --------------------------------------------------------------------------------------- */
 
 struct split_measure {
-    float pixels, shown; /* what they fill together; the median of what they show */
+    float pixels, radiance; /* that they fill together; the median of their observed radiances */
 };
 
 static struct split_measure measure(const struct split_level *l, const uint32_t *triangle, size_t count) {
@@ -100,35 +101,35 @@ static struct split_measure measure(const struct split_level *l, const uint32_t 
         m.pixels += l->job->light.pixels[triangle[i]];
         l->value[i] = l->job->light.observed[triangle[i]];
     }
-    m.shown = quantile(l->value, count, 0.5);
+    m.radiance = quantile(l->value, count, 0.5);
     return m;
 }
 
-static size_t collect_unlit(const struct split_level *l) {
+static size_t collect_darker(const struct split_level *l) {
     size_t count = 0;
     for (size_t i = 0; i < l->triangle_count; i++) {
-        float shown = l->job->light.observed[l->triangle[i]];
-        if (!l->job->settled[l->triangle[i]] && shown >= 0.0f && shown < l->bright)
-            l->unlit[count++] = l->triangle[i];
+        float observed = l->job->light.observed[l->triangle[i]];
+        if (!l->job->settled[l->triangle[i]] && observed >= 0.0f && observed < l->radiance)
+            l->darker[count++] = l->triangle[i];
     }
     return count;
 }
 
 /* Adds small enclosed pieces to a part: dark writing on a bright screen. */
-static void fill_holes(const struct split_level *l, size_t lit_count, uint32_t part) {
+static void fill_holes(const struct split_level *l, size_t part_size, uint32_t part) {
     const struct split_job *job = l->job;
     float area = 0.0f;
-    connect(l, is_rest);
+    connect(l, is_remainder);
     for (size_t i = 0; i < l->triangle_count; i++)
         job->size[l->triangle[i]] = 0.0f;
     for (size_t i = 0; i < l->triangle_count; i++)
         job->size[root_of(job->parent, l->triangle[i])] += mesh_triangle_area(&job->r->scene->mesh, l->triangle[i]);
-    for (size_t i = 0; i < lit_count; i++)
-        area += mesh_triangle_area(&job->r->scene->mesh, l->lit[i]);
-    for (size_t i = 0; i < lit_count; i++) {
-        for (uint32_t h = 3 * l->lit[i]; h < 3 * l->lit[i] + 3; h++) {
+    for (size_t i = 0; i < part_size; i++)
+        area += mesh_triangle_area(&job->r->scene->mesh, l->part[i]);
+    for (size_t i = 0; i < part_size; i++) {
+        for (uint32_t h = 3 * l->part[i]; h < 3 * l->part[i] + 3; h++) {
             uint32_t other = job->adjacency.next[h] / 3;
-            if (job->r->segments.of_triangle[other] != l->segment || !is_rest(l, other))
+            if (job->r->segments.of_triangle[other] != l->segment || !is_remainder(l, other))
                 continue;
             uint32_t root = root_of(job->parent, other);
             if (job->size[root] < HOLE * area)
@@ -137,7 +138,7 @@ static void fill_holes(const struct split_level *l, size_t lit_count, uint32_t p
     }
     for (size_t i = 0; i < l->triangle_count; i++) {
         uint32_t t = l->triangle[i];
-        if (!is_rest(l, t) || job->size[root_of(job->parent, t)] >= 0.0f)
+        if (!is_remainder(l, t) || job->size[root_of(job->parent, t)] >= 0.0f)
             continue;
         job->part[t] = part;
         job->settled[t] = true;
@@ -145,42 +146,43 @@ static void fill_holes(const struct split_level *l, size_t lit_count, uint32_t p
 }
 
 /* Keeps those of the part's triangles that show it alone. All of them are settled. */
-static size_t settle(const struct split_level *l, size_t lit_count, float shown) {
+static size_t settle(const struct split_level *l, size_t part_size, float radiance) {
     size_t kept = 0;
-    for (size_t i = 0; i < lit_count; i++) {
-        uint32_t t = l->lit[i];
+    for (size_t i = 0; i < part_size; i++) {
+        uint32_t t = l->part[i];
         l->job->settled[t] = true;
-        if (l->job->light.observed[t] >= PURE * shown)
-            l->lit[kept++] = t;
+        if (l->job->light.observed[t] >= PURE * radiance)
+            l->part[kept++] = t;
     }
     return kept;
 }
 
-static void make_part(const struct split_level *l, size_t lit_count) {
+static void make_part(const struct split_level *l, size_t part_size) {
     uint32_t part = ++l->job->count[l->segment];
-    for (size_t i = 0; i < lit_count; i++)
-        l->job->part[l->lit[i]] = part;
-    fill_holes(l, lit_count, part);
+    for (size_t i = 0; i < part_size; i++)
+        l->job->part[l->part[i]] = part;
+    fill_holes(l, part_size, part);
 }
 
 /* Tests one connected set of triangles of at least the level's radiance. */
-static void try_part(const struct split_level *l, size_t lit_count, const struct split_measure *unlit,
-                     size_t unlit_count) {
+static void try_part(const struct split_level *l, size_t part_size, const struct split_measure *darker,
+                     size_t darker_count) {
     const struct split_job *job = l->job;
-    struct split_measure lit = measure(l, l->lit, lit_count);
-    if (lit.pixels < LEAST_PIXELS || l->bright < job->needed[l->lit[0]])
+    struct split_measure part = measure(l, l->part, part_size);
+    if (part.pixels < LEAST_PIXELS || l->radiance < job->needed[l->part[0]])
         return;
-    float white = shining_white(&job->shining, l->lit, lit_count);
-    float needed = white / (1.0f - EMITTER_SHARE - EMITTER_SHARE_UNSEEN * job->shining.unseen_share);
-    if (l->bright < needed) {
-        for (size_t i = 0; i < lit_count; i++)
-            job->needed[l->lit[i]] = NEAR * needed;
+    float lambert = shining_lambert(&job->shining, l->part, part_size);
+    float needed = lambert / (1.0f - EMITTER_SHARE - EMITTER_SHARE_UNSEEN * job->shining.unseen_share);
+    if (l->radiance < needed) {
+        for (size_t i = 0; i < part_size; i++)
+            job->needed[l->part[i]] = NEAR * needed;
         return;
     }
-    lit_count = settle(l, lit_count, lit.shown);
-    if (unlit->pixels >= fmaxf(LEAST_PIXELS, LEAST_SHARE * lit.pixels) && lit.shown >= LEAST_CONTRAST * unlit->shown &&
-        !shining_is_sunlit(&job->shining, l->lit, lit_count, l->unlit, unlit_count))
-        make_part(l, lit_count);
+    part_size = settle(l, part_size, part.radiance);
+    if (darker->pixels >= fmaxf(LEAST_PIXELS, LEAST_SHARE * part.pixels) &&
+        part.radiance >= LEAST_CONTRAST * darker->radiance &&
+        !shining_is_sunlit(&job->shining, l->part, part_size, l->darker, darker_count))
+        make_part(l, part_size);
 }
 
 struct member {
@@ -195,29 +197,29 @@ static int by_root(const void *a, const void *b) {
 }
 
 static void try_level(const struct split_level *l) {
-    size_t unlit_count = collect_unlit(l), members = 0;
-    struct split_measure unlit = measure(l, l->unlit, unlit_count);
-    connect(l, is_lit);
+    size_t darker_count = collect_darker(l), members = 0;
+    struct split_measure darker = measure(l, l->darker, darker_count);
+    connect(l, is_bright);
     for (size_t i = 0; i < l->triangle_count; i++) {
-        if (is_lit(l, l->triangle[i]))
+        if (is_bright(l, l->triangle[i]))
             l->member[members++] = (struct member){root_of(l->job->parent, l->triangle[i]), l->triangle[i]};
     }
     qsort(l->member, members, sizeof *l->member, by_root);
     for (size_t i = 0, end; i < members; i = end) {
-        size_t lit_count = 0;
+        size_t part_size = 0;
         for (end = i; end < members && l->member[end].root == l->member[i].root; end++)
-            l->lit[lit_count++] = l->member[end].triangle;
-        try_part(l, lit_count, &unlit, unlit_count);
+            l->part[part_size++] = l->member[end].triangle;
+        try_part(l, part_size, &darker, darker_count);
     }
 }
 
 /* --- all segments --------------------------------------------------------------------------------- */
 
 static float brightest(const struct split_job *job, const uint32_t *triangle, size_t count) {
-    float bright = 0.0f;
+    float radiance = 0.0f;
     for (size_t i = 0; i < count; i++)
-        bright = fmaxf(bright, job->light.observed[triangle[i]]);
-    return bright;
+        radiance = fmaxf(radiance, job->light.observed[triangle[i]]);
+    return radiance;
 }
 
 static void try_segment(void *user, size_t segment, int thread) {
@@ -229,20 +231,20 @@ static void try_segment(void *user, size_t segment, int thread) {
                             .triangle = job->triangles.triangle + first[segment],
                             .triangle_count = count,
                             .segment = (uint32_t)segment,
-                            .bright = job->first_level};
+                            .radiance = job->first_level};
     float most = brightest(job, l.triangle, count);
-    if (!(most >= l.bright))
+    if (!(most >= l.radiance))
         return;
-    l.lit = mem_array(count, sizeof *l.lit);
-    l.unlit = mem_array(count, sizeof *l.unlit);
+    l.part = mem_array(count, sizeof *l.part);
+    l.darker = mem_array(count, sizeof *l.darker);
     l.value = mem_array(count, sizeof *l.value);
     l.member = mem_array(count, sizeof *l.member);
-    for (; l.bright <= most; l.bright *= LEVEL_STEP)
+    for (; l.radiance <= most; l.radiance *= LEVEL_STEP)
         try_level(&l);
     mem_free(l.member);
     mem_free(l.value);
-    mem_free(l.unlit);
-    mem_free(l.lit);
+    mem_free(l.darker);
+    mem_free(l.part);
 }
 
 /* Numbers the parts after the segments, in the order of these. */
