@@ -15,14 +15,10 @@
 /* The share of the points whose base colour is at most that of white paint. In scans it is not near 1: in creases of a
  * fused mesh too little light is found. */
 #define BELOW_WHITE 0.9
-/* Deviations at which a point has a quarter of its robust_weight: emitters are no surfaces lit. Beyond white it
- * comes later, or a room that is much too dark would be taken for one of lamps. */
+/* Deviations from its segment at which a point has a quarter of its influence. */
 #define OUTLIER 2.0
-#define OUTLIER_BEYOND 5.0
-/* Weights, as shares of the points at one deviation, of cells that differ from their neighbours by a factor of
- * e, and from where they began. */
+/* Weight, as a share of the points at one deviation, of a difference of neighbouring cells by a factor of e. */
 #define SMOOTHNESS 0.01
-#define INERTIA 0.001
 #define STEPS 40
 #define LONGEST_STEP 0.5 /* of a logarithm */
 #define FAINTEST 1e-12   /* in place of no light */
@@ -31,7 +27,6 @@ struct fit {
     const struct unseen_point *point; /* [count] */
     size_t count, segment_count;
     double *cell; /* [CELLS] the logarithm of the map */
-    double start[CELLS];
 };
 
 void unseen_add_ray(struct unseen_point *p, vec3 direction, float share, float filled) {
@@ -91,48 +86,45 @@ static void scale_to_white(struct fit *f) {
 }
 
 /* Geman and McClure's weight of a residual in deviations. */
-static double robust_weight(double deviations, double outlier) {
-    double e = deviations / outlier, w = 1.0 / (1.0 + e * e);
+static double robust_weight(double deviations) {
+    double e = deviations / OUTLIER, w = 1.0 / (1.0 + e * e);
     return w * w;
 }
 
-/* The weighted mean of the logarithm of base colour in each segment. */
+/* The mean of the logarithm of base colour in each segment. */
 static void means_of_segments(const struct fit *f, const double *log_base, double *mean) {
-    size_t segments = f->segment_count;
-    double *weight = mem_calloc(segments, sizeof *weight);
+    size_t segments = f->segment_count, *count = mem_calloc(segments, sizeof *count);
     memset(mean, 0, segments * sizeof *mean);
     for (size_t i = 0; i < f->count; i++) {
-        double w = robust_weight(fmax(log_base[i] - log(ALBEDO_WHITE), 0.0) / ALBEDO_PATCH, OUTLIER_BEYOND);
-        mean[f->point[i].segment] += w * log_base[i];
-        weight[f->point[i].segment] += w;
+        mean[f->point[i].segment] += log_base[i];
+        count[f->point[i].segment]++;
     }
     for (size_t s = 0; s < segments; s++)
-        mean[s] /= fmax(weight[s], 1e-12);
-    mem_free(weight);
+        mean[s] /= fmax((double)count[s], 1.0);
+    mem_free(count);
 }
 
 struct normal {
     double matrix[CELLS][CELLS], residual[CELLS];
 };
 
-/* Pulls the difference of two unknowns, or of one and a constant, to zero. */
-static void pull(struct normal *n, size_t a, size_t b, double difference, double weight) {
+/* Smooths: pulls the difference of two cells to zero. */
+static void pull(struct normal *n, const double cell[CELLS], size_t a, size_t b, double weight) {
+    double difference = cell[a] - cell[b];
     n->matrix[a][a] += weight;
-    n->residual[a] -= weight * difference;
-    if (a == b)
-        return;
     n->matrix[b][b] += weight;
     n->matrix[a][b] -= weight;
     n->matrix[b][a] -= weight;
+    n->residual[a] -= weight * difference;
     n->residual[b] += weight * difference;
 }
 
 static void add_point(struct normal *n, const struct unseen_point *p, const double cell[CELLS], double log_base,
                       double mean) {
+    const double beyond_weight = 1.0 / (ALBEDO_PATCH * ALBEDO_PATCH);
     double within = log_base - mean, beyond = fmax(log_base - log(ALBEDO_WHITE), 0.0);
-    double within_weight = robust_weight(within / ALBEDO_WITHIN, OUTLIER) / (ALBEDO_WITHIN * ALBEDO_WITHIN);
-    double beyond_weight = robust_weight(beyond / ALBEDO_PATCH, OUTLIER_BEYOND) / (ALBEDO_PATCH * ALBEDO_PATCH);
-    double pull = within_weight * within + beyond_weight * beyond;
+    double within_weight = robust_weight(within / ALBEDO_WITHIN) / (ALBEDO_WITHIN * ALBEDO_WITHIN);
+    double force = within_weight * within + beyond_weight * beyond;
     double weight = within_weight + (beyond > 0.0 ? beyond_weight : 0.0);
     double slope[CELLS], all = arrived(p, cell);
     for (size_t k = 0; k < CELLS; k++)
@@ -140,7 +132,7 @@ static void add_point(struct normal *n, const struct unseen_point *p, const doub
     for (size_t k = 0; k < CELLS; k++) {
         if (slope[k] == 0.0)
             continue;
-        n->residual[k] += slope[k] * pull;
+        n->residual[k] += slope[k] * force;
         for (size_t m = 0; m < CELLS; m++)
             n->matrix[k][m] += weight * slope[k] * slope[m];
     }
@@ -148,7 +140,7 @@ static void add_point(struct normal *n, const struct unseen_point *p, const doub
 
 static void step(struct fit *f, struct normal *n, double *log_base, double *mean) {
     double *cell = f->cell;
-    double inertia = INERTIA * (double)f->count, smoothness = SMOOTHNESS * (double)f->count;
+    const double smoothness = SMOOTHNESS * (double)f->count;
     memset(n, 0, sizeof *n);
     for (size_t i = 0; i < f->count; i++)
         log_base[i] = log(fmax((double)f->point[i].observed, FAINTEST) / arrived(&f->point[i], cell));
@@ -157,10 +149,9 @@ static void step(struct fit *f, struct normal *n, double *log_base, double *mean
         add_point(n, &f->point[i], cell, log_base[i], mean[f->point[i].segment]);
     for (size_t k = 0; k < CELLS; k++) {
         size_t right = sky_cells_right(k), below = sky_cells_below(k);
-        pull(n, k, k, cell[k] - f->start[k], inertia);
-        pull(n, k, right, cell[k] - cell[right], smoothness);
+        pull(n, cell, k, right, smoothness);
         if (below < CELLS)
-            pull(n, k, below, cell[k] - cell[below], smoothness);
+            pull(n, cell, k, below, smoothness);
     }
     if (!cholesky_factor(CELLS, CELLS, &n->matrix[0][0]))
         return;
@@ -176,7 +167,6 @@ void unseen_fit(const struct unseen_point *point, size_t count, size_t segment_c
     struct normal *n = mem_array(1, sizeof *n);
     memset(log_radiance, 0, CELLS * sizeof *log_radiance);
     scale_to_white(&f);
-    memcpy(f.start, f.cell, sizeof f.start);
     for (int i = 0; i < STEPS; i++)
         step(&f, n, log_base, mean);
     scale_to_white(&f);

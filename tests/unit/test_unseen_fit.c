@@ -90,8 +90,8 @@ int main(void) {
         point[i].observed *= 20.0f; /* they emit */
     double with = fit_error(point, white);
     printf("light off by %.3f, with emitters by %.3f\n", plain, with);
-    CHECK_THAT(plain < 0.12, "light off by %g", plain);
-    CHECK_THAT(with < 0.2, "with emitters light off by %g", with);
+    CHECK_THAT(plain < 0.1, "light off by %g", plain);
+    CHECK_THAT(with < 0.15, "with emitters light off by %g", with);
     for (size_t i = 0; i < POINTS; i++)
         point[i].filled = white[i] - KNOWN;
     CHECK_NEAR(unseen_base_color(point, POINTS, 0.8, NULL), 0.75, 0.1);
