@@ -9,7 +9,7 @@
 
 /* Reflections of a particle: after eight of white paint a quarter is left, and most have left a gap by then. */
 #define REFLECTIONS 8
-#define PARTICLES (BOUNCED_MOST / REFLECTIONS)
+#define PARTICLES (BOUNCED_MAX / REFLECTIONS)
 #define KEY_PARTICLES 53 /* keeps these random numbers apart from others of the segment */
 
 struct particle {
@@ -23,7 +23,7 @@ struct tracing {
     const float *albedo;
     float power; /* of the segment at radiance 1: pi times its area */
     size_t disc_count;
-    struct segment_light_disc *disc; /* [BOUNCED_MOST] */
+    struct segment_light_disc *disc; /* [BOUNCED_MAX] */
 };
 
 static struct accel_ray cosine_ray(const struct surface_point *at, uint32_t key, uint32_t index, uint32_t pair) {
@@ -81,7 +81,7 @@ static void trace(struct tracing *t, const struct segment_light_disc *from, size
 }
 
 size_t bounced_light_find(const struct segment_light *light, uint32_t segment, const float *albedo,
-                          struct segment_light_disc disc[BOUNCED_MOST]) {
+                          struct segment_light_disc disc[BOUNCED_MAX]) {
     struct tracing t = {light->r, albedo, BSDF_PI * light->area_m2[segment], 0, disc};
     struct segment_light_disc from[PARTICLES];
     trace(&t, from, segment_light_spread(light, segment, PARTICLES, from), sampler_key(KEY_PARTICLES, segment, 0));

@@ -9,9 +9,9 @@
 #include "server/light/segment_light.h"
 
 /* Discs that stand for all reflections, by unseen surfaces, of a radiance of 1 from the front of a segment;
- * BOUNCED_MOST at most, their number is the result. albedo[segment_count]: of unseen surfaces, lamps among them. */
-#define BOUNCED_MOST 1024
+ * BOUNCED_MAX at most, their number is the result. albedo[segment_count]: of unseen surfaces, lamps among them. */
+#define BOUNCED_MAX 1024
 size_t bounced_light_find(const struct segment_light *light, uint32_t segment, const float *albedo,
-                          struct segment_light_disc disc[BOUNCED_MOST]);
+                          struct segment_light_disc disc[BOUNCED_MAX]);
 
 #endif

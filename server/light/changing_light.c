@@ -12,13 +12,13 @@
 
 #define PLACES 96 /* texels of a segment that are tested; a quarter of them at least with enough observations */
 /* Least standard deviation of the logarithm of a texel's observations: with less it is not tested, for time. */
-#define SPREAD_LEAST 0.8f
-#define SHARE_LEAST 0.1f /* of the places; where fewer spread so far none is tested */
+#define MIN_SPREAD 0.8f
+#define MIN_SHARE 0.1f /* of the places; where fewer spread so far none is tested */
 /* Radiance over the Lambert radiance at albedo 1: of a dark observation less, of a bright one more. */
 #define DARK 0.25f
 #define BRIGHT 0.6f
 /* A photograph observes darkness if its range includes BRIGHT and its noise is below this part of DARK. */
-#define NOISE_MOST 0.25f
+#define MAX_NOISE 0.25f
 /* All pixels on a circle about a place must be dark or bright as well: poses are off by pixels, and edges of paint are
  * not to be taken for changes. Within a picture some are darker. */
 #define RING_PIXELS 6.0f
@@ -47,7 +47,7 @@ static enum observed_kind kind_of(const struct divide *d, const struct view *vie
         return OBSERVED_BRIGHT;
     float noise = rgb_mean(noise_deviation(d->noise, d->views, view, rgb_gray(DARK * lambert)));
     bool is_dark = *observed < DARK * lambert && ring.brightest < DARK * lambert &&
-                   rgb_mean(s.clip_radiance) > BRIGHT * lambert && noise < NOISE_MOST * DARK * lambert;
+                   rgb_mean(s.clip_radiance) > BRIGHT * lambert && noise < MAX_NOISE * DARK * lambert;
     return is_dark ? OBSERVED_DARK : OBSERVED_NEITHER;
 }
 
@@ -111,12 +111,12 @@ float changing_light(const struct divide *d, const uint32_t *texel, size_t count
         uint32_t at = texel[spaced(i, count, PLACES)];
         if (fused->count[at] < (float)BOTH_KINDS)
             continue;
-        spread += fused->spread[at] > SPREAD_LEAST;
+        spread += fused->spread[at] > MIN_SPREAD;
         place[places++] = at;
     }
-    if (places < PLACES / 4 || (float)spread < SHARE_LEAST * (float)places)
+    if (places < PLACES / 4 || (float)spread < MIN_SHARE * (float)places)
         return 0.0f;
     for (size_t i = 0; i < places; i++)
-        changes += fused->spread[place[i]] > SPREAD_LEAST && changed(d, place[i], thread);
+        changes += fused->spread[place[i]] > MIN_SPREAD && changed(d, place[i], thread);
     return (float)changes / (float)places;
 }

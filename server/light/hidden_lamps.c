@@ -168,7 +168,7 @@ void hidden_lamps_find(struct light_model *m) {
     struct lamp_search s = {.m = m};
     size_t before = m->lamps.count;
     find_candidates(&s);
-    while (s.count > 0 && m->lamps.count - before < LIGHT_MOST && add_best(&s))
+    while (s.count > 0 && m->lamps.count - before < LIGHT_MAX && add_best(&s))
         continue;
     while (m->lamps.count > before && remove_one(&s))
         continue;

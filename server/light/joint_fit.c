@@ -9,11 +9,11 @@
 #include "common/mem.h"
 #include "server/light/joint_model.h"
 
-#define CHUNKS 16         /* parts of the blocks that are summed apart, so that sums do not depend on threads */
-#define LONGEST_STEP 1.0  /* of a theta */
-#define HALVINGS 6        /* of a step that does not lower the loss */
-#define CONVERGED 1e-3    /* nats by which a step lowers the loss at the end */
-#define SHARE_LEAST 1e-5f /* parts of a point's light below it do not count */
+#define CHUNKS 16        /* parts of the blocks that are summed apart, so that sums do not depend on threads */
+#define LONGEST_STEP 1.0 /* of a theta */
+#define HALVINGS 6       /* of a step that does not lower the loss */
+#define CONVERGED 1e-3   /* nats by which a step lowers the loss at the end */
+#define MIN_SHARE 1e-5f  /* parts of a point's light below it do not count */
 
 static double square(double x) { return x * x; }
 
@@ -35,11 +35,11 @@ static void find_blocks(struct joint_fit *f) {
     f->patch[f->patch_count] = f->point_count;
 }
 
-void joint_fit_init(struct joint_fit *f, const struct joint_point *point, size_t point_count, size_t source_most,
+void joint_fit_init(struct joint_fit *f, const struct joint_point *point, size_t point_count, size_t source_max,
                     struct parallel *pool) {
-    *f = (struct joint_fit){.pool = pool, .point = point, .point_count = point_count, .source_most = source_most};
-    f->response = mem_calloc_large(point_count * source_most + 1, sizeof *f->response);
-    f->source = mem_array(source_most + 1, sizeof *f->source);
+    *f = (struct joint_fit){.pool = pool, .point = point, .point_count = point_count, .source_max = source_max};
+    f->response = mem_calloc_large(point_count * source_max + 1, sizeof *f->response);
+    f->source = mem_array(source_max + 1, sizeof *f->source);
     f->source[f->source_count++] = (struct joint_source){
         .mean = log(ALBEDO_WHITE), .deviation = ALBEDO_WHITE_DEVIATION, .least = -INFINITY, .value = log(ALBEDO_WHITE)};
     find_blocks(f);
@@ -54,9 +54,9 @@ void joint_fit_release(struct joint_fit *f) {
 }
 
 void joint_fit_add(struct joint_fit *f, const struct joint_source *source, const float *column) {
-    assert(f->source_count < f->source_most);
+    assert(f->source_count < f->source_max);
     for (size_t i = 0; i < f->point_count; i++)
-        f->response[i * f->source_most + f->source_count] = column[i];
+        f->response[i * f->source_max + f->source_count] = column[i];
     f->source[f->source_count++] = *source;
 }
 
@@ -65,7 +65,7 @@ void joint_fit_remove(struct joint_fit *f, size_t index) {
     size_t last = --f->source_count;
     f->source[index] = f->source[last];
     for (size_t i = 0; i < f->point_count; i++) {
-        float *row = f->response + i * f->source_most;
+        float *row = f->response + i * f->source_max;
         row[index] = row[last];
         row[last] = 0.0f;
     }
@@ -93,12 +93,12 @@ struct shares {
 };
 
 static void find_shares(const struct joint_fit *f, size_t point, const double *x, struct shares *s) {
-    const float *row = f->response + point * f->source_most;
+    const float *row = f->response + point * f->source_max;
     double light = joint_fit_light(f, point, x);
     s->count = 0;
     for (size_t j = 0; j < f->source_count; j++) {
         double share = (double)row[j] * x[j] / light;
-        if (share > (double)SHARE_LEAST) {
+        if (share > (double)MIN_SHARE) {
             s->source[s->count] = (uint32_t)j;
             s->share[s->count++] = share;
         }

@@ -22,8 +22,8 @@
 
 #include "server/light/joint_model.h"
 
-/* Borrows the points; no sources yet but white paint. There may be `source_most`. */
-void joint_fit_init(struct joint_fit *f, const struct joint_point *point, size_t point_count, size_t source_most,
+/* Borrows the points; no sources yet but white paint. There may be `source_max`. */
+void joint_fit_init(struct joint_fit *f, const struct joint_point *point, size_t point_count, size_t source_max,
                     struct parallel *pool);
 void joint_fit_release(struct joint_fit *f);
 

@@ -45,7 +45,7 @@ double *joint_fit_radiances(const struct joint_fit *f) {
 }
 
 double joint_fit_light(const struct joint_fit *f, size_t point, const double *x) {
-    const float *row = f->response + point * f->source_most;
+    const float *row = f->response + point * f->source_max;
     double light = (double)f->point[point].known;
     for (size_t j = 0; j < f->source_count; j++)
         light += (double)row[j] * x[j];

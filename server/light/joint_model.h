@@ -37,10 +37,10 @@ struct joint_block {
 
 struct joint_fit {
     struct parallel *pool; /* borrowed */
-    size_t point_count, source_count, source_most;
+    size_t point_count, source_count, source_max;
     const struct joint_point *point; /* [point_count]; borrowed */
-    float *response;                 /* [point_count][source_most] R; owned, as all below */
-    struct joint_source *source;     /* [source_most] the first one is no light, but the logarithm of white paint */
+    float *response;                 /* [point_count][source_max] R; owned, as all below */
+    struct joint_source *source;     /* [source_max] the first one is no light, but the logarithm of white paint */
     size_t tie_count;
     const struct joint_tie *tie; /* borrowed */
     size_t block_count, patch_count;

@@ -43,7 +43,7 @@ static bool is_near(float a, float b, float share) { return fabsf(a - b) <= shar
 /* Whether a segment has the size, the observed radiance and the saturated channels of a lamp. */
 static bool is_alike(const struct light_lamps *l, const struct light_lamp *lamp, uint32_t segment) {
     const struct emitter_evidence *e = &l->r->evidence[segment];
-    if (lamp->kind != ESTIMATED_SATURATED || lamp->segment_count == LIGHT_MOST ||
+    if (lamp->kind != ESTIMATED_SATURATED || lamp->segment_count == LIGHT_MAX ||
         !is_near(l->light.area_m2[lamp->segment[0]], l->light.area_m2[segment], ALIKE_AREA))
         return false;
     for (int c = 0; c < 3; c++) {
@@ -87,7 +87,7 @@ const struct light_lamp *light_lamps_half(const struct light_lamps *l, size_t ha
 }
 
 struct light_lamp *light_lamps_add_hidden(struct light_lamps *l, uint32_t segment) {
-    assert(l->count < LIGHT_LAMPS_MOST);
+    assert(l->count < LIGHT_LAMPS_MAX);
     struct light_lamp *lamp = &l->lamp[l->count++];
     l->is_lamp[segment] = true;
     *lamp = (struct light_lamp){.kind = ESTIMATED_HIDDEN, .segment_count = 1, .segment = {segment}};
@@ -138,7 +138,7 @@ static size_t sort_bright(const struct light_lamps *l, bool saturated, struct br
 static void choose_saturated(struct light_lamps *l) {
     struct bright *found;
     size_t count = sort_bright(l, true, &found);
-    for (size_t i = 0; i < count && l->count <= LIGHT_MOST + l->r->opening_count; i++)
+    for (size_t i = 0; i < count && l->count <= LIGHT_MAX + l->r->opening_count; i++)
         add_saturated(l, found[i].segment);
     mem_free(found);
 }
@@ -147,7 +147,7 @@ static void choose_saturated(struct light_lamps *l) {
 static void choose_seen(struct light_lamps *l) {
     struct bright *found;
     size_t count = sort_bright(l, false, &found);
-    for (size_t i = 0; i < count && i < LIGHT_SEEN_MOST && l->count < LIGHT_LAMPS_MOST - LIGHT_MOST; i++) {
+    for (size_t i = 0; i < count && i < LIGHT_SEEN_MAX && l->count < LIGHT_LAMPS_MAX - LIGHT_MAX; i++) {
         const struct emitter_evidence *e = &l->r->evidence[found[i].segment];
         l->is_lamp[found[i].segment] = true;
         l->lamp[l->count++] = (struct light_lamp){ESTIMATED_SEEN,          1,
@@ -172,7 +172,7 @@ static void choose_openings(struct light_lamps *l) {
 
 static void choose_again(struct light_lamps *l) {
     const struct reconstruction *r = l->r;
-    for (size_t i = 0; i < r->segments.count - r->opening_count && l->count < LIGHT_LAMPS_MOST; i++) {
+    for (size_t i = 0; i < r->segments.count - r->opening_count && l->count < LIGHT_LAMPS_MAX; i++) {
         if (r->evidence[i].is_unbounded)
             add_saturated(l, (uint32_t)i);
         else if (r->evidence[i].is_hidden)

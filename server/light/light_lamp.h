@@ -7,11 +7,11 @@
 #include "server/light/segment_light.h"
 #include "server/state/estimated_light.h"
 
-#define LIGHT_MOST 16      /* saturated lamps; hidden ones; segments that are one lamp */
-#define LIGHT_SEEN_MOST 24 /* lamps that are seen */
-#define LIGHT_OPENINGS_MOST 14
-#define LIGHT_LAMPS_MOST (2 * LIGHT_MOST + LIGHT_SEEN_MOST + LIGHT_OPENINGS_MOST + ENVIRONMENT_HALVES)
-_Static_assert(LIGHT_MOST *LIGHT_MOST + LIGHT_MOST + LIGHT_OPENINGS_MOST + ENVIRONMENT_HALVES <= ESTIMATED_MAX,
+#define LIGHT_MAX 16      /* saturated lamps; hidden ones; segments that are one lamp */
+#define LIGHT_SEEN_MAX 24 /* lamps that are seen */
+#define LIGHT_OPENINGS_MAX 14
+#define LIGHT_LAMPS_MAX (2 * LIGHT_MAX + LIGHT_SEEN_MAX + LIGHT_OPENINGS_MAX + ENVIRONMENT_HALVES)
+_Static_assert(LIGHT_MAX *LIGHT_MAX + LIGHT_MAX + LIGHT_OPENINGS_MAX + ENVIRONMENT_HALVES <= ESTIMATED_MAX,
                "all lamps and the sky are reported");
 
 /* Standard deviation of the logarithm of a radiance of which photographs tell no more than where to begin: a lower
@@ -23,7 +23,7 @@ _Static_assert(LIGHT_MOST *LIGHT_MOST + LIGHT_MOST + LIGHT_OPENINGS_MOST + ENVIR
 struct light_lamp {
     enum estimated_kind kind;
     size_t segment_count;
-    uint32_t segment[LIGHT_MOST];
+    uint32_t segment[LIGHT_MAX];
     rgb least;           /* observed radiance, a lower bound; 0 for hidden lamps and openings */
     bool is_measured[3]; /* by channel: not saturated, so that `least` is the radiance */
     rgb radiance;        /* the estimate */
@@ -38,7 +38,7 @@ struct light_lamps {
     struct segment_light light;
     bool *is_lamp; /* [segment_count] segments of lamps, which known light goes without; owned */
     size_t count;
-    struct light_lamp lamp[LIGHT_LAMPS_MOST];
+    struct light_lamp lamp[LIGHT_LAMPS_MAX];
 };
 
 void light_lamps_init(struct light_lamps *l, const struct reconstruction *r, float median_radiance);

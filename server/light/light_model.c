@@ -147,7 +147,7 @@ static void allow_for_highlights(struct light_model *m) {
 
 /* Discs of what unseen surfaces reflect of a hidden lamp; the first result is the caller's. */
 static struct segment_light_disc *find_bounced(const struct light_model *m, uint32_t segment, size_t *count) {
-    struct segment_light_disc *disc = mem_array(BOUNCED_MOST, sizeof *disc);
+    struct segment_light_disc *disc = mem_array(BOUNCED_MAX, sizeof *disc);
     *count = bounced_light_find(&m->lamps.light, segment, m->albedo, disc);
     return disc;
 }
@@ -190,7 +190,7 @@ static void take_bounced_off(struct light_model *m, const struct light_lamp *lam
             for (size_t c = 0; c < 3 && unobserved; c++)
                 unobserved[c] = fmaxf(unobserved[c] - bounced[i] * (&lamp->radiance.r)[c], 0.0f);
             if (unobserved)
-                m->fit.response[i * m->fit.source_most + m->first_region + k] = region_mean(&m->points.point[i], k);
+                m->fit.response[i * m->fit.source_max + m->first_region + k] = region_mean(&m->points.point[i], k);
         }
     }
     mem_free(bounced);
@@ -231,7 +231,7 @@ static void make_fit(struct light_model *m) {
             (struct joint_point){p->segment, p->patch, rgb_mean(p->observed), rgb_mean(p->known), p->deviation};
         any_escapes = any_escapes || p->escaping > 0.0f;
     }
-    joint_fit_init(&m->fit, m->joint, m->points.count, 1 + LIGHT_LAMPS_MOST + LIGHT_CELLS + LIGHT_REGIONS, m->r->pool);
+    joint_fit_init(&m->fit, m->joint, m->points.count, 1 + LIGHT_LAMPS_MAX + LIGHT_CELLS + LIGHT_REGIONS, m->r->pool);
     add_lamps(m, false);
     m->fit.tie = m->tie;
     tie_ground(m);

@@ -10,7 +10,7 @@
 
 /* Standard deviations by which an opening is brighter than the mean of its prior. */
 #define SURE 2.0
-#define MOST_NAMED (1 << 20) /* ids from there on get no name: there is an array of them */
+#define MAX_NAMED (1 << 20) /* ids from there on get no name: there is an array of them */
 
 struct opening_candidate {
     size_t cell;
@@ -36,7 +36,7 @@ static size_t choose(struct light_model *m, struct opening_candidate chosen[SURR
             chosen[count++] = (struct opening_candidate){k, exp(source->value), error};
     }
     qsort(chosen, count, sizeof *chosen, by_error);
-    return count < LIGHT_OPENINGS_MOST ? count : LIGHT_OPENINGS_MOST;
+    return count < LIGHT_OPENINGS_MAX ? count : LIGHT_OPENINGS_MAX;
 }
 
 /* --- surface ----------------------------------------------------------------------------------------------- */
@@ -82,7 +82,7 @@ static void add_cell(struct mesh *mesh, struct segments *segments, const vec3 co
 static void name_opening(struct mesh *mesh, struct segments *segments, int64_t id) {
     char ***name = segments->is_given ? &mesh->name : &segments->name;
     size_t *count = segments->is_given ? &mesh->name_count : &segments->name_count;
-    if (id >= MOST_NAMED)
+    if (id >= MAX_NAMED)
         return;
     if ((size_t)id >= *count)
         *name = mem_realloc_array(*name, (size_t)id + 1, sizeof **name);

@@ -31,7 +31,7 @@
 #define SUN_BRIGHTER 2.0f
 /* Beside a part: within its own size of it, and about as inclined. */
 #define BESIDE_COSINE 0.8f
-#define LEAST_BESIDE 6
+#define MIN_BESIDE 6
 
 /* --- places --------------------------------------------------------------------------------------- */
 
@@ -178,7 +178,7 @@ static void find_unseen_light(struct shining *s) {
     parallel_for(r->pool, s->room_count, gather_point, survey);
     s->unseen_share = (float)unseen_share(survey->point, s->room_count);
     size_t kept = unseen_keep_informative(survey->point, s->room_count);
-    if (kept >= UNSEEN_LEAST_POINTS) {
+    if (kept >= UNSEEN_MIN_POINTS) {
         unseen_fit(survey->point, kept, r->segments.count, s->log_unseen);
         s->has_unseen = true;
     }
@@ -247,7 +247,7 @@ static size_t choose_beside(struct sunlight *sun, const struct mesh *mesh, const
     }
     size_t chosen = near_count > 0 ? choose_places(mesh, near, near_count, PLACES, sun->beside) : 0;
     mem_free(near);
-    return near_count < LEAST_BESIDE ? 0 : chosen;
+    return near_count < MIN_BESIDE ? 0 : chosen;
 }
 
 struct shining_candidate {
@@ -281,7 +281,7 @@ static bool is_contradicted(const struct sunlight *sun, vec3 direction) {
         int open = is_open(sun->accel, &s->room[i], direction) ? 1 : 0;
         value[open][count[open]++] = s->light->mean[s->room[i].triangle];
     }
-    return count[1] >= LEAST_BESIDE &&
+    return count[1] >= MIN_BESIDE &&
            quantile(value[1], count[1], 0.5) < SUN_BRIGHTER * quantile(value[0], count[0], 0.5);
 }
 

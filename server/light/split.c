@@ -23,9 +23,9 @@
 #define NEAR 0.8f
 /* Least size of a part and of the rest, in pixels of all photographs; that of the rest over the part's; least ratio of
  * their median radiances. */
-#define LEAST_PIXELS 100.0f
-#define LEAST_SHARE 0.05f
-#define LEAST_CONTRAST 2.0f
+#define MIN_PIXELS 100.0f
+#define MIN_SHARE 0.05f
+#define MIN_CONTRAST 2.0f
 /* Triangles below this part of their part's radiance are mixed with their neighbours. */
 #define PURE 0.3f
 /* A piece that a part cuts off from its segment is added to the part if it is smaller than this part of it. */
@@ -169,7 +169,7 @@ static void try_part(const struct split_level *l, size_t part_size, const struct
                      size_t darker_count) {
     const struct split_job *job = l->job;
     struct split_measure part = measure(l, l->part, part_size);
-    if (part.pixels < LEAST_PIXELS || l->radiance < job->needed[l->part[0]])
+    if (part.pixels < MIN_PIXELS || l->radiance < job->needed[l->part[0]])
         return;
     float lambert = shining_lambert(&job->shining, l->part, part_size);
     float needed = lambert / (1.0f - EMITTER_SHARE - EMITTER_SHARE_UNSEEN * job->shining.unseen_share);
@@ -179,8 +179,8 @@ static void try_part(const struct split_level *l, size_t part_size, const struct
         return;
     }
     part_size = settle(l, part_size, part.radiance);
-    if (darker->pixels >= fmaxf(LEAST_PIXELS, LEAST_SHARE * part.pixels) &&
-        part.radiance >= LEAST_CONTRAST * darker->radiance &&
+    if (darker->pixels >= fmaxf(MIN_PIXELS, MIN_SHARE * part.pixels) &&
+        part.radiance >= MIN_CONTRAST * darker->radiance &&
         !shining_is_sunlit(&job->shining, l->part, part_size, l->darker, darker_count))
         make_part(l, part_size);
 }

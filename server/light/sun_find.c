@@ -12,7 +12,7 @@
 #include "server/scene/latlong.h"
 
 /* Least number of bright places, in the room and of those that the sun reaches. */
-#define LEAST_BRIGHT 12
+#define MIN_BRIGHT 12
 /* Directions are screened so far apart, in degrees, by up to so many bright places and as many others; the likeliest
  * ones are fitted. */
 #define SCREEN_DEGREES 3.0
@@ -217,7 +217,7 @@ static void look_for_sun(struct sun_search *s, double *explains) {
     try_direction(s, best.direction);
     *explains = best.score / fmax(count_reached(s, -INFINITY), 1.0);
     rgb strength = missing_light_color(&s->missing);
-    s->sun.is_there = is_disc && count_reached(s, PLACE_BRIGHT) >= LEAST_BRIGHT && *explains > EXPLAINS &&
+    s->sun.is_there = is_disc && count_reached(s, PLACE_BRIGHT) >= MIN_BRIGHT && *explains > EXPLAINS &&
                       rgb_mean(strength) < BRIGHTEST * s->median_radiance;
     s->sun.irradiance = rgb_scale(strength, BSDF_PI);
 }
@@ -259,7 +259,7 @@ void sun_find(struct reconstruction *r, const struct views *views) {
     survey_release(&survey);
     light_places_leave_out_lamps(&s.places);
     missing_light_init(&s.missing, &s.places, r->pool);
-    if (light_places_above(&s.places, PLACE_BRIGHT) >= LEAST_BRIGHT)
+    if (light_places_above(&s.places, PLACE_BRIGHT) >= MIN_BRIGHT)
         look_for_sun(&s, &explains);
     r->sun = s.sun;
     report(&s, explains);

@@ -11,7 +11,7 @@
 #include "server/scene/surface.h"
 
 /* Greatest factor by which a channel is changed; a greater one means another error. */
-#define CHANGE_MOST 2.0f
+#define MAX_CHANGE 2.0f
 
 static bool is_usable(const struct divide *d, uint32_t texel) {
     return d->fused->count[texel] > 0.0f && !d->fused->is_bound[texel] &&
@@ -87,7 +87,7 @@ void sun_refit(struct divide *d, struct sun *sun) {
     rgb fitted = rgb_scale(missing_light_color(&missing), BSDF_PI);
     for (int c = 0; c < 3; c++) {
         float *irradiance = &(&sun->irradiance.r)[c], before = *irradiance;
-        *irradiance = clampf((&fitted.r)[c], before / CHANGE_MOST, before * CHANGE_MOST);
+        *irradiance = clampf((&fitted.r)[c], before / MAX_CHANGE, before * MAX_CHANGE);
     }
     missing_light_release(&missing);
     light_places_release(&places);

@@ -12,7 +12,7 @@
 /* Least part of the map's light; what brings less has shadows that nobody sees. Of a uniform sky the widest disc brings
  * that if it is 30 times as bright; the sun is 100,000 times as bright as a clear sky, 100 times through thin
  * clouds. */
-#define LEAST_SHARE 0.02
+#define MIN_SHARE 0.02
 /* Photographs and map spread the disc over so many pixels of the map beyond its edge: the width of a bilinear pixel,
  * twice. What is around it lies as far away again. */
 #define BLUR_PIXELS 2.0
@@ -111,7 +111,7 @@ bool sun_seen_take(struct environment *e, struct sun *sun) {
         !is_whole(&s) || !find_around(&s))
         return false;
     rgb irradiance = take_excess(&s, NULL);
-    if ((double)rgb_luminance(irradiance) < LEAST_SHARE * 4.0 * PI * e->luminance)
+    if ((double)rgb_luminance(irradiance) < MIN_SHARE * 4.0 * PI * e->luminance)
         return false;
     take_excess(&s, &e->map);
     environment_update_figures(e);

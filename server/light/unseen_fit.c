@@ -11,7 +11,7 @@
 
 #define CELLS SKY_CELLS
 /* Least share of a point's rays in unseen directions for it to count in the fit. */
-#define SHARE_LEAST 0.1f
+#define MIN_SHARE 0.1f
 /* The share of the points whose base colour is at most that of white paint. In scans it is not near 1: in creases of a
  * fused mesh too little light is found. */
 #define BELOW_WHITE 0.9
@@ -40,7 +40,7 @@ void unseen_add_ray(struct unseen_point *p, vec3 direction, float share, float f
 size_t unseen_keep_informative(struct unseen_point *point, size_t count) {
     size_t kept = 0;
     for (size_t i = 0; i < count; i++) {
-        if (point[i].unseen >= SHARE_LEAST)
+        if (point[i].unseen >= MIN_SHARE)
             point[kept++] = point[i];
     }
     return kept;

@@ -25,7 +25,7 @@ void unseen_add_ray(struct unseen_point *p, vec3 direction, float share, float f
 /* Moves the points that unobserved directions light noticeably to the front; returns their number. */
 size_t unseen_keep_informative(struct unseen_point *point, size_t count);
 /* Least number of these. */
-#define UNSEEN_LEAST_POINTS 64
+#define UNSEEN_MIN_POINTS 64
 
 /* The part of all the points' rays that is unseen. */
 double unseen_share(const struct unseen_point *point, size_t count);

@@ -14,7 +14,7 @@
 /* Part of the light at a grey card that the unseen one must be, as guessed: what is wrong with the rest is taken for
  * its scale. Between a room whose light is all unseen and one where it is all seen (test_grey_card.c) it may be
  * anything: .15 and .25 give the same there. */
-#define CARD_LEAST 0.2
+#define MIN_CARD_SHARE 0.2
 /* Nothing is so white. Light is missing, and not only known badly, if more than the rest of the points are. */
 #define IMPOSSIBLE_BASE_COLOR 1.5
 #define NOT_IMPOSSIBLE 0.8
@@ -104,7 +104,7 @@ static void scale_by_card(struct unseen *u) {
     for (size_t k = 0; k < SKY_CELLS; k++)
         unseen += (double)p->share[k] * exp(u->log_radiance[k]);
     double wanted = (double)p->observed / card->pixel.value - (double)p->known;
-    if (!card->is_given || !(unseen > 0.0) || unseen < CARD_LEAST * (unseen + (double)p->known) || !(wanted > 0.0))
+    if (!card->is_given || !(unseen > 0.0) || unseen < MIN_CARD_SHARE * (unseen + (double)p->known) || !(wanted > 0.0))
         return;
     card->light_factor = wanted / unseen;
     for (size_t k = 0; k < SKY_CELLS; k++)
@@ -130,7 +130,7 @@ void unseen_light_estimate(struct reconstruction *r, const struct views *views) 
     r->unseen_share = unseen_share(u.point, u.count);
     u.count = unseen_keep_informative(u.point, u.count);
     double base_color = unseen_base_color(u.point, u.count, NOT_IMPOSSIBLE, NULL);
-    bool matters = !r->is_surrounded && u.count >= UNSEEN_LEAST_POINTS &&
+    bool matters = !r->is_surrounded && u.count >= UNSEEN_MIN_POINTS &&
                    (base_color > IMPOSSIBLE_BASE_COLOR || r->unseen_share > MOSTLY_UNSEEN);
     if (matters)
         relight(&u);

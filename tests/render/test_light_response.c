@@ -202,7 +202,7 @@ static size_t segment_of(const struct rig *g, int64_t object) {
 static float *bounced_at(const struct rig *g, const struct light_point *point, size_t count, int64_t object,
                          float albedo_of) {
     struct segment_light light;
-    struct segment_light_disc *disc = mem_array(BOUNCED_MOST, sizeof *disc);
+    struct segment_light_disc *disc = mem_array(BOUNCED_MAX, sizeof *disc);
     float *lit = mem_calloc(count + 1, sizeof *lit), albedo[OBJECTS] = {0};
     size_t lamp = segment_of(g, LAMP);
     segment_light_init(&light, &g->r);
