@@ -10,11 +10,10 @@
 
 /* Points of a candidate that represent its area while all are screened; the likeliest get SEGMENT_LIGHT_POINTS. */
 #define SCREEN_POINTS 8
-/* Candidates that are tried with their whole response, half of which are fitted together with all other sources. */
+/* Candidates that are tried with their whole response. */
 #define LIKELIEST 8
-/* Logarithm of the odds that are asked for: 20 to 1, as a false lamp costs more than a missed one. */
-#define SURE 3.0
-#define NO_LIGHT (-1e3) /* the logarithm of no radiance to speak of */
+/* Odds that are asked of a lamp: a false one costs more than a missed one. */
+#define SURE 20.0
 
 struct lamp_candidate {
     uint32_t segment;
@@ -73,29 +72,21 @@ static int by_gain(const void *a, const void *b) {
     return (first->segment > second->segment) - (first->segment < second->segment);
 }
 
-/* Logarithm of the odds that a lamp is there, of which one is expected among `count` candidates, over those that are
- * asked for, if the loss is `gain` lower with it. How alike patches are is measured with it: without, what it lights
- * agrees. */
-static double odds(struct light_model *m, double gain, size_t count) {
+/* Logarithm of the odds that a lamp is there, of which one is expected among `count` candidates, if the loss is `gain`
+ * lower with it. How alike patches are is measured with it: without, what it lights agrees. */
+static double log_odds(struct light_model *m, double gain, size_t count) {
     light_model_measure(m);
-    return gain / m->patches_alike - log((double)count) - SURE;
-}
-
-/* Gives what unseen surfaces send its prior value: it must not keep explaining what a lamp explains better. */
-static void reset_regions(struct joint_fit *fit, size_t first) {
-    for (size_t k = first; k < first + LIGHT_REGIONS; k++)
-        fit->source[k].value = fit->source[k].mean;
+    return gain / m->patches_alike - log((double)count);
 }
 
 /* Sorts the first `count` candidates by what each gains with all other sources as they are. */
 static void sort_candidates(struct lamp_search *s, size_t count) {
-    reset_regions(&s->m->fit, s->m->first_region);
     parallel_for(s->m->r->pool, count, try_candidate, s);
     qsort(s->candidate, count, sizeof *s->candidate, by_gain);
 }
 
-/* Sorts the likeliest candidates to the front; returns how many are to be fitted. */
-static size_t find_likeliest(struct lamp_search *s) {
+/* Sorts the likeliest candidate to the front. */
+static void find_likeliest(struct lamp_search *s) {
     size_t likeliest = s->count < LIKELIEST ? s->count : LIKELIEST;
     sort_candidates(s, s->count);
     for (size_t i = 0; i < likeliest; i++) {
@@ -107,70 +98,39 @@ static size_t find_likeliest(struct lamp_search *s) {
         c->is_whole = true;
     }
     sort_candidates(s, likeliest);
-    return likeliest < LIKELIEST / 2 ? likeliest : LIKELIEST / 2;
 }
 
-/* Fits the likeliest candidates each together with all sources; adds the best one if the evidence suffices. */
-static bool add_best(struct lamp_search *s) {
+/* Fits the likeliest candidate together with all sources; false, and all as it was, where the evidence for it does not
+ * suffice. */
+static bool add_likeliest(struct lamp_search *s) {
     struct light_model *m = s->m;
-    size_t sources = m->fit.source_count, best = SIZE_MAX, bytes = (sources + 1) * sizeof *m->fit.source;
-    struct joint_source *kept = mem_array(sources + 1, sizeof *kept), *fitted = mem_array(sources + 1, sizeof *fitted);
-    double without = joint_fit_loss(&m->fit), greatest = 0.0;
-    memcpy(kept, m->fit.source, bytes - sizeof *kept);
-    size_t likeliest = find_likeliest(s);
-    for (size_t i = 0; i < likeliest && s->candidate[i].gain > 0.0; i++) {
-        joint_fit_add(&m->fit, &s->candidate[i].source, s->candidate[i].column);
-        double likely = odds(m, without - joint_fit_solve(&m->fit, JOINT_STEPS_NEAR), s->count);
-        if (likely > greatest) {
-            greatest = likely, best = i;
-            memcpy(fitted, m->fit.source, bytes);
-        }
-        joint_fit_remove(&m->fit, sources);
-        memcpy(m->fit.source, kept, bytes - sizeof *kept);
-        reset_regions(&m->fit, m->first_region);
+    double without = joint_fit_loss(&m->fit);
+    find_likeliest(s);
+    struct lamp_candidate *best = &s->candidate[0];
+    if (!(best->gain > 0.0))
+        return false;
+    size_t bytes = m->fit.source_count * sizeof *m->fit.source;
+    struct joint_source *kept = mem_array(m->fit.source_count, sizeof *kept);
+    memcpy(kept, m->fit.source, bytes);
+    joint_fit_add(&m->fit, &best->source, best->column);
+    bool is_likely = log_odds(m, without - joint_fit_solve(&m->fit, JOINT_STEPS_NEAR), s->count) > log(SURE);
+    if (is_likely) {
+        struct light_lamp *lamp = light_lamps_add_hidden(&m->lamps, best->segment);
+        lamp->source = m->fit.source_count - 1, lamp->column = best->column;
+        *best = s->candidate[--s->count];
+    } else {
+        joint_fit_remove_last(&m->fit);
+        memcpy(m->fit.source, kept, bytes);
     }
-    memcpy(m->fit.source, kept, bytes - sizeof *kept);
-    if (best < SIZE_MAX) {
-        struct lamp_candidate *c = &s->candidate[best];
-        light_model_add_hidden(m, c->segment, &c->source, c->column);
-        memcpy(m->fit.source, fitted, bytes);
-        *c = s->candidate[--s->count];
-    }
-    mem_free(fitted);
     mem_free(kept);
-    return best < SIZE_MAX;
-}
-
-/* --- the whole --------------------------------------------------------------------------------------------- */
-
-/* Takes a lamp back that the others make superfluous; false where there is none. */
-static bool remove_one(struct lamp_search *s) {
-    struct light_model *m = s->m;
-    double with = joint_fit_loss(&m->fit);
-    for (size_t i = 0; i < m->lamps.count; i++) {
-        const struct light_lamp *lamp = &m->lamps.lamp[i];
-        if (lamp->kind != ESTIMATED_HIDDEN)
-            continue;
-        struct joint_source *source = &m->fit.source[lamp->source], kept = *source;
-        source->value = source->mean = NO_LIGHT;
-        double gain = joint_fit_loss(&m->fit) - with;
-        *source = kept;
-        if (odds(m, gain, s->count + 1) > 0.0)
-            continue;
-        light_model_remove_hidden(m, i);
-        joint_fit_solve(&m->fit, JOINT_STEPS_NEAR);
-        return true;
-    }
-    return false;
+    return is_likely;
 }
 
 void hidden_lamps_find(struct light_model *m) {
     struct lamp_search s = {.m = m};
     size_t before = m->lamps.count;
     find_candidates(&s);
-    while (s.count > 0 && m->lamps.count - before < LIGHT_MAX && add_best(&s))
-        continue;
-    while (m->lamps.count > before && remove_one(&s))
+    while (s.count > 0 && m->lamps.count - before < LIGHT_MAX && add_likeliest(&s))
         continue;
     for (size_t i = 0; i < s.count; i++)
         mem_free(s.candidate[i].column);

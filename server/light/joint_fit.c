@@ -60,16 +60,7 @@ void joint_fit_add(struct joint_fit *f, const struct joint_source *source, const
     f->source[f->source_count++] = *source;
 }
 
-void joint_fit_remove(struct joint_fit *f, size_t index) {
-    assert(index < f->source_count);
-    size_t last = --f->source_count;
-    f->source[index] = f->source[last];
-    for (size_t i = 0; i < f->point_count; i++) {
-        float *row = f->response + i * f->source_max;
-        row[index] = row[last];
-        row[last] = 0.0f;
-    }
-}
+void joint_fit_remove_last(struct joint_fit *f) { f->source_count--; }
 
 /* --- loss and its derivatives ------------------------------------------------------------------------------ */
 

@@ -29,8 +29,8 @@ void joint_fit_release(struct joint_fit *f);
 
 /* Appends a source; `column` is its column of R. Its value is to be set, at least `least`. */
 void joint_fit_add(struct joint_fit *f, const struct joint_source *source, const float *column);
-/* Removes a source; the last one takes its place. It must not be tied. */
-void joint_fit_remove(struct joint_fit *f, size_t index);
+/* Removes the source that was added last. It must not be tied. */
+void joint_fit_remove_last(struct joint_fit *f);
 
 /* Negative logarithm of the posterior at the sources' values, up to a constant. */
 double joint_fit_loss(const struct joint_fit *f);

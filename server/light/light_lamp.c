@@ -94,14 +94,6 @@ struct light_lamp *light_lamps_add_hidden(struct light_lamps *l, uint32_t segmen
     return lamp;
 }
 
-void light_lamps_remove(struct light_lamps *l, size_t index) {
-    struct light_lamp *lamp = &l->lamp[index];
-    for (size_t i = 0; i < lamp->segment_count; i++)
-        l->is_lamp[lamp->segment[i]] = false;
-    mem_free(lamp->column);
-    *lamp = l->lamp[--l->count];
-}
-
 /* A segment, and its power. */
 struct bright {
     uint32_t segment;

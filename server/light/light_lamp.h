@@ -54,8 +54,6 @@ void light_lamps_choose(struct light_lamps *l, bool again);
 
 /* Adds a hidden lamp. */
 struct light_lamp *light_lamps_add_hidden(struct light_lamps *l, uint32_t segment);
-/* Removes a lamp; the last one takes its place. */
-void light_lamps_remove(struct light_lamps *l, size_t index);
 
 /* Whether there are lamps or sky of unknown radiance. */
 bool light_lamps_has_unknown(const struct light_lamps *l);

@@ -1,7 +1,6 @@
 /* light_model.c -- see light_model.h. */
 #include "server/light/light_model.h"
 
-#include <assert.h>
 #include <math.h>
 #include <string.h>
 
@@ -260,23 +259,6 @@ void light_model_survey(struct light_model *m, const struct views *views, const 
         image_release(&known);
     }
     make_fit(m);
-}
-
-void light_model_add_hidden(struct light_model *m, uint32_t segment, const struct joint_source *source, float *column) {
-    struct light_lamp *lamp = light_lamps_add_hidden(&m->lamps, segment);
-    lamp->source = m->fit.source_count, lamp->column = column;
-    joint_fit_add(&m->fit, source, column);
-}
-
-void light_model_remove_hidden(struct light_model *m, size_t index) {
-    size_t source = m->lamps.lamp[index].source;
-    assert(m->lamps.lamp[index].kind == ESTIMATED_HIDDEN);
-    joint_fit_remove(&m->fit, source);
-    light_lamps_remove(&m->lamps, index);
-    for (size_t i = 0; i < m->lamps.count; i++) {
-        if (m->lamps.lamp[i].source == m->fit.source_count)
-            m->lamps.lamp[i].source = source;
-    }
 }
 
 void light_model_measure(struct light_model *m) {

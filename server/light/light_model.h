@@ -32,12 +32,6 @@ void light_model_survey(struct light_model *m, const struct views *views, const 
 /* Adds to column[points.count] the response of a hidden lamp: its own light and what unseen surfaces reflect of it. */
 void light_model_respond_hidden(const struct light_model *m, uint32_t segment, float *column);
 
-/* Adds a hidden lamp of which `column` is the column of the response; takes it over. Its radiance is of the fit's
- * value. */
-void light_model_add_hidden(struct light_model *m, uint32_t segment, const struct joint_source *source, float *column);
-/* Removes a hidden lamp. */
-void light_model_remove_hidden(struct light_model *m, size_t lamp);
-
 /* Measures m->patches_alike at the fit's values. */
 void light_model_measure(struct light_model *m);
 

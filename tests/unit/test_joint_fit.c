@@ -133,7 +133,7 @@ static void test_bound(struct parallel *pool) {
     joint_fit_add(&f, &loose, lit[0]);
     joint_fit_solve(&f, 30);
     CHECK_NEAR(exp(f.source[1].value), 60.0, 6.0);
-    joint_fit_remove(&f, 1);
+    joint_fit_remove_last(&f);
     joint_fit_add(&f, &tight, lit[0]);
     joint_fit_solve(&f, 30);
     CHECK(f.source[1].value == tight.least);
