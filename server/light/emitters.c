@@ -77,9 +77,9 @@ static void add_to_sums(const struct reconstruction *r, uint32_t texel, const st
     sums->count++;
 }
 
-/* Whether the mean of the observations is surely below fused radiance, their median: something that the mesh lacks, such
- * as the bars of a window, stands before the surface in some. The standard error is that of a ratio of sums (Cochran
- * 1977, eq. 6.13). */
+/* Whether the mean of the observations is surely below fused radiance, their median: something that the mesh lacks,
+ * such as the bars of a window, stands before the surface in some. The standard error is that of a ratio of sums
+ * (Cochran 1977, eq. 6.13). */
 static bool is_obstructed(const struct ratio_sums *sums) {
     if (sums->count < MIN_OBSERVATIONS)
         return false;

@@ -1,8 +1,8 @@
 /* hidden_lamps.h -- which segments that no photograph shows are lamps, by the evidence of what they light.
  *
  * Each is tried as a further source of the joint fit, all others being as they are. The likeliest is taken if, fitted
- * with all others, it raises the posterior by more than a lamp among so many candidates needs (Occam's factor); then the
- * next one is sought. */
+ * with all others, it raises the posterior by more than a lamp among so many candidates needs (Occam's factor); then
+ * the next one is sought. */
 #ifndef UNBAKE_LIGHT_HIDDEN_LAMPS_H
 #define UNBAKE_LIGHT_HIDDEN_LAMPS_H
 

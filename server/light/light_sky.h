@@ -26,7 +26,8 @@ struct light_sky {
     bool is_dark;                    /* nothing comes from where no photograph looks */
     double fill[SKY_CELLS];          /* mean radiance of the fill about each cell; 0: there is none */
     bool estimates_bounds;           /* saturated directions are sources; else their bounds are known light */
-    /* Of each half (environment.h): the part of the seen directions that saturates, -1: none is seen; and their mean. */
+    /* Of each half (environment.h): the part of the seen directions that saturates, -1: none is seen; and their
+     * mean. */
     double bound_share[ENVIRONMENT_HALVES], bound_radiance[ENVIRONMENT_HALVES];
 };
 

@@ -1,8 +1,8 @@
 /* split.c -- see split.h.
  *
- * Segment by segment, at rising levels of radiance: connected sets of triangles of at least the level's observed radiance
- * are tested, until the level exceeds the Lambert radiance at albedo 1 there. So a part is as large as it can be, and
- * all of it is brighter than what it could reflect. */
+ * Segment by segment, at rising levels of radiance: connected sets of triangles of at least the level's observed
+ * radiance are tested, until the level exceeds the Lambert radiance at albedo 1 there. So a part is as large as it can
+ * be, and all of it is brighter than what it could reflect. */
 #include "server/light/split.h"
 
 #include <math.h>
