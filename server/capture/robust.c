@@ -13,7 +13,7 @@ static int compare_gray(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
-size_t robust_keep(struct robust_sample *sample, size_t count, float within) {
+size_t robust_select(struct robust_sample *sample, size_t count, float within) {
     size_t kept = 0;
     qsort(sample, count, sizeof *sample, compare_gray);
     float median = sample[count / 2].gray;

@@ -26,7 +26,7 @@ float robust_weigh(struct robust_sample *sample, size_t count, float weight_powe
 
 /* Keeps samples whose `gray` is less than `within` from its unweighted median. count > 0; sorts the samples; returns
  * how many are kept. */
-size_t robust_keep(struct robust_sample *sample, size_t count, float within);
+size_t robust_select(struct robust_sample *sample, size_t count, float within);
 
 /* Weighted mean after robust_weigh with weight_power 1; count > 0. */
 rgb robust_mean(struct robust_sample *sample, size_t count, float scale);

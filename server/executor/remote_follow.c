@@ -95,7 +95,7 @@ static char *all_ids(const struct remote *m) {
     return text;
 }
 
-void remote_ask(struct remote *m) {
+void remote_query_status(struct remote *m) {
     if (m->asking || now_sec(m) < m->ask_at || !any_needs_status(m))
         return;
     char *ids = all_ids(m);

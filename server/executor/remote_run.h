@@ -56,7 +56,7 @@ struct remote {
 /* Sends the run's submission, under the name that its row has. */
 void remote_submit(struct remote_run *r, const char *token);
 /* Sends a status command if one is due and any run needs it. */
-void remote_ask(struct remote *remote);
+void remote_query_status(struct remote *remote);
 /* What has come back: takes all commands that are done. */
 void remote_receive(struct remote *remote);
 /* Judges runs by how long they have been silent. */

@@ -99,7 +99,7 @@ static void turn(struct remote *m) {
     look(m);
     remote_receive(m);
     remote_judge(m);
-    remote_ask(m);
+    remote_query_status(m);
     count_runs(m);
 }
 

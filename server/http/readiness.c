@@ -90,7 +90,7 @@ void readiness_free(struct readiness *r) {
     mem_free(r);
 }
 
-enum status readiness_ask(struct readiness *r, uint64_t *free_bytes, struct error *err) {
+enum status readiness_probe(struct readiness *r, uint64_t *free_bytes, struct error *err) {
     double until_sec = clock_sec() + READINESS_WAIT_SEC;
     pthread_mutex_lock(&r->thread.mutex);
     bool is_late = r->is_asking && clock_sec() - r->asked_sec >= READINESS_WAIT_SEC;

@@ -17,6 +17,6 @@ enum status readiness_new(struct readiness **r, struct store *store, const char 
 void readiness_free(struct readiness *r); /* NULL is allowed */
 /* Writes and reads back a row and a file; *free_bytes is the free space. Callers that ask meanwhile share the probe.
  * STATUS_UNAVAILABLE when it takes longer than READINESS_WAIT_SEC; at once if it has already. */
-enum status readiness_ask(struct readiness *r, uint64_t *free_bytes, struct error *err);
+enum status readiness_probe(struct readiness *r, uint64_t *free_bytes, struct error *err);
 
 #endif

@@ -20,7 +20,7 @@ static void scene_added(void *scheduler) { scheduler_wake(scheduler); }
 static void maintain_uploads(void *resumables) { resumables_maintain(resumables); }
 
 static enum status forget_upload(void *resumables, const char *id, struct error *err) {
-    return resumable_forget(resumables, id, err);
+    return resumable_remove_files(resumables, id, err);
 }
 
 /* Opens what works in the data folder. Complete uploads become scenes before leftovers are removed. */
@@ -50,9 +50,10 @@ enum status service_new(struct api **out, const struct api_config *config, struc
     api->arrivals = arrivals_new();
     api->hub = hub_new(config->keepalive_sec);
     *out = api;
-    enum status status = store_keep(store, config->scene_keep_ms, config->job_keep_ms, config->upload_keep_ms, err);
+    enum status status =
+        store_retention_set_periods(store, config->scene_keep_ms, config->job_keep_ms, config->upload_keep_ms, err);
     if (status == STATUS_OK)
-        status = store_keep_empty(store, api->config.empty_upload_ms, err);
+        status = store_retention_set_empty_upload(store, api->config.empty_upload_ms, err);
     if (status == STATUS_OK)
         status = open_folder(api, err);
     store_reserve_renew(store);

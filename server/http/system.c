@@ -53,7 +53,7 @@ struct response *system_healthz(struct api *api, struct request *r) {
 struct response *system_readyz(struct api *api, struct request *r) {
     struct error err;
     uint64_t room;
-    if (readiness_ask(api->readiness, &room, &err) != STATUS_OK)
+    if (readiness_probe(api->readiness, &room, &err) != STATUS_OK)
         return problem_full(r, 503, err.message, err.hint, NULL);
     bool waits = scheduler_waits_for_disk(api->scheduler);
     uint64_t keep = api->config.min_free_bytes + (limits_bind(r) ? api->config.admin_free_bytes : 0);

@@ -216,7 +216,7 @@ static struct response *change(struct api *api, const struct request *r) {
     if (cJSON_GetArraySize(params) > 0)
         return problem_invalid(r, "the change is invalid", params);
     cJSON_Delete(params);
-    if (store_upload_keep(api->store, id, &retention, &err) != STATUS_OK ||
+    if (store_upload_set_retention(api->store, id, &retention, &err) != STATUS_OK ||
         store_upload_get(api->store, id, &row, NULL, 0, &err) != STATUS_OK)
         return problem_from(r, &err);
     reply = response_json(200, view_upload(&row));

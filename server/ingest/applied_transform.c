@@ -29,7 +29,7 @@ void applied_transform_undo(struct frames *t, const char *name, const char *reas
         pose_transform((const double(*)[4])inverse, &t->frame[i].world_from_camera);
     t->has_applied = false;
     t->coordinates = CAPTURE;
-    frames_know(t, "file", "those of the cameras' file", (const double(*)[4])inverse);
+    frames_add_coordinates(t, "file", "those of the cameras' file", (const double(*)[4])inverse);
     findings_warning(f, "%s: the poses are in nerfstudio's axes (applied_transform) and were turned back: %s", name,
                      reason);
 }
@@ -76,8 +76,9 @@ static void know_capture(struct frames *t) {
     similarity(t, m);
     double det = coordinates_invert((const double(*)[4])m, inverse);
     if (det > 1e-9 && isfinite(det))
-        frames_know(t, CAPTURE, "those of the capture before nerfstudio's applied_transform and applied_scale",
-                    (const double(*)[4])m);
+        frames_add_coordinates(t, CAPTURE,
+                               "those of the capture before nerfstudio's applied_transform and applied_scale",
+                               (const double(*)[4])m);
 }
 
 void applied_transform_settle(struct frames *t, const char *name, const char *mesh, const char *given,

@@ -14,7 +14,7 @@ void applied_transform_undo(struct frames *t, const char *name, const char *reas
 
 /* Decides for the mesh of that path by who writes such a name; NULL: none. Undoes it for meshes that photogrammetry or
  * a scanner wrote; otherwise leaves the poses and says what would turn the mesh, where something was applied. `given`:
- * what the reading says (frames_settle_coordinates), or NULL. */
+ * what the reading says (frames_choose_coordinates), or NULL. */
 void applied_transform_settle(struct frames *t, const char *name, const char *mesh, const char *given,
                               struct findings *f);
 

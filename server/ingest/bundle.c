@@ -182,7 +182,7 @@ static enum status settle_coordinates(struct frames *t, const char *name, const 
                                       struct findings *f, struct error *err) {
     struct error own;
     enum status status =
-        frames_settle_coordinates(t, given, scene->mesh.triangle_count > 0 ? &scene->mesh : NULL, &own);
+        frames_choose_coordinates(t, given, scene->mesh.triangle_count > 0 ? &scene->mesh : NULL, &own);
     if (status == STATUS_OK && t->stands_apart)
         findings_warning(
             f,

@@ -26,7 +26,7 @@ void frames_release(struct frames *t) {
 
 #define FILE_COORDINATES "file"
 
-void frames_know(struct frames *t, const char *name, const char *text, const double poses_from[3][4]) {
+void frames_add_coordinates(struct frames *t, const char *name, const char *text, const double poses_from[3][4]) {
     assert(t->other_count < COORDINATES_MAX);
     struct coordinates *added = &t->other[t->other_count++];
     *added = (struct coordinates){.name = name, .text = text};
@@ -85,7 +85,7 @@ static void move_to_mesh(struct frames *t, const struct mesh *mesh) {
         move(t, best);
 }
 
-enum status frames_settle_coordinates(struct frames *t, const char *given, const struct mesh *mesh, struct error *err) {
+enum status frames_choose_coordinates(struct frames *t, const char *given, const struct mesh *mesh, struct error *err) {
     if (!given) {
         if (t->is_placed_by_mesh && mesh)
             move_to_mesh(t, mesh);

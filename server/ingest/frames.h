@@ -68,11 +68,11 @@ void frames_release(struct frames *t);
 void frame_release(struct frame *frame);
 
 /* Adds coordinates of which the poses' are poses_from * those. */
-void frames_know(struct frames *t, const char *name, const char *text, const double poses_from[3][4]);
+void frames_add_coordinates(struct frames *t, const char *name, const char *text, const double poses_from[3][4]);
 /* Takes the poses to those that the reading names ("file": as the files are) or, where it names none and nothing else
  * tells, to those in which most cameras stand within the mesh's bounds (NULL: no mesh). STATUS_INPUT: the capture knows
  * none of that name. */
-enum status frames_settle_coordinates(struct frames *t, const char *given, const struct mesh *mesh, struct error *err);
+enum status frames_choose_coordinates(struct frames *t, const char *given, const struct mesh *mesh, struct error *err);
 
 /* The camera of a frame whose picture is width x height pixels, in coordinates whose origin lies at `offset` in the
  * file's (that of struct mesh). STATUS_INPUT when the file states another size or an invalid lens. */

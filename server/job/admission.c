@@ -191,8 +191,8 @@ static enum status tell(struct admission *a, struct store *store, int64_t id, do
     return status;
 }
 
-enum status admission_ask(struct admission *a, struct store *store, int64_t id, size_t running, double used, bool *may,
-                          double *need, struct error *err) {
+enum status admission_decide(struct admission *a, struct store *store, int64_t id, size_t running, double used,
+                             bool *may, double *need, struct error *err) {
     enum status status = find_need(a, store, id, need, err);
     if (running == 0)
         a->total_bytes = (double)(a->limit_bytes > 0 ? a->limit_bytes : machine_memory_available(""));

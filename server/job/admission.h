@@ -34,7 +34,7 @@ enum status admission_foretell(const struct admission *a, struct store *store, c
 
 /* *may: the job may begin beside `running` others, which need `used` bytes; *need: its own. One that may not is told
  * why; one that was told and need not wait any more is told, too. */
-enum status admission_ask(struct admission *a, struct store *store, int64_t id, size_t running, double used, bool *may,
-                          double *need, struct error *err);
+enum status admission_decide(struct admission *a, struct store *store, int64_t id, size_t running, double used,
+                             bool *may, double *need, struct error *err);
 
 #endif

@@ -53,7 +53,7 @@ enum status deliveries_run(struct deliveries *d, const struct scheduler_config *
     struct error why;
     enum status result = STATUS_OK;
     for (size_t i = 0; i < DELIVERIES_AT_ONCE; i++)
-        is_free = delivery_listen(&d->slot[i], store) || is_free;
+        is_free = delivery_poll(&d->slot[i], store) || is_free;
     /* Asked before the due messages are read, so that none becomes due in between. */
     if (store_outbox_wait(store, &wait, &why) != STATUS_OK)
         wait = RETRY_SEC;

@@ -104,7 +104,7 @@ static bool settle(struct delivery *d, struct store *store) {
     return true;
 }
 
-bool delivery_listen(struct delivery *d, struct store *store) {
+bool delivery_poll(struct delivery *d, struct store *store) {
     struct run_end end;
     if (d->id == 0)
         return true;
@@ -123,7 +123,7 @@ bool delivery_listen(struct delivery *d, struct store *store) {
 
 void delivery_stop(struct delivery *d, struct store *store) {
     run_ask(d->run, RUN_KILL);
-    while (!delivery_listen(d, store) && !d->has_ended)
+    while (!delivery_poll(d, store) && !d->has_ended)
         poll(NULL, 0, 5);
     forget(d);
 }

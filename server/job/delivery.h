@@ -30,7 +30,7 @@ struct delivery {
 enum status delivery_start(struct delivery *d, const struct scheduler_config *config, const struct outbox_row *row,
                            struct error *err);
 /* Reads from the process, ends it when its time is up, and enters the outcome. True when the slot is empty again. */
-bool delivery_listen(struct delivery *d, struct store *store);
+bool delivery_poll(struct delivery *d, struct store *store);
 /* Ends the process and empties the slot. */
 void delivery_stop(struct delivery *d, struct store *store);
 

@@ -71,7 +71,7 @@ static enum status ask_admission(struct dispatch *d, bool is_small, int64_t id, 
         used += is_here ? d->slot[i].memory_bytes : 0.0;
     }
     struct admission *a = is_small ? &d->small_admission : &d->admission;
-    enum status status = admission_ask(a, d->store, id, running, used, may, need, err);
+    enum status status = admission_decide(a, d->store, id, running, used, may, need, err);
     d->admission.total_bytes = d->small_admission.total_bytes = a->total_bytes;
     return status;
 }

@@ -303,7 +303,7 @@ static void note_facts(const struct message_listener *l) {
     if (!a->facts)
         return;
     char *text = json_text(a->facts);
-    if (store_scene_tell(l->store, a->scene_id, a->reading, text, &err) != STATUS_OK)
+    if (store_scene_set_facts(l->store, a->scene_id, a->reading, text, &err) != STATUS_OK)
         complain(a, "scene", &err);
     mem_free(text);
 }

@@ -121,7 +121,7 @@ static void measure_texel(const struct emitter *e, uint32_t texel) {
     observe_all(e, texel, &observations);
     /* Of a screen whose picture changed, keep the majority: the rest is another picture, not noise. */
     if (observations.count > 0 && e->finder->evidence[e->segment].changing_share > 0.0f)
-        observations.count = robust_keep(observations.observation, observations.count, MAX_SCREEN_DEVIATION);
+        observations.count = robust_select(observations.observation, observations.count, MAX_SCREEN_DEVIATION);
     if (observations.count > 0)
         e->finder->measured[texel] = measurement_mean(&observations, OUTLIER_SCALE, rgb_gray(0.0f));
 }

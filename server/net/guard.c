@@ -86,7 +86,7 @@ void guard_discard_unsent(struct guarded *c) {
     setsockopt(c->fd, SOL_SOCKET, SO_LINGER, &none, sizeof none);
 }
 
-void guard_look(struct guard *g, double now_sec) {
+void guard_check_all(struct guard *g, double now_sec) {
     pthread_mutex_lock(&g->thread.mutex);
     for (struct guarded *c = g->first; c; c = c->next) {
         if (c->is_shut || c->held_sec > 0.0 || !is_late(g, c, now_sec))
@@ -112,7 +112,7 @@ static void *run(void *user) {
         while (!atomic_load(&g->thread.stopping) && background_wait_until(&g->thread, until_sec))
             ; /* woken by a connection that came or went: the second is not over */
         pthread_mutex_unlock(&g->thread.mutex);
-        guard_look(g, clock_sec());
+        guard_check_all(g, clock_sec());
         if (g->tick)
             g->tick(g->user);
         pthread_mutex_lock(&g->thread.mutex);

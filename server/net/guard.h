@@ -52,6 +52,6 @@ size_t guard_count(struct guard *g);        /* connections */
 uint64_t guard_shut_count(struct guard *g); /* connections ever shut down for being late */
 
 /* Checks all connections as of `now_sec` (CLOCK_MONOTONIC). The thread's step; for tests. */
-void guard_look(struct guard *g, double now_sec);
+void guard_check_all(struct guard *g, double now_sec);
 
 #endif

@@ -82,7 +82,8 @@ enum link_state link_state(struct attempt_link *l) {
     return l->state;
 }
 
-enum status link_note(struct attempt_link *l, enum status status, const struct reply *reply, const struct error *err) {
+enum status link_read_reply(struct attempt_link *l, enum status status, const struct reply *reply,
+                            const struct error *err) {
     bool is_refusal = reply->code == 401 || reply->code == 403 || reply->code == 409;
     if (status != STATUS_OK && is_refusal && l->state == LINK_OPEN) {
         l->state = LINK_REFUSED;
@@ -126,7 +127,7 @@ static enum status post(struct attempt_link *l, const char *what, const cJSON *b
     *sent = clock_sec();
     enum status status = link_whole(l, request_run(l->control, &call, reply, err), reply, member, err);
     mem_free(path);
-    return link_note(l, status, reply, err);
+    return link_read_reply(l, status, reply, err);
 }
 
 static void take_lease(struct attempt_link *l, const cJSON *reply, double sent) {
@@ -163,7 +164,7 @@ enum status link_claim(struct attempt_link *l, const char *host, int threads, cJ
 
 /* --- reports -------------------------------------------------------------------------------- */
 
-void link_say(struct attempt_link *l, const char *line, size_t length) {
+void link_add_line(struct attempt_link *l, const char *line, size_t length) {
     if (length >= PROGRESS_LINE_MAX || !utf8_valid(line, length, NULL) || memchr(line, '\0', length))
         return;
     if (l->line_count == l->line_room) {
@@ -173,7 +174,7 @@ void link_say(struct attempt_link *l, const char *line, size_t length) {
     l->line[l->line_count++] = mem_strndup(line, length);
 }
 
-bool link_has_said_all(const struct attempt_link *l) { return l->line_count == 0 && !l->is_pending; }
+bool link_all_lines_sent(const struct attempt_link *l) { return l->line_count == 0 && !l->is_pending; }
 
 static double interval(const struct attempt_link *l, double most) { return fmin(most, l->lease_sec / REPORTS_A_LEASE); }
 
@@ -229,7 +230,7 @@ static void put_off(struct attempt_link *l, const cJSON *reply) {
     l->failures = 0;
 }
 
-void link_drop(struct attempt_link *l) {
+void link_drop_lines(struct attempt_link *l) {
     if (l->line_count > 0)
         log_warning("%zu lines are dropped: the daemon's disk is full", l->line_count);
     for (size_t i = 0; i < l->line_count; i++)

@@ -70,12 +70,12 @@ enum link_state link_state(struct attempt_link *l);
 enum status link_claim(struct attempt_link *l, const char *host, int threads, cJSON **order, struct error *err);
 
 /* A line for the next report; longer ones than a line may be, or what is no UTF-8, are dropped. */
-void link_say(struct attempt_link *l, const char *line, size_t length);
-bool link_has_said_all(const struct attempt_link *l);
+void link_add_line(struct attempt_link *l, const char *line, size_t length);
+bool link_all_lines_sent(const struct attempt_link *l);
 /* Reports where that is due: when there are lines every 2 s, otherwise every 5 s; at once if `now`. */
 void link_report(struct attempt_link *l, double cpu_sec, bool now);
 /* Forgets what has not been entered: the daemon has no room for it, and the next attempt says it again. */
-void link_drop(struct attempt_link *l);
+void link_drop_lines(struct attempt_link *l);
 /* When the next report is due (clock_sec). */
 double link_next_report(const struct attempt_link *l);
 
@@ -100,7 +100,8 @@ enum status link_send(struct attempt_link *l, const char *what, const char *name
                       const char *hex, struct error *err);
 
 /* For link_files.c: what the reply to any request tells of the link; returns `status`. */
-enum status link_note(struct attempt_link *l, enum status status, const struct reply *reply, const struct error *err);
+enum status link_read_reply(struct attempt_link *l, enum status status, const struct reply *reply,
+                            const struct error *err);
 /* Where a head is cut off on the way, what is left may look like an answer without content: STATUS_UNAVAILABLE where
  * the answer to a successful request is not JSON with that member. */
 enum status link_whole(const struct attempt_link *l, enum status status, const struct reply *reply, const char *member,

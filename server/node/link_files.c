@@ -86,7 +86,7 @@ static enum status run(struct attempt_link *l, struct request_call *call, struct
         status = request_run(l->bulk, call, reply, err);
         if (member)
             status = link_whole(l, status, reply, member, err);
-        link_note(l, status, reply, err);
+        link_read_reply(l, status, reply, err);
         if (t->status != STATUS_OK)
             return t->status;
         if (status == STATUS_CANCELLED) {

@@ -185,7 +185,7 @@ static void say_no_space(struct relay *r, const struct error *why) {
     json_add_string(line, "message", why->message);
     json_add_string(line, "hint", why->hint);
     char *text = json_text(line);
-    link_say(&r->link, text, strlen(text));
+    link_add_line(&r->link, text, strlen(text));
     mem_free(text);
     cJSON_Delete(line);
 }

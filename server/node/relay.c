@@ -253,7 +253,7 @@ static enum status pass_on(struct relay *r, struct error *err) {
     if (status != STATUS_OK)
         return status;
     if (is_passed)
-        link_say(&r->link, text, strlen(text));
+        link_add_line(&r->link, text, strlen(text));
     mem_free(changed);
     mem_free(r->line[0]);
     memmove(r->line, r->line + 1, --r->line_count * sizeof *r->line);
@@ -350,10 +350,10 @@ static bool is_given_up(const struct relay *r) {
 }
 
 bool relay_flush(struct relay *r) {
-    while (!link_has_said_all(&r->link) && link_state(&r->link) == LINK_OPEN) {
+    while (!link_all_lines_sent(&r->link) && link_state(&r->link) == LINK_OPEN) {
         double wait = link_next_report(&r->link) - clock_sec();
         if (r->link.is_put_off && is_given_up(r)) {
-            link_drop(&r->link);
+            link_drop_lines(&r->link);
             break;
         }
         if ((r->link.failures > 0 || r->link.is_put_off) && wait > 0.0)

@@ -155,9 +155,9 @@ struct optimiser *listing1_new(const struct optimiser_input *input) {
     l->log = mem_array(o->pass.chunk_count, sizeof *l->log);
     for (size_t c = 0; c < o->pass.chunk_count; c++)
         l->log[c] = gradient_log_new(surface->segments->count);
-    optimiser_keep(o, "progress", &l->progress, sizeof l->progress);
-    optimiser_keep(o, "base_color.adam", l->params.base_color.record, adam_bytes(&l->params.base_color));
-    optimiser_keep(o, "roughness.adam", l->params.roughness.record, adam_bytes(&l->params.roughness));
-    optimiser_keep(o, "specular.adam", l->params.specular.record, adam_bytes(&l->params.specular));
+    optimiser_add_state(o, "progress", &l->progress, sizeof l->progress);
+    optimiser_add_state(o, "base_color.adam", l->params.base_color.record, adam_bytes(&l->params.base_color));
+    optimiser_add_state(o, "roughness.adam", l->params.roughness.record, adam_bytes(&l->params.roughness));
+    optimiser_add_state(o, "specular.adam", l->params.specular.record, adam_bytes(&l->params.specular));
     return o;
 }

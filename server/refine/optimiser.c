@@ -16,14 +16,14 @@
  * ten where a tenth of it is. */
 #define MAX_VISITS 10.0 /* +25 %: no change */
 
-/* As optimiser_keep, for an array that checkpoints of formats before `format` (state_array.h) lack: it is left as it is
- * then. */
+/* As optimiser_add_state, for an array that checkpoints of formats before `format` (state_array.h) lack: it is left as
+ * it is then. */
 static void keep_since(struct optimiser *o, int format, const char *name, void *data, size_t bytes) {
     assert(o->state_count < OPTIMISER_ARRAYS);
     o->state[o->state_count++] = (struct state_array){name, data, bytes, format};
 }
 
-void optimiser_keep(struct optimiser *o, const char *name, void *data, size_t bytes) {
+void optimiser_add_state(struct optimiser *o, const char *name, void *data, size_t bytes) {
     keep_since(o, 1, name, data, bytes);
 }
 
@@ -39,20 +39,20 @@ static void keep_common(struct optimiser *o) {
     struct materials *m = in->materials;
     size_t segments = in->surface.segments->count;
     size_t texels = (size_t)m->base_color.width * m->base_color.height;
-    optimiser_keep(o, "counters", &o->counters, sizeof o->counters);
-    optimiser_keep(o, "base_color", m->base_color.texel, texels * sizeof *m->base_color.texel);
-    optimiser_keep(o, "roughness", m->roughness, segments * sizeof *m->roughness);
-    optimiser_keep(o, "specular", m->specular, segments * sizeof *m->specular);
-    optimiser_keep(o, "emission", m->emission, segments * sizeof *m->emission);
-    optimiser_keep(o, "emission.log", o->emission.log_radiance, segments * sizeof *o->emission.log_radiance);
-    optimiser_keep(o, "emission.adam", o->emission.adam.record, adam_bytes(&o->emission.adam));
-    optimiser_keep(o, "emission.evidence", in->evidence, segments * sizeof *in->evidence);
-    optimiser_keep(o, "environment.factor", in->sky_factor, sizeof *in->sky_factor);
+    optimiser_add_state(o, "counters", &o->counters, sizeof o->counters);
+    optimiser_add_state(o, "base_color", m->base_color.texel, texels * sizeof *m->base_color.texel);
+    optimiser_add_state(o, "roughness", m->roughness, segments * sizeof *m->roughness);
+    optimiser_add_state(o, "specular", m->specular, segments * sizeof *m->specular);
+    optimiser_add_state(o, "emission", m->emission, segments * sizeof *m->emission);
+    optimiser_add_state(o, "emission.log", o->emission.log_radiance, segments * sizeof *o->emission.log_radiance);
+    optimiser_add_state(o, "emission.adam", o->emission.adam.record, adam_bytes(&o->emission.adam));
+    optimiser_add_state(o, "emission.evidence", in->evidence, segments * sizeof *in->evidence);
+    optimiser_add_state(o, "environment.factor", in->sky_factor, sizeof *in->sky_factor);
     keep_since(o, 3, "light", in->light, offsetof(struct estimated_light, ground_factor));
     keep_since(o, 5, "light.ground", in->light->ground_factor, sizeof in->light->ground_factor);
     keep_since(o, 4, "deviation", m->deviation, texels * sizeof *m->deviation);
-    optimiser_keep(o, "sun.irradiance", in->sun_irradiance, sizeof *in->sun_irradiance);
-    optimiser_keep(o, "emission.is_emitter", in->is_emitter, segments * sizeof *in->is_emitter);
+    optimiser_add_state(o, "sun.irradiance", in->sun_irradiance, sizeof *in->sun_irradiance);
+    optimiser_add_state(o, "emission.is_emitter", in->is_emitter, segments * sizeof *in->is_emitter);
     keep_since(o, 2, "plan", &o->plan, sizeof o->plan);
     keep_since(o, 2, STATE_SURFACE, &o->surface, sizeof o->surface);
 }

@@ -3,7 +3,7 @@
  *
  * An iteration is a pass over the surface (pass.h) and a step by its result; both are the method's. The loop adds
  * progress, the loss curve, checkpoints, previews and figures. A checkpoint holds the materials, the evidence and
- * decision about emitters, the counters, and the arrays that the method names with optimiser_keep. */
+ * decision about emitters, the counters, and the arrays that the method names with optimiser_add_state. */
 #ifndef UNBAKE_REFINE_OPTIMISER_H
 #define UNBAKE_REFINE_OPTIMISER_H
 
@@ -90,7 +90,7 @@ struct optimiser *optimiser_new(const struct optimiser_input *input, bool deriva
 void optimiser_free(struct optimiser *o);
 
 /* Adds data[bytes] to the checkpoints. Borrows both name and data. */
-void optimiser_keep(struct optimiser *o, const char *name, void *data, size_t bytes);
+void optimiser_add_state(struct optimiser *o, const char *name, void *data, size_t bytes);
 
 /* Loads the newest checkpoint that fits, if any; saves one. */
 enum status optimiser_load(struct optimiser *o, bool *found, struct error *err);

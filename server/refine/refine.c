@@ -115,10 +115,10 @@ struct optimiser *refine_new(const struct optimiser_input *input, const struct f
     f->observation = mem_calloc(o->pass.chunk_count * o->pass.observation_capacity, sizeof *f->observation);
     f->d_emission = mem_array(surface->segments->count, sizeof *f->d_emission);
     f->emission_rate = (float)settings_number(o->settings, "emission_rate");
-    optimiser_keep(o, "correction.sums", f->correction.sums, f->correction.count * sizeof *f->correction.sums);
-    optimiser_keep(o, "correction.solved", f->correction.solved,
-                   (size_t)base_color->width * base_color->height * sizeof *f->correction.solved);
-    optimiser_keep(o, "correction.next_looks", &f->next_observations, sizeof f->next_observations);
+    optimiser_add_state(o, "correction.sums", f->correction.sums, f->correction.count * sizeof *f->correction.sums);
+    optimiser_add_state(o, "correction.solved", f->correction.solved,
+                        (size_t)base_color->width * base_color->height * sizeof *f->correction.solved);
+    optimiser_add_state(o, "correction.next_looks", &f->next_observations, sizeof f->next_observations);
     return o;
 }
 

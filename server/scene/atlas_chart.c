@@ -160,7 +160,7 @@ static void settle(struct builder *b, size_t chart, vec3 normal) {
     if (b->region_count > 1) {
         for (size_t i = 0; i < b->region_count; i++)
             project(b, b->region[i], u, v, &b->flat[i]);
-        if (overlap_drop(b->flat, b->region_count, b->overlap_m, b->dropped) > 0) {
+        if (overlap_mark_dropped(b->flat, b->region_count, b->overlap_m, b->dropped) > 0) {
             size_t kept = 0;
             for (size_t i = 0; i < b->region_count; i++)
                 if (!b->dropped[i])

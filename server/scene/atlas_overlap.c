@@ -133,7 +133,7 @@ static void enter(struct overlap_grid *g, const struct flat_triangle *triangle, 
     }
 }
 
-size_t overlap_drop(const struct flat_triangle *triangle, size_t count, double depth, bool *dropped) {
+size_t overlap_mark_dropped(const struct flat_triangle *triangle, size_t count, double depth, bool *dropped) {
     struct overlap_grid g;
     size_t dropped_count = 0;
     grid_init(&g, triangle, count);

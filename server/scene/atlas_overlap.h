@@ -11,6 +11,6 @@ struct flat_triangle {
 
 /* Goes through the triangles in order and sets dropped[i] for each one that lies over an earlier
  * one that was not dropped; an overlap no deeper than `depth` is none. Returns how many. */
-size_t overlap_drop(const struct flat_triangle *triangle, size_t count, double depth, bool *dropped);
+size_t overlap_mark_dropped(const struct flat_triangle *triangle, size_t count, double depth, bool *dropped);
 
 #endif

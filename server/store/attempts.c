@@ -150,7 +150,7 @@ enum status attempt_leave(struct store *store, struct present *now, enum job_sta
         return transition_move(store, now, to, reason, hint, err);
     enum status status = is_split ? STATUS_OK : part_end(store, now, to, reason, hint, err);
     if (status == STATUS_OK)
-        status = part_tell(store, now, to, reason, err);
+        status = part_append_event(store, now, to, reason, err);
     if (status == STATUS_OK)
         status = sql_int(&store->sql, 0, &others, err,
                          "SELECT count(*) FROM attempts WHERE job_id = ? AND number <> ? AND phase = ?", "inn", now->id,
@@ -329,11 +329,11 @@ static enum status explain_one(struct store *store, int64_t only, const char *re
                                  "ntti", (int)JOB_QUEUED, reason, prefix, only);
     if (status != STATUS_OK || *id == 0)
         return status;
-    status = transition_look(store, *id, &now, err);
+    status = transition_read(store, *id, &now, err);
     if (status == STATUS_OK)
         status = sql_run(&store->sql, err, "UPDATE jobs SET revision = revision + 1, reason = ?, hint = ? WHERE id = ?",
                          "tti", reason, hint, *id);
-    return status == STATUS_OK ? transition_tell(store, &now, reason, hint, err) : status;
+    return status == STATUS_OK ? transition_append_event(store, &now, reason, hint, err) : status;
 }
 
 enum status store_job_explain(struct store *store, int64_t only, const char *reason, const char *prefix,

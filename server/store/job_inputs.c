@@ -33,7 +33,7 @@ enum status store_job_files_check(struct store *store, int64_t id, struct error 
 enum status source_check_readable(struct store *store, int64_t id, struct error *err) {
     struct present now = {0};
     int64_t kind = 0, files = 0;
-    enum status status = transition_look(store, id, &now, err);
+    enum status status = transition_read(store, id, &now, err);
     if (status == STATUS_OK)
         status = sql_int(&store->sql, 0, &kind, err, "SELECT kind FROM jobs WHERE id = ?", "i", id);
     if (status == STATUS_OK && kind != (int)JOB_RECONSTRUCT)

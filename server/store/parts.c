@@ -190,8 +190,8 @@ enum status part_verdict(struct store *store, int64_t id, struct part_verdict *v
     return status;
 }
 
-enum status part_tell(struct store *store, const struct present *now, enum job_state to, const char *reason,
-                      struct error *err) {
+enum status part_append_event(struct store *store, const struct present *now, enum job_state to, const char *reason,
+                              struct error *err) {
     int64_t count = 0;
     enum status status =
         sql_int(&store->sql, 0, &count, err, "SELECT count(*) FROM parts WHERE job_id = ?", "i", now->id);

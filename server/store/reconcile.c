@@ -39,7 +39,7 @@ static enum status find_stray(struct store *store, const struct strays *s, int64
 static enum status end_strays(struct store *store, const struct strays *s, int64_t id, struct error *err) {
     struct present now;
     int64_t number = 0;
-    enum status status = transition_look(store, id, &now, err);
+    enum status status = transition_read(store, id, &now, err);
     now.ending = ENDING_RESTARTED;
     while (status == STATUS_OK) {
         status = sql_int(&store->sql, 0, &number, err,
@@ -65,7 +65,7 @@ static enum status end_all_strays(struct store *store, void *what, int64_t *chan
 
 static enum status requeue_one(struct store *store, int64_t id, struct error *err) {
     struct present now;
-    enum status status = transition_look(store, id, &now, err);
+    enum status status = transition_read(store, id, &now, err);
     now.ending = ENDING_RESTARTED;
     if (status == STATUS_OK)
         status = sql_run(&store->sql, err, "UPDATE jobs SET disk_bytes = -1 WHERE id = ?", "i", id);

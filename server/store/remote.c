@@ -148,13 +148,14 @@ enum status store_remote_submitted(struct store *store, int64_t job_id, int numb
 /* Inside a transaction: the reason that a running job shows. */
 static enum status tell_job(struct store *store, int64_t job_id, const char *reason, struct error *err) {
     struct present now;
-    enum status status = transition_look(store, job_id, &now, err);
+    enum status status = transition_read(store, job_id, &now, err);
     if (status == STATUS_OK)
         status =
             sql_run(&store->sql, err,
                     "UPDATE jobs SET revision = revision + 1, reason = ?1, hint = '' WHERE id = ?2 AND reason <> ?1",
                     "ti", reason, job_id);
-    return status == STATUS_OK && sql_changes(&store->sql) > 0 ? transition_tell(store, &now, reason, "", err) : status;
+    return status == STATUS_OK && sql_changes(&store->sql) > 0 ? transition_append_event(store, &now, reason, "", err)
+                                                               : status;
 }
 
 /* The wait in the site's queue is none of the job's running time. One that is split began with its first attempt. */

@@ -8,7 +8,8 @@
 #include "common/mem.h"
 #include "server/store/internal.h"
 
-enum status store_keep(struct store *store, int64_t scene_ms, int64_t job_ms, int64_t upload_ms, struct error *err) {
+enum status store_retention_set_periods(struct store *store, int64_t scene_ms, int64_t job_ms, int64_t upload_ms,
+                                        struct error *err) {
     enum status status =
         store_begin_freeing(store, err); /* a daemon that cannot do this never starts to free anything */
     if (status != STATUS_OK)
@@ -18,7 +19,7 @@ enum status store_keep(struct store *store, int64_t scene_ms, int64_t job_ms, in
     return store_end(store, status, STORE_NOTHING_CHANGED, err);
 }
 
-enum status store_keep_empty(struct store *store, int64_t upload_ms, struct error *err) {
+enum status store_retention_set_empty_upload(struct store *store, int64_t upload_ms, struct error *err) {
     enum status status = store_begin_freeing(store, err);
     if (status != STATUS_OK)
         return status;

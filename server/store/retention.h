@@ -21,10 +21,11 @@
 struct store;
 
 /* The periods of rule 2; 0: no limit (not for uploads). Call once, before anything is listed. */
-enum status store_keep(struct store *store, int64_t scene_ms, int64_t job_ms, int64_t upload_ms, struct error *err);
+enum status store_retention_set_periods(struct store *store, int64_t scene_ms, int64_t job_ms, int64_t upload_ms,
+                                        struct error *err);
 
 /* The same for an upload of which no byte has arrived. */
-enum status store_keep_empty(struct store *store, int64_t upload_ms, struct error *err);
+enum status store_retention_set_empty_upload(struct store *store, int64_t upload_ms, struct error *err);
 
 enum keep_pin { KEEP_PIN_AS_IS, KEEP_PIN_ON, KEEP_PIN_OFF };
 /* A change for one thing; all zeros change nothing. */

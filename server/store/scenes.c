@@ -130,8 +130,8 @@ static enum status conclude(struct store *store, const char *id, const char *rea
     return store_end(store, status, 0, err);
 }
 
-enum status store_scene_tell(struct store *store, const char *id, const char *reading, const char *facts,
-                             struct error *err) {
+enum status store_scene_set_facts(struct store *store, const char *id, const char *reading, const char *facts,
+                                  struct error *err) {
     int64_t overtaken = 0;
     enum status status = store_begin(store, err);
     if (status != STATUS_OK)

@@ -90,8 +90,8 @@ enum status store_scene_add(struct store *store, const char *id, const char *nam
 enum status store_scene_ready(struct store *store, const char *id, const char *reading, const char *facts,
                               struct error *err);
 /* Facts known by now of a scene that is being checked, by the same rule; of any other nothing is entered. */
-enum status store_scene_tell(struct store *store, const char *id, const char *reading, const char *facts,
-                             struct error *err);
+enum status store_scene_set_facts(struct store *store, const char *id, const char *reading, const char *facts,
+                                  struct error *err);
 enum status store_scene_reject(struct store *store, const char *id, const char *reading, const char *problems,
                                const char *facts, struct error *err);
 /* As seen by a caller who may read everything and owns nothing. */

@@ -7,7 +7,7 @@
 #include "common/mem.h"
 #include "common/protocol.h"
 
-enum status transition_look(struct store *store, int64_t id, struct present *now, struct error *err) {
+enum status transition_read(struct store *store, int64_t id, struct present *now, struct error *err) {
     sqlite3_stmt *stmt;
     bool found = false;
     enum status status = sql_first(&store->sql, &stmt, &found, err,
@@ -30,7 +30,7 @@ enum status transition_look(struct store *store, int64_t id, struct present *now
 static enum status begun(struct store *store, enum status status, int64_t id, struct present *now, struct error *err) {
     if (status != STATUS_OK)
         return status;
-    status = transition_look(store, id, now, err);
+    status = transition_read(store, id, now, err);
     return status == STATUS_OK ? status : store_end(store, status, STORE_NOTHING_CHANGED, err);
 }
 
@@ -50,8 +50,8 @@ enum status transition_forbidden(const struct present *now, const char *action, 
                      job_state_name(now->state), action);
 }
 
-enum status transition_tell(struct store *store, const struct present *now, const char *reason, const char *hint,
-                            struct error *err) {
+enum status transition_append_event(struct store *store, const struct present *now, const char *reason,
+                                    const char *hint, struct error *err) {
     cJSON *data = cJSON_CreateObject();
     json_add_string(data, "state", job_state_name(now->state)); /* the event's row has the attempt */
     if (now->wanted != JOB_WANT_RUN)
@@ -102,7 +102,7 @@ enum status transition_move(struct store *store, struct present *now, enum job_s
             "nnnttii", (int)to, now->attempt, now->attempts_left, reason, hint, job_is_terminal(to) ? at : (int64_t)0,
             now->id);
     if (status == STATUS_OK)
-        status = transition_tell(store, now, reason, hint, err);
+        status = transition_append_event(store, now, reason, hint, err);
     return status == STATUS_OK ? store_webhook_post(store, now->id, now->attempt, job_state_name(to), reason, hint, err)
                                : status;
 }

@@ -17,7 +17,7 @@ struct present {
 };
 
 /* Inside a transaction: reads the job. */
-enum status transition_look(struct store *store, int64_t id, struct present *now, struct error *err);
+enum status transition_read(struct store *store, int64_t id, struct present *now, struct error *err);
 /* Locks, begins and reads the job. On an error everything is undone already. */
 enum status transition_begin(struct store *store, int64_t id, struct present *now, struct error *err);
 /* The same for what stops work, and works on a full disk. */
@@ -28,8 +28,8 @@ enum status transition_forbidden(const struct present *now, const char *action, 
 enum status transition_move(struct store *store, struct present *now, enum job_state to, const char *reason,
                             const char *hint, struct error *err);
 /* Appends the state's event. */
-enum status transition_tell(struct store *store, const struct present *now, const char *reason, const char *hint,
-                            struct error *err);
+enum status transition_append_event(struct store *store, const struct present *now, const char *reason,
+                                    const char *hint, struct error *err);
 
 /* attempts.c: */
 
@@ -56,7 +56,7 @@ struct part_verdict {
 };
 enum status part_verdict(struct store *store, int64_t id, struct part_verdict *verdict, struct error *err);
 /* Appends an event of the log that says how the attempt of a part has ended, or, for part 0, that there are parts. */
-enum status part_tell(struct store *store, const struct present *now, enum job_state to, const char *reason,
-                      struct error *err);
+enum status part_append_event(struct store *store, const struct present *now, enum job_state to, const char *reason,
+                              struct error *err);
 
 #endif

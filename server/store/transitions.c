@@ -19,7 +19,7 @@ static enum status record_request(struct store *store, struct present *now, enum
     now->wanted = wanted;
     enum status status = sql_run(&store->sql, err, "UPDATE jobs SET revision = revision + 1, wanted = ? WHERE id = ?",
                                  "ni", (int)wanted, now->id);
-    return status == STATUS_OK ? transition_tell(store, now, "", "", err) : status;
+    return status == STATUS_OK ? transition_append_event(store, now, "", "", err) : status;
 }
 
 /* --- what users ask ---------------------------------------------------------------------- */

@@ -164,8 +164,8 @@ enum status store_upload_finish(struct store *store, const char *id, const char 
     return end_change(store, status, id, err);
 }
 
-enum status store_upload_keep(struct store *store, const char *id, const struct retention *retention,
-                              struct error *err) {
+enum status store_upload_set_retention(struct store *store, const char *id, const struct retention *retention,
+                                       struct error *err) {
     enum status status = store_begin(store, err);
     if (status != STATUS_OK)
         return status;

@@ -53,8 +53,8 @@ enum status store_upload_begin(struct store *store, const char *id, const char *
 enum status store_upload_advance(struct store *store, const char *id, uint64_t received, const void *hash,
                                  size_t hash_size, struct error *err);
 enum status store_upload_finish(struct store *store, const char *id, const char *scene_id, struct error *err);
-enum status store_upload_keep(struct store *store, const char *id, const struct retention *retention,
-                              struct error *err);
+enum status store_upload_set_retention(struct store *store, const char *id, const struct retention *retention,
+                                       struct error *err);
 enum status store_upload_delete(struct store *store, const char *id, struct error *err);
 
 #endif

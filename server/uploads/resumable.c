@@ -238,7 +238,7 @@ enum status resumable_status(struct resumables *r, const char *id, struct upload
     return status == STATUS_OK ? store_upload_get(r->config.store, id, row, NULL, 0, err) : status;
 }
 
-enum status resumable_forget(struct resumables *r, const char *id, struct error *err) {
+enum status resumable_remove_files(struct resumables *r, const char *id, struct error *err) {
     char *path = layout_upload(NULL, id);
     upload_session_mark_gone(r, id);
     enum status status = trash_take(r->config.folder->trash, path, err);
@@ -248,5 +248,5 @@ enum status resumable_forget(struct resumables *r, const char *id, struct error 
 
 enum status resumable_remove(struct resumables *r, const char *id, struct error *err) {
     enum status status = store_upload_delete(r->config.store, id, err);
-    return status == STATUS_OK ? resumable_forget(r, id, err) : status;
+    return status == STATUS_OK ? resumable_remove_files(r, id, err) : status;
 }

@@ -43,6 +43,6 @@ enum status resumable_status(struct resumables *r, const char *id, struct upload
 /* Removes the upload and its file, even while somebody writes to it. */
 enum status resumable_remove(struct resumables *r, const char *id, struct error *err);
 /* The same where the row is gone already. */
-enum status resumable_forget(struct resumables *r, const char *id, struct error *err);
+enum status resumable_remove_files(struct resumables *r, const char *id, struct error *err);
 
 #endif

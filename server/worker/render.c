@@ -87,7 +87,7 @@ static void announce(struct render_run *run, const char *type, const char *name,
 
 static bool should_stop(void *user) {
     struct render_run *run = user;
-    return requests_look(&run->requests) || run->status != STATUS_OK || over_share(run);
+    return requests_poll(&run->requests) || run->status != STATUS_OK || over_share(run);
 }
 
 static void tell_progress(void *user, double done, double total) {

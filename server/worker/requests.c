@@ -32,7 +32,7 @@ static bool hung_up(struct requests *r) {
     return poll(&pipe, 1, 0) == 1 && (pipe.revents & POLLERR);
 }
 
-bool requests_look(struct requests *r) {
+bool requests_poll(struct requests *r) {
     static const struct timespec at_once = {0, 0};
     sigset_t set;
     int number;

@@ -17,6 +17,6 @@ struct requests {
 /* Blocks the signals. Before the first thread, which inherits that. */
 void requests_init(struct requests *r, int pipe_fd);
 /* Looks for requests; returns r->stop. Costs a system call or two. */
-bool requests_look(struct requests *r);
+bool requests_poll(struct requests *r);
 
 #endif

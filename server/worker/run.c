@@ -64,7 +64,7 @@ struct worker_run {
 
 static bool stop_requested(void *user) {
     struct worker_run *run = user;
-    return requests_look(&run->requests);
+    return requests_poll(&run->requests);
 }
 
 static bool checkpoint_due(void *user) {

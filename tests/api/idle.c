@@ -15,7 +15,7 @@ static enum status obey(struct rig *rig, const char *line, struct error *err) {
     if (strncmp(line, "ready ", 6) == 0)
         return store_scene_ready(rig->store, RIG_SCENE, NULL, line + 6, err);
     if (strncmp(line, "tell ", 5) == 0)
-        return store_scene_tell(rig->store, RIG_SCENE, NULL, line + 5, err);
+        return store_scene_set_facts(rig->store, RIG_SCENE, NULL, line + 5, err);
     if (strncmp(line, "reject ", 7) == 0)
         return store_scene_reject(rig->store, RIG_SCENE, NULL, line + 7, "{}", err);
     int count = sscanf(line, "%15s %lld %d", word, &job, &attempt);

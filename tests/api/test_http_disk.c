@@ -77,7 +77,7 @@ static void check_collector(void) {
     struct collector *collector = NULL;
     int64_t job = rig_job(&rig);
     rig_must(store_job_cancel(rig.store, job, &err), &err, "store_job_cancel");
-    rig_must(store_keep(rig.store, 0, 1, 3600000, &err), &err, "store_keep");
+    rig_must(store_retention_set_periods(rig.store, 0, 1, 3600000, &err), &err, "store_retention_set_periods");
     system_break(" pthread_create ", EAGAIN);
     CHECK(collector_start(&collector, &rig.api->collector_config, 0.01, &err) == STATUS_IO && collector == NULL);
     CHECK_THAT(strstr(err.message, "cannot start the thread"), "%s", err.message);
@@ -92,7 +92,7 @@ static void check_collector(void) {
         usleep(10000);
     CHECK(!is_there(job));
     collector_stop(collector);
-    rig_must(store_keep(rig.store, 0, 0, 3600000, &err), &err, "store_keep");
+    rig_must(store_retention_set_periods(rig.store, 0, 0, 3600000, &err), &err, "store_retention_set_periods");
 }
 
 /* --- a large upload --------------------------------------------------------------------------------- */

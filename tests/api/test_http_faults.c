@@ -112,7 +112,7 @@ static void expired_things(void) {
     new_upload();
     unused_scene();
     ended_job();
-    rig_must(store_keep(rig.store, 1, 1, 1, &err), &err, "store_keep");
+    rig_must(store_retention_set_periods(rig.store, 1, 1, 1, &err), &err, "store_retention_set_periods");
     usleep(3000);
 }
 
@@ -343,7 +343,7 @@ int main(void) {
     check_metadata();
     check_garbled();
     calls += strike_all(true) + strike_all(false);
-    rig_must(store_keep(rig.store, 0, 0, 3600000, &err), &err, "store_keep");
+    rig_must(store_retention_set_periods(rig.store, 0, 0, 3600000, &err), &err, "store_retention_set_periods");
     rig_must(store_token_add(rig.store, "root", ROLE_ADMIN, 0, token, &id, &err), &err, "token");
     snprintf(token_field, sizeof token_field, "Authorization: Bearer %s\r\n", token);
     snprintf(login, sizeof login, "{\"token\":\"%s\"}", token);

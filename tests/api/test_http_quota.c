@@ -185,7 +185,7 @@ static void test_age(void) {
     rig_must(store_upload_advance(rig.store, begun, 1, hash, 10, &err), &err, "store_upload_advance");
     rig_must(collector_run(&rig.api->collector_config, false, NULL, NULL, &err), &err, "collector_run");
     CHECK(is_there(empty) && is_there(begun));
-    rig_must(store_keep_empty(rig.store, 1, &err), &err, "store_keep_empty");
+    rig_must(store_retention_set_empty_upload(rig.store, 1, &err), &err, "store_retention_set_empty_upload");
     usleep(5000);
     rig_must(collector_run(&rig.api->collector_config, false, NULL, NULL, &err), &err, "collector_run");
     CHECK(!is_there(empty) && is_there(begun));

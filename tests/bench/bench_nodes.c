@@ -140,7 +140,7 @@ static void say(struct attempt_link *l, const char *format, ...) {
     va_start(arguments, format);
     int length = vsnprintf(line, sizeof line, format, arguments);
     va_end(arguments);
-    link_say(l, line, (size_t)length);
+    link_add_line(l, line, (size_t)length);
 }
 
 /* Sends a file of so many bytes. */
@@ -176,7 +176,7 @@ static enum status work(struct attempt_link *l, struct error *why) {
         status = send_file(l, "outputs", "base_color.exr", "", OUTPUT_BYTES, hex, why);
     say(l, "{\"type\":\"output\",\"name\":\"base_color.exr\",\"sha256\":\"%s\",\"bytes\":%d}", hex, OUTPUT_BYTES);
     say(l, "{\"type\":\"end\",\"status\":\"ok\",\"message\":\"\"}");
-    while (status == STATUS_OK && !link_has_said_all(l) && link_state(l) == LINK_OPEN)
+    while (status == STATUS_OK && !link_all_lines_sent(l) && link_state(l) == LINK_OPEN)
         link_report(l, JOB_SEC, true);
     return status;
 }

@@ -74,8 +74,8 @@ static enum status patch_scene(void) {
 static enum status read_scene_otherwise(void) {
     return store_scene_patch(store, &alice, SCENE_A, &(struct scene_patch){.reading = "{\"axes\":\"opencv\"}"}, &err);
 }
-static enum status tell_overtaken(void) { return store_scene_tell(store, SCENE_A, "{}", "{\"a\":1}", &err); }
-static enum status tell_checking(void) { return store_scene_tell(store, SCENE_A, NULL, "{\"b\":2}", &err); }
+static enum status tell_overtaken(void) { return store_scene_set_facts(store, SCENE_A, "{}", "{\"a\":1}", &err); }
+static enum status tell_checking(void) { return store_scene_set_facts(store, SCENE_A, NULL, "{\"b\":2}", &err); }
 static enum status conclude_overtaken(void) { return store_scene_ready(store, SCENE_A, "{}", "{}", &err); }
 static enum status access_scene(void) {
     enum access access;
@@ -361,11 +361,11 @@ static enum status begin_upload(void) { return store_upload_begin(store, UPLOAD,
 static enum status advance_upload(void) { return store_upload_advance(store, UPLOAD, 7, "mesh", 4, &err); }
 static enum status finish_upload(void) { return store_upload_finish(store, UPLOAD, SCENE_A, &err); }
 static enum status keep_upload(void) {
-    return store_upload_keep(store, UPLOAD, &(struct retention){.pin = KEEP_PIN_ON}, &err);
+    return store_upload_set_retention(store, UPLOAD, &(struct retention){.pin = KEEP_PIN_ON}, &err);
 }
 static enum status delete_upload(void) { return store_upload_delete(store, UPLOAD, &err); }
 
-static enum status keep(void) { return store_keep(store, 1, 1, 1, &err); }
+static enum status keep(void) { return store_retention_set_periods(store, 1, 1, 1, &err); }
 static enum status list_expired(void) {
     struct expired *list;
     size_t count;

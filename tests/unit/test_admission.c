@@ -58,7 +58,7 @@ static void expect_reason(int64_t id, const char *wanted) {
 static bool ask(struct admission *a, int64_t id, size_t running, double used) {
     bool may;
     double need;
-    OK(admission_ask(a, store, id, running, used, &may, &need, &err));
+    OK(admission_decide(a, store, id, running, used, &may, &need, &err));
     CHECK_NEAR(need, GIB, 0.5);
     return may;
 }
@@ -106,11 +106,11 @@ static void test_ask(void) {
     OK(store_job_start(store, ids[1], "process", &number, &err));
     expect_reason(ids[1], "");
     /* One that is gone is nobody's. */
-    OK(admission_ask(&a, store, 777, 1, GIB, &may, &need, &err));
+    OK(admission_decide(&a, store, 777, 1, GIB, &may, &need, &err));
     CHECK(may && need == 0.0);
     /* Where the store fails, nobody is let in by mistake. */
     strike_sql("FROM jobs", 1, true);
-    CHECK(admission_ask(&a, store, ids[2], 1, GIB, &may, &need, &err) != STATUS_OK);
+    CHECK(admission_decide(&a, store, ids[2], 1, GIB, &may, &need, &err) != STATUS_OK);
     CHECK(lift());
     /* Without a limit it is the machine that has one. */
     admission_init(&a, 0, 0);
@@ -139,7 +139,7 @@ static double more_with(int64_t source, const char *settings, const char *file, 
         OK(store_job_add(store, &new, 1000, &id, &replayed, &err));
         if (i == 1)
             OK(store_job_file_put(store, id, file, bytes, HEX, NULL, &queued, &err));
-        OK(admission_ask(&a, store, id, 1, 0.0, &may, &need[i], &err));
+        OK(admission_decide(&a, store, id, 1, 0.0, &may, &need[i], &err));
     }
     return need[1] - need[0];
 }

@@ -80,7 +80,7 @@ static void test_rule(void) {
         positions_append(&p, (double[3]){0.0, table[i].lower, 0.0});
         positions_append(&p, (double[3]){NAN, -1e9, 1e9}); /* of no triangle */
         positions_append(&p, (double[3]){0.0, table[i].upper, 0.0});
-        positions_settle(&p, &mesh);
+        positions_move_to_mesh(&p, &mesh);
         double wanted = table[i].lower - table[i].offset;
         CHECK_THAT(mesh.offset[1] == table[i].offset, "case %zu: %.17g", i, mesh.offset[1]);
         CHECK(mesh.offset[0] == 0.0 && mesh.offset[2] == 0.0 && mesh.vertex_count == 3);

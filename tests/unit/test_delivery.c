@@ -79,7 +79,7 @@ static enum status start(struct delivery *d, struct error *why) {
 }
 
 static void wait_for(struct delivery *d) {
-    while (!delivery_listen(d, store))
+    while (!delivery_poll(d, store))
         usleep(1000);
 }
 
@@ -116,9 +116,9 @@ static bool end_once(bool is_sql, long n, bool stays) {
     OK(start(&d, &err));
     strike(is_sql, n, stays);
     for (int i = 0; i < 60000 && !d.has_ended && d.id; i++, usleep(1000))
-        delivery_listen(&d, store);
+        delivery_poll(&d, store);
     if (d.id)
-        delivery_listen(&d, store);
+        delivery_poll(&d, store);
     bool struck = lift();
     CHECK(d.id == 0 || (d.has_ended && d.delivered));
     CHECK_THAT(log_count("outcome cannot be recorded") <= 1, "call %ld: the log is filled", n);

@@ -1,4 +1,4 @@
-/* test_disk.c -- when the disk counts as nearly full, and when no more: not by the same figure, lest jobs stop and go
+/* test_disk_watch.c -- when the disk counts as nearly full, and when no more: not by the same figure, lest jobs stop and go
  * on all the time. */
 #include "server/job/disk_watch.h"
 

@@ -40,12 +40,12 @@ static void check_readers(void) {
     struct guarded *c = guard_add(g, ends[0]);
     guard_enter(g, c, GUARD_REPLY);
     double now = clock_sec();
-    guard_look(g, now + 1000);
-    guard_look(g, now + 9000);
+    guard_check_all(g, now + 1000);
+    guard_check_all(g, now + 9000);
     CHECK(guard_shut_count(g) == 0); /* nothing waits: the daemon itself is slow */
     while (send(ends[0], chunk, sizeof chunk, MSG_DONTWAIT) > 0)
         ;
-    guard_look(g, now + 10000); /* a window begins */
+    guard_check_all(g, now + 10000); /* a window begins */
     size_t taken = 0;
     while (taken < 400000) { /* enough for 3,000 s at 10 bytes/s, and for the kernel to notice */
         ssize_t got = recv(ends[1], chunk, sizeof chunk, 0);
@@ -53,13 +53,13 @@ static void check_readers(void) {
         if (send(ends[0], chunk, sizeof chunk, MSG_DONTWAIT) < 0)
             continue;
     }
-    guard_look(g, now + 12000);
+    guard_check_all(g, now + 12000);
     CHECK(guard_shut_count(g) == 0);
-    guard_look(g, now + 13001);
+    guard_check_all(g, now + 13001);
     CHECK(guard_shut_count(g) == 0);
-    guard_look(g, now + 16000);
+    guard_check_all(g, now + 16000);
     CHECK(guard_shut_count(g) == 0);
-    guard_look(g, now + 16002); /* nothing was taken over a whole window */
+    guard_check_all(g, now + 16002); /* nothing was taken over a whole window */
     CHECK(guard_shut_count(g) == 1);
     guard_remove(g, c);
     close(ends[0]);
@@ -87,30 +87,30 @@ int main(void) {
     guard_enter(g, c[3], GUARD_IDLE);
     guard_enter(g, c[4], GUARD_SHORT_BODY);
 
-    guard_look(g, now + 990);
+    guard_check_all(g, now + 990);
     CHECK(guard_shut_count(g) == 0);
-    guard_look(g, now + 1010); /* the head took too long */
+    guard_check_all(g, now + 1010); /* the head took too long */
     CHECK(is_shut(ends[0][1]) && guard_shut_count(g) == 1);
-    guard_look(g, now + 1020); /* and is counted once */
+    guard_check_all(g, now + 1020); /* and is counted once */
     CHECK(guard_shut_count(g) == 1);
 
     guard_body(g, c[1], 31000); /* more than 10 bytes/s over the first window */
     guard_body(g, c[4], 100000);
-    guard_look(g, now + 3010);
+    guard_check_all(g, now + 3010);
     CHECK(!is_shut(ends[1][1]));
     guard_body(g, c[1], 29000); /* less over the second */
     guard_body(g, c[4], 100000);
-    guard_look(g, now + 4990);
+    guard_check_all(g, now + 4990);
     CHECK(!is_shut(ends[4][1])); /* fast enough, and not yet too long */
     guard_body(g, c[4], 100000);
-    guard_look(g, now + 5010);
+    guard_check_all(g, now + 5010);
     CHECK(is_shut(ends[4][1]) && guard_shut_count(g) == 2);
-    guard_look(g, now + 6000);
+    guard_check_all(g, now + 6000);
     CHECK(!is_shut(ends[1][1]));
     CHECK(!is_shut(ends[3][1])); /* idle may last its time and a head's */
-    guard_look(g, now + 6020);
+    guard_check_all(g, now + 6020);
     CHECK(is_shut(ends[1][1]) && is_shut(ends[3][1]));
-    guard_look(g, now + 1e9);
+    guard_check_all(g, now + 1e9);
     CHECK(!is_shut(ends[2][1]) && guard_shut_count(g) == 4); /* no TCP: a reply has no deadline */
 
     for (int i = 0; i < 5; i++) {

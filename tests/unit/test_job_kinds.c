@@ -73,7 +73,7 @@ static void check_sources(void) {
         CHECK(strstr(err.message, "reads the outputs"));
         IS(store_job_retry(store, source, 2, "report", NULL, &err), STATUS_CONFLICT);
         IS(store_job_extend(store, source, 2, "{}", NULL, &err), STATUS_CONFLICT);
-        OK(store_keep(store, 1, 1, 1, &err)); /* everything expires a millisecond after its end */
+        OK(store_retention_set_periods(store, 1, 1, 1, &err)); /* everything expires a millisecond after its end */
         OK(store_job_get(store, source, &job, &err));
         CHECK(job.expires_ms == 0);
         job_release(&job);
@@ -85,7 +85,7 @@ static void check_sources(void) {
     OK(store_job_get(store, source, &job, &err));
     CHECK(job.expires_ms > 0);
     job_release(&job);
-    OK(store_keep(store, 0, 0, 86400000, &err));
+    OK(store_retention_set_periods(store, 0, 0, 86400000, &err));
     OK(store_job_delete(store, source, &err));
     IS(store_job_retry(store, render, 2, "render", NULL, &err), STATUS_CONFLICT);
     CHECK_THAT(strstr(err.message, "there is no job"), "%s", err.message);

@@ -1,4 +1,4 @@
-/* test_memory.c -- what an attempt gets after one that ran out of memory. */
+/* test_memory_reduction.c -- what an attempt gets after one that ran out of memory. */
 #include "server/job/memory_reduction.h"
 
 #include "common/error.h"

@@ -91,22 +91,22 @@ static void test_undo(void) {
     applied_transform_settle(&t, "transforms.json", "mesh.ply", NULL, &f);
     CHECK(t.has_applied && f.warning_count == 1 && strstr(f.warning[0], "needs coordinates=capture"));
     /* As the user says, or the check of fit finds; and back. */
-    CHECK(t.other_count == 1 && frames_settle_coordinates(&t, "capture", NULL, NULL) == STATUS_OK);
+    CHECK(t.other_count == 1 && frames_choose_coordinates(&t, "capture", NULL, NULL) == STATUS_OK);
     check_undone(&frame.world_from_camera);
-    CHECK(frames_settle_coordinates(&t, "capture", NULL, NULL) == STATUS_OK);
+    CHECK(frames_choose_coordinates(&t, "capture", NULL, NULL) == STATUS_OK);
     check_undone(&frame.world_from_camera);
-    CHECK(frames_settle_coordinates(&t, "file", NULL, NULL) == STATUS_OK);
+    CHECK(frames_choose_coordinates(&t, "file", NULL, NULL) == STATUS_OK);
     for (int i = 0; i < 3; i++)
         CHECK_NEAR(frame.world_from_camera.translation[i], stored.translation[i], 1e-12);
     struct error err;
-    CHECK(frames_settle_coordinates(&t, "chunk", NULL, &err) == STATUS_INPUT);
+    CHECK(frames_choose_coordinates(&t, "chunk", NULL, &err) == STATUS_INPUT);
     CHECK_THAT(strstr(err.message, "only \"file\", \"capture\""), "%s", err.message);
     t.other_count = 0;
     /* By the mesh's name; it may be wrong, so the file's are known. */
     applied_transform_settle(&t, "transforms.json", "a/scene_dense_mesh.ply", NULL, &f);
     CHECK(!t.has_applied && f.warning_count == 2 && strstr(f.warning[1], "were turned back"));
     check_undone(&frame.world_from_camera);
-    CHECK(t.other_count == 1 && frames_settle_coordinates(&t, "file", NULL, NULL) == STATUS_OK);
+    CHECK(t.other_count == 1 && frames_choose_coordinates(&t, "file", NULL, NULL) == STATUS_OK);
     for (int i = 0; i < 3; i++)
         CHECK_NEAR(frame.world_from_camera.translation[i], stored.translation[i], 1e-12);
     t.has_applied = true;

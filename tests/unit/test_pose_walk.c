@@ -120,7 +120,7 @@ static void test_learnt(double precision, double turn, double move) {
         for (int k = 0; k < POSE_UNKNOWNS; k++)
             block[f][k][k] = sqrt(precision);
     }
-    pose_walk_learn(&chain.solver, block);
+    pose_walk_update_variances(&chain.solver, block);
     double px = 2.0 / precision / 2.0; /* both ends, over two places, pixels^2 */
     double turn_goal = turn * turn + px / (FOCAL * FOCAL),
            move_goal = move * move + px * DEPTH * DEPTH / (FOCAL * FOCAL);

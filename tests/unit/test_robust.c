@@ -62,12 +62,12 @@ static void test_keep(void) {
     struct robust_sample sample[SAMPLES];
     for (int i = 0; i < SAMPLES; i++)
         sample[i] = sample_of(i % 3 == 0 ? 0.1f : i % 3 == 1 ? 1.0f : 1.2f, i % 3 == 0 ? 100.0f : 1.0f, 0.0f);
-    size_t kept = robust_keep(sample, SAMPLES, 0.5f);
+    size_t kept = robust_select(sample, SAMPLES, 0.5f);
     CHECK(kept == 27);
     for (size_t i = 0; i < kept; i++)
         CHECK(sample[i].weight == 1.0f);
     struct robust_sample one = sample_of(3.0f, 1.0f, 0.1f);
-    CHECK(robust_keep(&one, 1, 0.5f) == 1);
+    CHECK(robust_select(&one, 1, 0.5f) == 1);
     CHECK_NEAR(robust_mean(&one, 1, SCALE).r, 3.0f, 1e-6f);
 }
 

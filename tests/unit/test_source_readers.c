@@ -247,38 +247,38 @@ static void test_geocentric(struct frames *t) {
     CHECK_NEAR(sqrt(distance), scale * sqrt(camera[0] * camera[0] + camera[1] * camera[1] + camera[2] * camera[2]),
                1e-3);
     double height = sqrt(at[0] * at[0] + at[1] * at[1] + at[2] * at[2]);
-    CHECK(frames_settle_coordinates(t, "local", NULL, NULL) == STATUS_OK);
+    CHECK(frames_choose_coordinates(t, "local", NULL, NULL) == STATUS_OK);
     double across = sqrt(at[0] * at[0] + at[1] * at[1] + at[2] * at[2]);
     CHECK_NEAR(across, sqrt(distance), 1e-6);
     /* Up is away from the Earth's centre, but for a fifth of a degree. */
     double middle = sqrt(origin[0] * origin[0] + origin[1] * origin[1] + origin[2] * origin[2]);
     CHECK_NEAR(at[2], height - middle, 0.0034 * across + 1e-3);
-    CHECK(frames_settle_coordinates(t, "chunk", NULL, NULL) == STATUS_OK);
+    CHECK(frames_choose_coordinates(t, "chunk", NULL, NULL) == STATUS_OK);
     for (int i = 0; i < 3; i++)
         CHECK_NEAR(at[i], camera[i], 1e-6);
     /* By a mesh about the cameras in one of them. */
-    CHECK(frames_settle_coordinates(t, "file", NULL, NULL) == STATUS_OK);
+    CHECK(frames_choose_coordinates(t, "file", NULL, NULL) == STATUS_OK);
     vec3 corner[2] = {{-8.0f, -8.0f, -8.0f}, {8.0f, 8.0f, 8.0f}};
     uint32_t index[1][3] = {{0, 1, 0}};
     mesh.position = corner;
     mesh.vertex_count = 2;
     mesh.index = index;
     mesh.triangle_count = 1;
-    CHECK(frames_settle_coordinates(t, NULL, &mesh, NULL) == STATUS_OK);
+    CHECK(frames_choose_coordinates(t, NULL, &mesh, NULL) == STATUS_OK);
     CHECK_STRING(t->coordinates, "chunk");
     memcpy(mesh.offset, origin, sizeof origin);
-    CHECK(frames_settle_coordinates(t, NULL, &mesh, NULL) == STATUS_OK);
+    CHECK(frames_choose_coordinates(t, NULL, &mesh, NULL) == STATUS_OK);
     CHECK_STRING(t->coordinates, "file");
     CHECK(!t->stands_apart);
-    CHECK(frames_settle_coordinates(t, "projected", NULL, NULL) == STATUS_OK);
+    CHECK(frames_choose_coordinates(t, "projected", NULL, NULL) == STATUS_OK);
     for (int i = 0; i < 3; i++)
         mesh.offset[i] = round(at[i]);
     CHECK(mesh.offset[0] > 2e5 && mesh.offset[0] < 8e5 && mesh.offset[1] > 4.3e6 && mesh.offset[1] < 4.5e6);
-    CHECK(frames_settle_coordinates(t, "file", NULL, NULL) == STATUS_OK);
-    CHECK(frames_settle_coordinates(t, NULL, &mesh, NULL) == STATUS_OK);
+    CHECK(frames_choose_coordinates(t, "file", NULL, NULL) == STATUS_OK);
+    CHECK(frames_choose_coordinates(t, NULL, &mesh, NULL) == STATUS_OK);
     CHECK_STRING(t->coordinates, "projected");
     mesh.offset[0] += 1e5; /* another system, say */
-    CHECK(frames_settle_coordinates(t, NULL, &mesh, NULL) == STATUS_OK && t->stands_apart);
+    CHECK(frames_choose_coordinates(t, NULL, &mesh, NULL) == STATUS_OK && t->stands_apart);
 }
 
 static void test_metashape(void) {

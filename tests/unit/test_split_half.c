@@ -101,9 +101,9 @@ static void test_keep(void) {
     for (uint32_t i = 0; i < 5; i++)
         sample[i] =
             (struct robust_sample){.gray = logf(value[i]), .weight = value[i] < 0.5f ? 10.0f : 1.0f, .source = i};
-    CHECK(robust_keep(sample, 5, 0.7f) == 3);
+    CHECK(robust_select(sample, 5, 0.7f) == 3);
     CHECK(sample[0].source == 0 && sample[1].source == 4 && sample[2].source == 2);
-    CHECK(robust_keep(sample, 1, 0.7f) == 1);
+    CHECK(robust_select(sample, 1, 0.7f) == 1);
 }
 
 int main(void) {

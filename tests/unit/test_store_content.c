@@ -157,12 +157,12 @@ static void test_reading(void) {
     OK(store_scene_reject(store, SCENE_A, "{}", "[{\"file\":\"a\"}]", "{}", &err));
     OK(store_scene_postpone(store, SCENE_A, "{}", "[{\"file\":\"a\"}]", &err));
     check_scene(store, SCENE_CHECKING, OPENCV, "{}");
-    OK(store_scene_tell(store, SCENE_A, "{}", "{\"n\":1}", &err)); /* overtaken, too */
+    OK(store_scene_set_facts(store, SCENE_A, "{}", "{\"n\":1}", &err)); /* overtaken, too */
     check_scene(store, SCENE_CHECKING, OPENCV, "{}");
-    OK(store_scene_tell(store, SCENE_A, OPENCV, "{\"n\":0}", &err)); /* seen while it is checked */
+    OK(store_scene_set_facts(store, SCENE_A, OPENCV, "{\"n\":0}", &err)); /* seen while it is checked */
     check_scene(store, SCENE_CHECKING, OPENCV, "{\"n\":0}");
     OK(store_scene_reject(store, SCENE_A, OPENCV, "[{\"file\":\"a\"}]", "{\"warnings\":[\"w\"]}", &err));
-    OK(store_scene_tell(store, SCENE_A, OPENCV, "{\"n\":0}", &err)); /* too late */
+    OK(store_scene_set_facts(store, SCENE_A, OPENCV, "{\"n\":0}", &err)); /* too late */
     check_scene(store, SCENE_REJECTED, OPENCV, "{\"warnings\":[\"w\"]}");
     OK(read_as(store, NULL, OPENCV)); /* the same, once more */
     check_scene(store, SCENE_CHECKING, OPENCV, "{}");
@@ -224,7 +224,7 @@ static void test_sent_again(void) {
     sqlite3 *db;
     bool existed;
     OK(store_open(&store, dir, &err));
-    OK(store_keep(store, 1000, 0, 1000, &err));
+    OK(store_retention_set_periods(store, 1000, 0, 1000, &err));
     OK(store_scene_add(store, SCENE_A, "one", 10, 1, &existed, &err));
     OK(store_scene_ready(store, SCENE_A, NULL, "{}", &err));
     store_close(store);
@@ -476,8 +476,8 @@ static void test_expired_no_more(void) {
     size_t count;
     const int64_t later = INT64_MAX / 2;
     OK(store_open(&store, dir, &err));
-    OK(store_keep(store, 1000, 1000, 1000, &err));
-    OK(store_keep_empty(store, 1000, &err));
+    OK(store_retention_set_periods(store, 1000, 1000, 1000, &err));
+    OK(store_retention_set_empty_upload(store, 1000, &err));
     add_ready_scene(store, SCENE_A);
     int64_t id = add_job(store, SCENE_A, 0), used;
     bool existed;
@@ -492,7 +492,7 @@ static void test_expired_no_more(void) {
     const struct retention pinned = {.pin = KEEP_PIN_ON};
     const struct job_patch patch = {.priority = INT_MIN, .shared = -1, .retention = pinned};
     OK(store_job_patch(store, id, -1, &patch, &err));
-    OK(store_upload_keep(store, row.id, &pinned, &err));
+    OK(store_upload_set_retention(store, row.id, &pinned, &err));
     OK(store_scene_patch(store, NULL, SCENE_A, &(struct scene_patch){NULL, pinned, NULL}, &err));
     used = add_job(store, SCENE_B, 0);
     for (size_t i = 0; i < count; i++) {

@@ -213,7 +213,7 @@ void pose_solve(struct pose_solver *s) {
     const struct conjugate_system system = {n, multiply, precondition, &twist};
     preconditioner_init(&twist);
     if (s->walk.is_known && s->walk.is_learnt)
-        pose_walk_learn(s, twist.preconditioner.block);
+        pose_walk_update_variances(s, twist.preconditioner.block);
     multiply_out(&(struct product){.solver = s, .out = r});
     memset(x, 0, twists * sizeof *x);
     for (size_t i = 0; i < twists; i++)

@@ -125,7 +125,7 @@ static void variances_of(const struct pose_frame *frame, double (*factor)[POSE_U
     }
 }
 
-void pose_walk_learn(struct pose_solver *s, double (*block)[POSE_UNKNOWNS][POSE_UNKNOWNS]) {
+void pose_walk_update_variances(struct pose_solver *s, double (*block)[POSE_UNKNOWNS][POSE_UNKNOWNS]) {
     struct pose_walk least = walk_of(s, MIN_PX, MIN_PX);
     double turn = 0.0, move = 0.0, before[2] = {0.0, 0.0};
     for (size_t f = 0; f < s->frames; f++) {

@@ -29,7 +29,7 @@ struct pose_walk pose_walk_begin(const struct pose_solver *s);
 
 /* Improves the variances of s->walk from the frames' totals. block[frames]: lower Cholesky factors of the frames' own
  * equations, the walk included. */
-void pose_walk_learn(struct pose_solver *s, double (*block)[POSE_UNKNOWNS][POSE_UNKNOWNS]);
+void pose_walk_update_variances(struct pose_solver *s, double (*block)[POSE_UNKNOWNS][POSE_UNKNOWNS]);
 
 /* The expected correction of the photograph at place `at` of the order (an index into scene->photograph): on the line
  * between the training photographs around it, beyond the first and the last as theirs. There must be one. */

@@ -114,7 +114,7 @@ static struct response *check_states(struct job_submission *s) {
     if (store_source_check_readable(s->api->store, s->source.id, &err) != STATUS_OK)
         return problem_from(s->r, &err);
     if (s->w.kind == JOB_RENDER) {
-        render_request_look(s->api, &s->render, s->source.id, s->params);
+        render_request_check_room(s->api, &s->render, s->source.id, s->params);
         return cJSON_GetArraySize(s->params) > 0 ? reply_invalid(s) : NULL;
     }
     if (s->scene.state == SCENE_READY && !work_file_has_truth(s->api->config.data_dir, s->scene.id)) {

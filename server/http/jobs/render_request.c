@@ -130,7 +130,7 @@ static cJSON *read_cameras(struct api *api, const cJSON *settings, int64_t sourc
     return render_settings_is(settings, "cameras", "photographs") ? read_output(api, source, OUTPUT_CAMERAS) : NULL;
 }
 
-void render_request_look(struct api *api, struct render_request *q, int64_t source, cJSON *params) {
+void render_request_check_room(struct api *api, struct render_request *q, int64_t source, cJSON *params) {
     cJSON *none = cJSON_CreateObject(), *problems = cJSON_CreateArray();
     const cJSON *settings = q->settings ? q->settings : none;
     bool needs_report = render_settings_bool(settings, "per_light") || render_settings_need_report(settings);

@@ -18,7 +18,7 @@ struct render_request {
 void render_request_read(struct render_request *q, const cJSON *settings, cJSON *params);
 /* Finds the cost, from the cameras of the job `source`, and adds to `params` what the settings name that its room has
  * not. */
-void render_request_look(struct api *api, struct render_request *q, int64_t source, cJSON *params);
+void render_request_check_room(struct api *api, struct render_request *q, int64_t source, cJSON *params);
 /* Adds what a dry run tells: files, paths, whether it is small. */
 void render_request_describe(const struct api *api, const struct render_request *q, cJSON *value);
 void render_request_release(struct render_request *q);

@@ -214,7 +214,7 @@ static void finish(struct gltf_reader *r) {
     struct gltf_surface *surface = &r->surface;
     struct mesh *mesh = surface->mesh;
     surface->faces->report.step_m = positions_step(surface->position.single);
-    positions_settle(&surface->position, mesh);
+    positions_move_to_mesh(&surface->position, mesh);
     if (surface->lacks_normals) {
         mem_free(mesh->normal);
         mesh->normal = NULL;

@@ -272,7 +272,7 @@ static enum status finish(struct obj_reader *r, struct mesh *mesh) {
         const double *n = r->normal.at[r->pair[v][1]];
         mesh->normal[v] = vec3_make((float)n[0], (float)n[1], (float)n[2]);
     }
-    positions_settle(&vertices, mesh);
+    positions_move_to_mesh(&vertices, mesh);
     if (r->materials)
         return obj_materials_settle(&r->objects, r->name, r->folder, mesh, r->materials, &r->faces->report, r->err);
     obj_objects_settle(&r->objects, r->folder, mesh, &r->faces->report);

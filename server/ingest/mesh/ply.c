@@ -273,7 +273,7 @@ static enum status parse(const void *data, size_t size, const char *name, size_t
         status = read_body(r, faces);
     faces->report.step_m = positions_step(r->vertices.position.single);
     if (status == STATUS_OK)
-        positions_settle(&r->vertices.position, mesh);
+        positions_move_to_mesh(&r->vertices.position, mesh);
     if (status == STATUS_OK)
         mesh->picture_count = r->in.header.picture_count;
     else

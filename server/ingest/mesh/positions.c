@@ -47,7 +47,7 @@ static void find_origin(const struct positions *p, const struct mesh *mesh, doub
         origin[i] = centre_of(lower[i], upper[i]);
 }
 
-void positions_settle(struct positions *p, struct mesh *mesh) {
+void positions_move_to_mesh(struct positions *p, struct mesh *mesh) {
     double origin[3];
     find_origin(p, mesh, origin);
     mesh->vertex_count = p->count;

@@ -36,7 +36,7 @@ double positions_step(double coordinate);
 
 /* Moves all of them to mesh->position and sets mesh->vertex_count and mesh->offset; mesh->index must be complete and in
  * range. The positions are empty then. */
-void positions_settle(struct positions *p, struct mesh *mesh);
+void positions_move_to_mesh(struct positions *p, struct mesh *mesh);
 
 /* "unbake offset X Y Z" as our PLY and OBJ files have it in a comment, NUL-terminated; false, and *offset unchanged,
  * when the text is anything else. */

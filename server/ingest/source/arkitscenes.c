@@ -128,7 +128,7 @@ static enum status read(const struct source_place *place, struct frames *t, stru
     if (unposed_count > 0)
         findings_warning(f, "%s: %zu photographs have no pose at their time and are not used", place->found,
                          unposed_count);
-    photo_folder_settle(place->listing, place->base, false, t, f);
+    photo_folder_resolve(place->listing, place->base, false, t, f);
     pose_track_release(&track);
     mem_free(pattern);
     return findings_settle(f, place->found, status, &own, err);

@@ -112,7 +112,7 @@ static enum status read(const struct source_place *place, struct frames *t, stru
     if (status == STATUS_OK)
         status = read_cameras(text, names, &list, &own);
     mem_free(text);
-    photo_folder_settle(place->listing, place->base, false, t, f);
+    photo_folder_resolve(place->listing, place->base, false, t, f);
     mem_free(names);
     return findings_settle(f, place->found, status, &own, err);
 }

@@ -204,7 +204,7 @@ static enum status read_model(const struct source_place *place, const char *imag
             status = colmap_images_parse(file.data, file.size, images, binary, found, "", t, f, &own);
         mapping_close(&file);
         result = findings_settle(f, images, status, &own, err);
-        *found_count = photo_folder_settle(l, workspace, true, t, f);
+        *found_count = photo_folder_resolve(l, workspace, true, t, f);
     }
     colmap_cameras_free(found);
     mem_free(workspace);

@@ -17,7 +17,7 @@ struct frame_list {
 /* The list for a file of camera-to-world matrices; empties *t. */
 struct frame_list frame_list_make(struct frames *t, const char *name, enum matrix_axes axes, struct findings *f);
 /* Adds a frame with the camera-to-world matrix m[3][4] and photograph `file`, which is copied: as the tool wrote it,
- * cleaned by path_clean_foreign; photo_folder_settle then finds the files. A name that is none or a matrix that is no
+ * cleaned by path_clean_foreign; photo_folder_resolve then finds the files. A name that is none or a matrix that is no
  * pose is a problem that names `place`; a lost pose is counted. The new frame, borrowed until the next call, or NULL.
  * STATUS_INPUT: too many. */
 enum status frame_list_add(struct frame_list *in, double m[3][4], const struct lens *lens, const char *file,

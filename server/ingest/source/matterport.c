@@ -62,7 +62,7 @@ static enum status read(const struct source_place *place, struct frames *t, stru
     for (size_t at = 0;
          status == STATUS_OK && (file = listing_match(place->listing, place->base, POSES "/*.txt", &at)) != NULL;)
         status = read_pose(place, file->path, &list, &own);
-    photo_folder_settle(place->listing, place->base, false, t, f);
+    photo_folder_resolve(place->listing, place->base, false, t, f);
     return findings_settle(f, place->found, status, &own, err);
 }
 

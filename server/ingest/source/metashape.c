@@ -125,9 +125,9 @@ static void know_coordinates(const struct xml_node *chunk, const double geocentr
     geodesy_from_local(placed, local);
     const struct utm utm = utm_of(chunk, placed);
     geodesy_from_utm(placed, &utm, projected);
-    frames_know(t, "chunk", "the chunk's own", geocentric);
-    frames_know(t, "local", "local ones with the origin in the chunk's region", (const double(*)[4])local);
-    frames_know(t, "projected", "easting, northing and height of UTM", (const double(*)[4])projected);
+    frames_add_coordinates(t, "chunk", "the chunk's own", geocentric);
+    frames_add_coordinates(t, "local", "local ones with the origin in the chunk's region", (const double(*)[4])local);
+    frames_add_coordinates(t, "projected", "easting, northing and height of UTM", (const double(*)[4])projected);
     t->is_placed_by_mesh = true;
 }
 
@@ -218,7 +218,7 @@ static enum status read(const struct source_place *place, struct frames *t, stru
                          "%s: b2 (skew), p3 and p4 are not modelled, which moves the photographs' corners by %.2g "
                          "pixels: optimise the cameras without them, or export undistorted photographs",
                          place->found, counts.left_out_px);
-    photo_folder_settle(place->listing, place->base, false, t, f);
+    photo_folder_resolve(place->listing, place->base, false, t, f);
     return findings_settle(f, place->found, status, &own, err);
 }
 

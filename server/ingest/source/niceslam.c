@@ -113,7 +113,7 @@ static enum status read(const struct source_place *place, struct frames *t, stru
         mem_free(text);
     }
     mapping_close(&file);
-    photo_folder_settle(place->listing, place->base, false, t, f);
+    photo_folder_resolve(place->listing, place->base, false, t, f);
     return findings_settle(f, place->found, status, &own, err);
 }
 

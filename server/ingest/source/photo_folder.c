@@ -234,8 +234,8 @@ static char *settle_name(const struct pictures *in, const struct choice *choice,
     return meant.file ? mem_strdup(meant.file->path) : mem_printf("%s%s", base, named);
 }
 
-size_t photo_folder_settle(const struct listing *l, const char *base, bool tells_unposed, struct frames *t,
-                           struct findings *f) {
+size_t photo_folder_resolve(const struct listing *l, const char *base, bool tells_unposed, struct frames *t,
+                            struct findings *f) {
     struct pictures in = find_pictures(l);
     const struct names names = {t, false};
     struct choice choice = choose_folder(&in, base, &names);

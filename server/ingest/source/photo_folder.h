@@ -20,11 +20,11 @@ bool photo_is_picture(const char *path);
  * picture before camera raw); where it may mean two files, both are named as a problem. Names that are not found get
  * the base before them. Warns where the folder is not the one that the names say; with `tells_unposed` also of
  * photographs beside them that no frame names. Returns how many were found. */
-size_t photo_folder_settle(const struct listing *l, const char *base, bool tells_unposed, struct frames *t,
-                           struct findings *f);
+size_t photo_folder_resolve(const struct listing *l, const char *base, bool tells_unposed, struct frames *t,
+                            struct findings *f);
 
 /* The same for the masks of frames that have one, in the folders that tools use for them; call it after
- * photo_folder_settle, whose files are no masks. */
+ * photo_folder_resolve, whose files are no masks. */
 void photo_folder_settle_masks(const struct listing *l, const char *base, struct frames *t, struct findings *f);
 
 #endif

@@ -79,7 +79,7 @@ static enum status read(const struct source_place *place, struct frames *t, stru
     while (status == STATUS_OK && (file = listing_match(place->listing, base, "*.json", &at)) != NULL)
         status = read_frame(place, file->path, alignment, &list, &own);
     frame_list_finish(&list);
-    photo_folder_settle(place->listing, photographs, false, t, f);
+    photo_folder_resolve(place->listing, photographs, false, t, f);
     mem_free(photographs);
     mem_free(base);
     return findings_settle(f, place->found, status, &own, err);

@@ -147,7 +147,7 @@ static enum status read_table(const struct source_place *place, struct frames *t
                          "%s: %zu lenses have k1 alone and are taken for RealityCapture's division model, since its "
                          "Brown models have three coefficients; the XMP files say which it is",
                          place->found, division_count);
-    photo_folder_settle(place->listing, place->base, true, t, f);
+    photo_folder_resolve(place->listing, place->base, true, t, f);
     return findings_settle(f, place->found, status, &own, err);
 }
 
@@ -258,7 +258,7 @@ static enum status read_xmp(const struct source_place *place, struct frames *t, 
     if (unposed_count > 0)
         findings_warning(f, "%zu files .xmp hold no pose of RealityCapture's; their photographs are not used",
                          unposed_count);
-    photo_folder_settle(place->listing, folder, false, t, f);
+    photo_folder_resolve(place->listing, folder, false, t, f);
     mem_free(folder);
     return findings_settle(f, place->found, status, &own, err);
 }

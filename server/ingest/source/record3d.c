@@ -58,7 +58,7 @@ static enum status read(const struct source_place *place, struct frames *t, stru
     if (status == STATUS_OK)
         status = read_frames(tree, folder, &list, &own);
     frame_list_finish(&list);
-    photo_folder_settle(place->listing, place->base, false, t, f);
+    photo_folder_resolve(place->listing, place->base, false, t, f);
     cJSON_Delete(tree);
     return findings_settle(f, place->found, status, &own, err);
 }

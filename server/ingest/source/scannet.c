@@ -74,7 +74,7 @@ static enum status read(const struct source_place *place, struct frames *t, stru
         status = read_pose(place, number[i], &lens, &list, &own);
     frame_list_finish(&list);
     mem_free(number);
-    photo_folder_settle(place->listing, place->base, false, t, f);
+    photo_folder_resolve(place->listing, place->base, false, t, f);
     return findings_settle(f, place->found, status, &own, err);
 }
 

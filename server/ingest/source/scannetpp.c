@@ -62,7 +62,7 @@ static enum status read(const struct source_place *place, struct frames *t, stru
                                   : mem_strndup(place->found, (size_t)(path_base(place->found) - place->found));
     enum status status = transforms_file_read(place, place->found, t, f, err);
     settle_masks(place, t, f);
-    photo_folder_settle(place->listing, folder, false, t, f);
+    photo_folder_resolve(place->listing, folder, false, t, f);
     mem_free(t->point_cloud); /* of nerfstudio's axes */
     t->point_cloud = NULL;
     t->has_applied = true;

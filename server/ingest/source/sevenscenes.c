@@ -50,7 +50,7 @@ static enum status read(const struct source_place *place, struct frames *t, stru
     findings_warning(f,
                      "7-Scenes states no lens of its colour camera: a focal length of 525 pixels is taken, the nominal "
                      "one; a transforms.json beside the sequences says another");
-    photo_folder_settle(place->listing, place->base, false, t, f);
+    photo_folder_resolve(place->listing, place->base, false, t, f);
     return findings_settle(f, place->found, status, &own, err);
 }
 

@@ -61,7 +61,7 @@ static enum status read(const struct source_place *place, struct frames *t, stru
     char *folder = mem_strndup(place->found, (size_t)(path_base(place->found) - place->found));
     enum status status = transforms_file_read(place, place->found, t, f, err);
     rebase(folder, t);
-    photo_folder_settle(place->listing, folder, false, t, f);
+    photo_folder_resolve(place->listing, folder, false, t, f);
     photo_folder_settle_masks(place->listing, folder, t, f);
     mem_free(folder);
     return status;
@@ -110,7 +110,7 @@ static enum status read_split(const struct source_place *place, struct frames *t
     static const char *const names[] = {"transforms_val.json", "transforms_test.json"};
     enum status status = transforms_file_read(place, place->found, t, f, err);
     rebase(place->base, t);
-    photo_folder_settle(place->listing, place->base, false, t, f);
+    photo_folder_resolve(place->listing, place->base, false, t, f);
     photo_folder_settle_masks(place->listing, place->base, t, f);
     for (int i = 0; i < 2 && status == STATUS_OK; i++) {
         struct frames held_out;
@@ -118,7 +118,7 @@ static enum status read_split(const struct source_place *place, struct frames *t
         if (!file)
             continue;
         status = transforms_file_read(place, file->path, &held_out, f, err);
-        photo_folder_settle(place->listing, place->base, false, &held_out, f);
+        photo_folder_resolve(place->listing, place->base, false, &held_out, f);
         photo_folder_settle_masks(place->listing, place->base, &held_out, f);
         rebase(place->base, &held_out);
         drop_absent(place->listing, file->path, &held_out, f);

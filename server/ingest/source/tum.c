@@ -119,7 +119,7 @@ static enum status read(const struct source_place *place, struct frames *t, stru
         status = read_track(place, &track, &own);
     if (status == STATUS_OK)
         status = read_photographs(list_text, &track, &lens, &list, &own);
-    photo_folder_settle(place->listing, place->base, false, t, f);
+    photo_folder_resolve(place->listing, place->base, false, t, f);
     pose_track_release(&track);
     mem_free(list_text);
     mem_free(name);
