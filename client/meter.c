@@ -7,8 +7,8 @@
 
 #define SMOOTHING_SEC 4.0 /* time constant of the smoothed rate */
 #define MEASURE_SEC 0.25  /* shorter intervals are too noisy */
-#define REDRAW_SEC 0.1
-#define BAR_COLUMNS 24 /* width of the bar */
+#define REDRAW_SEC 0.1    /* between two drawings of the line on a terminal */
+#define BAR_COLUMNS 24    /* width of the bar */
 
 void meter_begin(struct meter *m, struct terminal *terminal, const char *label, double done, double total) {
     double now = clock_sec();

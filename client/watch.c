@@ -18,7 +18,8 @@
 #include "common/protocol.h"
 
 #define SILENCE_SEC 45.0 /* three keep-alives */
-#define PATIENCE_SEC 600.0
+#define PATIENCE_SEC                                                                                                   \
+    600.0              /* for which a stream that has once been open is tried again, unless --retry says otherwise */
 #define REDRAW_SEC 0.2 /* between two drawings of the line */
 #define PLAIN_SEC 10.0 /* between two lines where none can be redrawn */
 

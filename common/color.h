@@ -10,8 +10,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define COLOR_NAME_SIZE 64 /* bytes with the NUL, as the next */
-#define COLOR_WARNING_SIZE 160
+#define COLOR_NAME_SIZE 64     /* bytes with the NUL, as the next */
+#define COLOR_WARNING_SIZE 160 /* bytes with the NUL: a short sentence */
 
 /* How linear light became the stored value. */
 enum color_transfer {

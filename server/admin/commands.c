@@ -69,7 +69,7 @@ static int ask(int code, struct invocation *in, cJSON *request,
 
 /* --- token --------------------------------------------------------------------------------- */
 
-#define TIME_SIZE 32
+#define TIME_SIZE 32 /* of "2026-01-31 12:00Z", with the NUL, rounded up */
 #define DAY_MS INT64_C(86400000)
 #define HOUR_MS INT64_C(3600000)
 #define EXPIRES_MAX 36500 /* days or hours: a century of the former */

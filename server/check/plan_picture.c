@@ -7,9 +7,9 @@
 #include "common/mem.h"
 #include "server/scene/area_sample.h"
 
-#define SIDE 800     /* pixels */
-#define MARGIN 30.0f /* pixels */
-#define POINTS 24000
+#define SIDE 800            /* pixels */
+#define MARGIN 30.0f        /* pixels */
+#define POINTS 24000        /* of the surface, spread by area: about one in 5 x 5 pixels of the plan */
 #define PHOTOGRAPHS_MAX 96  /* asked for each point; evenly spaced where there are more */
 #define CEILING_FROM 0.6f   /* of the height: horizontal surface above it is ceiling, lamp or the top of a cupboard */
 #define FREE_SHARE 0.985f   /* of the way to a camera */

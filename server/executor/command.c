@@ -14,8 +14,8 @@
 
 #include "common/clock.h"
 
-#define LOOK_MS 20 /* how soon the end is seen of a command that keeps its output open elsewhere */
-#define COMPLAINT_MAX 4096
+#define LOOK_MS 20         /* how soon the end is seen of a command that keeps its output open elsewhere */
+#define COMPLAINT_MAX 4096 /* bytes of a command's standard error that are kept: the last line of it is told */
 
 extern char **environ;
 

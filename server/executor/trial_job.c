@@ -16,10 +16,10 @@
 #include "server/executor/command.h"
 #include "server/executor/job_status.h"
 
-#define URL_SEC 5.0   /* in which the daemon must answer a node */
-#define LOOK_SEC 1.0  /* between two looks at the job */
-#define END_SEC 120.0 /* for a job to be seen to end, or to go once it is cancelled */
-#define OUTPUT_LINES 5
+#define URL_SEC 5.0    /* in which the daemon must answer a node */
+#define LOOK_SEC 1.0   /* between two looks at the job */
+#define END_SEC 120.0  /* for a job to be seen to end, or to go once it is cancelled */
+#define OUTPUT_LINES 5 /* of the command `info` that are shown: a version takes one or two */
 
 struct attempt_at {
     const struct site *site;

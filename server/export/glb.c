@@ -33,7 +33,7 @@
 #define WRAP_CLAMP 33071
 
 #define CAMERAS_MAX 100 /* of held-out views */
-#define NEAR_M 0.01
+#define NEAR_M 0.01     /* near plane of cameras, metres: nearer than any photograph is taken */
 
 /* Buffer views, in order. Without normals there is no NORMAL, without texture coordinates of the input no INPUT_UV,
  * without emission patterns no EMISSION. */

@@ -21,7 +21,8 @@
 #include "server/export/input.h"
 
 #define LIGHTS_MAX 16 /* without the sun; viewers slow down with each */
-#define LIGHT_SPAN_M 1.0f
+#define LIGHT_SPAN_M                                                                                                   \
+    1.0f /* metres: at some metres' distance the light of a point beside that of a lamp of this length */
 
 /* Cd/m2 of radiance 1 in the file; 1 where unknown. */
 double glb_lights_unit(const struct export_input *in);

@@ -128,8 +128,8 @@ enum status mitsuba_xml_write(const char *path, const struct export_input *in, c
 #define HAS_NORMALS 0x0001 /* flags of a mesh */
 #define HAS_TEXCOORDS 0x0002
 #define SINGLE_PRECISION 0x1000
-#define LEVEL 4 /* half the time of level 6 for a few percent more bytes */
-#define BLOCK (1 << 16)
+#define LEVEL 4         /* half the time of level 6 for a few percent more bytes */
+#define BLOCK (1 << 16) /* bytes that are compressed at a time */
 
 /* Compresses its input with zlib and writes it to the sink. */
 struct packer {

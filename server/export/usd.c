@@ -13,7 +13,7 @@
 
 #define CAMERAS_MAX 100 /* of held-out views */
 #define APERTURE 0.36   /* width of a film of 36 mm, in tenths of the unit, the metre */
-#define NEAR_M 0.01
+#define NEAR_M 0.01     /* metres: nearer than any photograph is taken */
 #define FAR_M 1000.0    /* clipping range of cameras, with NEAR_M */
 #define VALUES_A_LINE 8 /* of arrays */
 #define TRIPLE "(" SINK_FLOAT ", " SINK_FLOAT ", " SINK_FLOAT ")"

@@ -9,8 +9,8 @@
 #include "common/file.h"
 #include "common/mem.h"
 
-#define LOG_KEEP 65536 /* bytes kept of earlier attempts when the log has passed LOG_LARGE */
-#define LOG_LARGE (1 << 20)
+#define LOG_KEEP 65536      /* bytes kept of earlier attempts when the log has passed LOG_LARGE */
+#define LOG_LARGE (1 << 20) /* bytes */
 
 /* Cuts the log to its tail once it is large. */
 static enum status trim_log(const char *path, int fd, struct error *err) {

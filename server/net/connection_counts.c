@@ -7,7 +7,7 @@
 #include "common/mem.h"
 
 #define KEPT_SHARE 20 /* one connection in 20 is kept for loopback */
-#define KEPT_MIN 2
+#define KEPT_MIN 2    /* and this many at least, however few there may be in all */
 
 struct connection_counts {
     size_t most, of_one; /* limit for all but loopback; for one address */

@@ -6,7 +6,7 @@
 #include "common/mem.h"
 #include "server/scene/inverse_uv.h"
 
-#define MIN_SIZE 64
+#define MIN_SIZE 64       /* texels a side: mips and gutters need some room, however small the pictures are */
 #define UTILISATION 0.5   /* of an atlas, about */
 #define MIN_DENSITY 0.05f /* of a triangle, as a share of the finest one's; those without a picture have it */
 #define TAPS 4            /* by which a texel is averaged: 2 x 2 */

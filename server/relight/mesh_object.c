@@ -9,7 +9,7 @@
 #include "server/relight/setting_files.h"
 #include "server/relight/virtual_object_settings.h"
 
-#define MAX_TRIANGLES ((size_t)1 << 24)
+#define MAX_TRIANGLES ((size_t)1 << 24) /* a quarter of what a room may have (bundle.h) */
 
 /* The file's y is up. */
 static void move_mesh(const cJSON *s, uint32_t n, const struct compass *compass, vec3 to, struct mesh *m) {

@@ -10,8 +10,8 @@
 #include "common/output_names.h"
 #include "server/ingest/mesh/ply_header.h"
 
-#define PLY_LIMIT ((size_t)1 << 34)
-#define NO_TEXEL SIZE_MAX
+#define PLY_LIMIT ((size_t)1 << 34) /* bytes of scene.ply: the largest room, of 2^26 triangles, has some 3 GiB */
+#define NO_TEXEL SIZE_MAX           /* of a segment */
 
 /* --- scene.ply ---------------------------------------------------------------------------- */
 

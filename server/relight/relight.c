@@ -23,11 +23,11 @@
 #include "server/relight/luminance_per_unit.h"
 #include "server/render/film.h"
 
-#define ROULETTE_DEPTH 5
-#define UNTIL_SPP 65536 /* with noise or time_limit, where spp is not given */
-#define METER_WIDTH 80  /* pixels of the picture that chooses the exposure; before the first preview: kept cheap */
-#define METER_SPP 16
-#define PREVIEW_INTERVAL_SEC 1.0
+#define ROULETTE_DEPTH 5 /* segment of a path from which Russian roulette may end it */
+#define UNTIL_SPP 65536  /* with noise or time_limit, where spp is not given */
+#define METER_WIDTH 80   /* pixels of the picture that chooses the exposure; before the first preview: kept cheap */
+#define METER_SPP 16     /* samples a pixel of that picture, whose mean is what counts */
+#define PREVIEW_INTERVAL_SEC 1.0                  /* between two previews of a picture that is being rendered */
 #define PICTURE_SEED UINT64_C(0x9e3779b97f4a7c15) /* between the seeds of two pictures */
 
 struct relight_state {
@@ -105,7 +105,7 @@ static struct path_settings path_of(const struct relight_state *r, uint64_t stre
     return path;
 }
 
-#define PASSES_MAX 16
+#define PASSES_MAX 16 /* of one view; the table of passes.c has fewer */
 
 static struct output_formats formats_of(const struct relight_state *r) {
     const char *format = render_settings_text(r->job->settings, "format");

@@ -5,7 +5,7 @@
 #include "common/mem.h"
 #include "common/output_names.h"
 
-#define REPORT_MAX_BYTES ((size_t)256 << 20)
+#define REPORT_MAX_BYTES ((size_t)256 << 20) /* of report.json: some 1 KiB a segment and view */
 
 char *setting_files_path(const struct relight_job *job, const char *name) {
     return job->files ? file_join(job->files, name) : mem_strdup(name);

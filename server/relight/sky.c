@@ -7,8 +7,8 @@
 #include "server/scene/latlong.h"
 
 #define RADIANS (PI / 180.0)
-#define MAP_WIDTH 1024 /* pixels of .35 degrees; the sun is .53 degrees wide */
-#define MAP_HEIGHT 513
+#define MAP_WIDTH 1024                        /* pixels of .35 degrees; the sun is .53 degrees wide */
+#define MAP_HEIGHT 513                        /* rows, the poles among them */
 #define SUN_RADIUS (sqrt(SKY_SUN_ANGLE / PI)) /* radians */
 #define GROUND_ALBEDO 0.2                     /* of mixed ground, without snow */
 #define MIN_COSINE 0.01                       /* keeps the sky next to the horizon finite */
@@ -134,8 +134,8 @@ rgb sky_radiance(const struct sky *sky, double theta, double gamma) {
 /* --- the sun: appendix A.1 -------------------------------------------------------------------------------------- */
 
 #define SPECTRUM_FIRST 380 /* nm */
-#define SPECTRUM_STEP 10
-#define SPECTRUM_COUNT 38
+#define SPECTRUM_STEP 10   /* nm */
+#define SPECTRUM_COUNT 38  /* to 750 nm */
 /* Of the sun above the atmosphere, 100 W / (m2 sr nm). */
 static const double sun_radiance[SPECTRUM_COUNT] = {
     165.5, 162.3, 211.2, 258.8, 258.2, 242.3, 267.6, 296.6, 305.4, 300.6, 306.6, 288.3, 287.1,
@@ -148,9 +148,9 @@ static const double ozone[SPECTRUM_COUNT] = {0.0,   0.0,   0.0,   0.0,   0.0,   
                                              0.036, 0.028, 0.023, 0.018, 0.014, 0.011, 0.010, 0.009};
 static const double vapour[SPECTRUM_COUNT] = {
     [31] = 0.016, [32] = 0.024, [33] = 0.0125, [34] = 1.0, [35] = 0.87, [36] = 0.061, [37] = 0.001};
-#define OZONE_CM 0.35
-#define VAPOUR_CM 2.0
-#define AEROSOL_EXPONENT 1.3
+#define OZONE_CM 0.35        /* column of ozone at standard pressure and temperature (A.1) */
+#define VAPOUR_CM 2.0        /* of precipitable water (A.1) */
+#define AEROSOL_EXPONENT 1.3 /* Angstrom's, of the aerosols' sizes (A.1) */
 
 /* The CIE 1931 observer, fitted by sums of lobes (Wyman, Sloan and Shirley 2013, listing 1). */
 static double lobe(double wavelength, double scale, double middle, double before, double after) {
@@ -175,7 +175,7 @@ static double transmittance(int i, double mass, double turbidity) {
     return exp(-depth);
 }
 
-#define LUMENS_PER_WATT 683.0
+#define LUMENS_PER_WATT 683.0 /* at 555 nm: the definition of the candela */
 
 rgb sky_sun_radiance(const struct sky *sky) {
     double elevation = fmax(sky->sun.elevation, 0.0), xyz[3] = {0.0, 0.0, 0.0};

@@ -12,8 +12,8 @@
 #include "server/relight/mesh_object.h"
 #include "server/relight/virtual_object_settings.h"
 
-#define BALL_SPLITS 3
-#define DISC_CORNERS 32
+#define BALL_SPLITS 3       /* of an icosahedron's triangles into four: 1,280 triangles */
+#define DISC_CORNERS 32     /* of the polygon of a disc's area that stands for it */
 #define LAMP_ROUGHNESS 0.5f /* of a black body without a highlight: no matter */
 
 void virtual_objects_release(struct virtual_objects *t) {

@@ -7,8 +7,8 @@
 
 #include "common/mem.h"
 
-#define GUIDE_DENSITY 4 /* starting points per entry of a table */
-#define MAX_BLOCK_COLUMNS 512
+#define GUIDE_DENSITY 4       /* starting points per entry of a table */
+#define MAX_BLOCK_COLUMNS 512 /* of the table of blocks: 512 x 256 entries are 512 KiB, which a core's cache holds */
 /* Lower bound of a direction's visibility, as a fraction of the mean over the light. */
 #define MIN_VISIBILITY 0.1
 /* Minimum share of samples of the environment and of the emitters. */

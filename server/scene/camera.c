@@ -19,9 +19,9 @@
 #include <math.h>
 
 #define HALF_PI (0.5 * PI)
-#define FOLD_STEPS 4096 /* of the march towards the fold */
-#define FOV_MIN 1e-7    /* radians of FOV's angle; below it there is no distortion in single precision */
-#define NEWTON_STEPS 50
+#define FOLD_STEPS 4096    /* of the march towards the fold */
+#define FOV_MIN 1e-7       /* radians of FOV's angle; below it there is no distortion in single precision */
+#define NEWTON_STEPS 50    /* at most, of lenses at which it does not converge */
 #define NEWTON_PIXELS 1e-6 /* residual at which the inverse is taken as found */
 
 bool camera_is_distorted(const struct camera *c) {

@@ -7,8 +7,8 @@
 #include "common/mem.h"
 #include "common/quantile.h"
 
-#define CHUNK 1024 /* triangles per work item */
-#define FILTER_PASSES 5
+#define CHUNK 1024      /* triangles per work item */
+#define FILTER_PASSES 5 /* of the bilateral filter over all triangles */
 /* Standard deviation of the filter's range kernel (normals differing by it weigh 0.6), in units of roughness and
  * clamped. */
 #define SPREAD_FACTOR 2.0f

@@ -11,8 +11,8 @@
 #define EDGE_COSINE 0.5f       /* between the normals of a vertex and its triangles; below it there is an edge */
 #define MIN_NORMAL_COSINE 0.5f /* between the normals of vertices in one fit */
 #define MIN_NEIGHBOURS 12      /* vertices in the first fit; each further fit has half as many more */
-#define MAX_NEIGHBOURS 96
-#define VISITED_SLOTS 256 /* of the hash set; more than twice MAX_NEIGHBOURS */
+#define MAX_NEIGHBOURS 96      /* vertices in one fit; bounds time and stack */
+#define VISITED_SLOTS 256      /* of the hash set; more than twice MAX_NEIGHBOURS */
 #define MAX_CHI2_SIGMA                                                                                                 \
     5.0                    /* residual of a fit, in standard deviations of chi squared, above which the surface is
                               * no paraboloid */

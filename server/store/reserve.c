@@ -36,8 +36,8 @@
 #define CHECKPOINT_FRAMES 1000 /* SQLite's own default */
 #define CHECKPOINT_TIGHT 16
 
-#define FILE_BYTES ((uint64_t)16 << 20) /* size of DATA/reserve */
-#define FILE_BYTES_MIN ((uint64_t)256 << 10)
+#define FILE_BYTES ((uint64_t)16 << 20)      /* size of DATA/reserve */
+#define FILE_BYTES_MIN ((uint64_t)256 << 10) /* at least; on a smaller disk there is none */
 
 /* Called by SQLite after each commit, with the frames in the log. It replaces SQLite's own hook, which makes the
  * checkpoints; the next commit makes up for a failed one. */

@@ -16,8 +16,8 @@
 #include "server/worker/checkpoint_file.h"
 
 #define HEAD_MAX ((size_t)64 << 20) /* some 40 bytes a tile: enough for 1.6 TB of state */
-#define READ_BYTES ((size_t)65536)
-#define TILE_VALUES 3 /* in the head: hash, part, offset */
+#define READ_BYTES ((size_t)65536)  /* at a time */
+#define TILE_VALUES 3               /* in the head: hash, part, offset */
 
 void part_head_release(struct part_head *head) {
     for (size_t i = 0; i < head->array_count; i++) {

@@ -8,7 +8,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define SANDBOX_READ_DIRS 2
+#define SANDBOX_READ_DIRS                                                                                              \
+    2 /* folders that a worker may read besides its own: a scene's or outputs, and a job's files */
 /* What a process may still do. */
 struct sandbox {
     const char *write_dir;                   /* NULL: none */

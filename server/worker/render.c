@@ -37,7 +37,7 @@
 #define PREVIEW PREVIEWS "/render.png"
 #define PROGRESS_INTERVAL_SEC 0.25 /* between two reports of progress, at least */
 #define RECORD_INTERVAL_SEC 2.0    /* between two words of the record: a part's has some 100 lines */
-#define MIB 1048576.0
+#define MIB 1048576.0              /* bytes */
 
 /* A file of an earlier attempt whose hash the engine has just found to be right: it is not read again. */
 struct kept_file {

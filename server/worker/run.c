@@ -34,9 +34,9 @@
 #define CHECKPOINT_SHARE 0.02
 #define CHECKPOINT_STRETCH 5.0
 #define PREVIEW_SHARE 0.05
-#define PROGRESS_INTERVAL_SEC 0.25
-#define METRIC_INTERVAL_SEC 1.0 /* minimum between values of a series */
-#define SERIES_MAX 16
+#define PROGRESS_INTERVAL_SEC 0.25 /* minimum between two reports of progress */
+#define METRIC_INTERVAL_SEC 1.0    /* minimum between values of a series */
+#define SERIES_MAX 16              /* metrics of a reconstruction that are told; it has fewer */
 
 struct worker_run {
     const struct order *order;

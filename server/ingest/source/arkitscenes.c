@@ -14,8 +14,8 @@
 #include "server/ingest/source/pose_track.h"
 #include "server/ingest/source/values.h"
 
-#define GAP_SEC 0.25 /* of two poses; a lost one is passed over */
-#define MAX_BYTES ((size_t)64 << 20)
+#define GAP_SEC 0.25                 /* of two poses; a lost one is passed over */
+#define MAX_BYTES ((size_t)64 << 20) /* of the file of poses: a day of them */
 
 /* The sharpest photographs that are there; NULL: none are. */
 static const char *folder_of(const struct listing *l, const char *base) {

@@ -15,8 +15,8 @@
 #include "server/ingest/source/pose_track.h"
 #include "server/ingest/source/values.h"
 
-#define GAP_SEC 0.1 /* ground truth comes at 100 Hz; SLAM writes keyframes, at 30 Hz at most */
-#define MAX_BYTES ((size_t)64 << 20)
+#define GAP_SEC 0.1                  /* ground truth comes at 100 Hz; SLAM writes keyframes, at 30 Hz at most */
+#define MAX_BYTES ((size_t)64 << 20) /* of a list of poses or photographs: a day of them */
 
 /* fx fy cx cy k1 k2 p1 p2 k3 of the colour cameras, as TUM's page of intrinsics states them. */
 static const struct {
