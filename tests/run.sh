@@ -15,7 +15,7 @@ shift
 # `make tsan` run them all the same.
 slow_asan="gradient/test_path render/test_conformance render/test_rooms render/test_listing1 api/test_demo_room
 render/test_calibrate_poses render/test_emission_pattern render/test_environment render/test_specular
-render/test_held_out_light render/test_large_held_out render/test_saturated_light render/test_short render/test_sky_room
+render/test_held_out_light render/test_large_held_out render/test_saturated_light render/test_short_time_limit render/test_sky_room
 render/test_fireflies_left_out render/test_grey_card render/test_sun render/test_split api/test_resume api/test_readme
 render/test_emitters render/test_hidden_lamp render/test_openings render/test_changing_light render/test_sky_doubt render/test_holes
 unit/test_outputs_read_back unit/test_fit unit/test_check_pictures api/test_http_faults chaos/test_clock
@@ -24,7 +24,7 @@ chaos/test_start_faults chaos/test_worker_calls chaos/test_worker_kill chaos/tes
 api/test_render api/test_render_parts chaos/test_render_kill api/test_retention render/test_calibrate_light unit/test_atlas unit/test_inverse_uv
 unit/test_worker_faults chaos/test_disk_faults unit/test_attempt_faults api/test_client_sweep chaos/test_daemon_kill
 chaos/test_power_cut unit/test_scheduler_faults unit/test_scheduler_retries unit/test_delivery render/test_detail
-api/test_client_commands api/test_client_scripts render/test_sampling api/test_admin unit/test_corrections
+api/test_client_commands api/test_client_scripts render/test_sampling api/test_admin unit/test_user_corrections
 unit/test_luminance_unit api/test_older_data"
 # Names of the tests that begin no thread but those of a pool (common/parallel.h): neither they nor a header that they
 # include begin one, nor does the unit of such a header.

@@ -151,7 +151,7 @@ static void test_assignments(void) {
 }
 
 /* What a user says of single segments, and of a box. */
-static void test_corrections(void) {
+static void test_user_corrections(void) {
     static const char *const faults[] = {"{\"emitters.x\":\"on\"}",
                                          "{\"emitters.\":\"on\"}",
                                          "{\"emitters.1\":true}",
@@ -205,7 +205,7 @@ static void test_corrections(void) {
 }
 
 int main(void) {
-    test_corrections();
+    test_user_corrections();
     test_table();
     test_problems_all_at_once();
     test_method();

@@ -1,4 +1,4 @@
-/* test_corrections.c -- what a user puts right of a job: photographs left out, a part of the mesh kept, a segment that
+/* test_user_corrections.c -- what a user puts right of a job: photographs left out, a part of the mesh kept, a segment that
  * emits or does not. */
 #include "server/scene/select.h"
 #include "tests/unit/tiny_scene.h"

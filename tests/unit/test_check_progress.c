@@ -1,4 +1,4 @@
-/* test_check_told.c -- the lines of a check: facts come while it runs, each line knows more, and the last is all of
+/* test_check_progress.c -- the lines of a check: facts come while it runs, each line knows more, and the last is all of
  * it. */
 #include "server/data/layout.h"
 #include "tests/unit/tiny_scene.h"
