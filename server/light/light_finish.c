@@ -50,10 +50,9 @@ static void fit_channel(struct light_model *m, int channel) {
 }
 
 void light_finish(struct light_model *m) {
-    light_model_measure(m);
-    joint_fit_errors(&m->fit);
+    light_model_find_errors(m);
     for (size_t i = 0; i < m->lamps.count; i++) {
-        double error = sqrt(m->patches_alike) * m->fit.source[m->lamps.lamp[i].source].error;
+        double error = m->fit.source[m->lamps.lamp[i].source].error;
         m->lamps.lamp[i].deviation = (float)sqrt(error * error + SYSTEMATIC_DEVIATION * SYSTEMATIC_DEVIATION);
     }
     for (int c = 0; c < 3 && m->lamps.count > 0; c++)

@@ -268,3 +268,10 @@ void light_model_measure(struct light_model *m) {
     m->patches_alike = joint_alike(&m->fit, position, ALIKE_EDGES * m->points.edge_m);
     mem_free(position);
 }
+
+void light_model_find_errors(struct light_model *m) {
+    light_model_measure(m);
+    joint_fit_errors(&m->fit);
+    for (size_t j = 0; j < m->fit.source_count; j++)
+        m->fit.source[j].error *= sqrt(m->patches_alike);
+}

@@ -35,4 +35,8 @@ void light_model_respond_hidden(const struct light_model *m, uint32_t segment, f
 /* Measures m->patches_alike at the fit's values. */
 void light_model_measure(struct light_model *m);
 
+/* Sets the errors of the fit's sources at their values: standard deviations by patches of which so many are worth one,
+ * which is measured first. */
+void light_model_find_errors(struct light_model *m);
+
 #endif

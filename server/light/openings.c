@@ -27,13 +27,11 @@ static int by_error(const void *a, const void *b) {
 /* The cells of which the points say that they are brighter than the prior has them; the surest ones first. */
 static size_t choose(struct light_model *m, struct opening_candidate chosen[SURROUND_CELLS]) {
     size_t count = 0;
-    light_model_measure(m);
-    joint_fit_errors(&m->fit);
+    light_model_find_errors(m);
     for (size_t k = 0; k < SURROUND_CELLS && m->has_sky; k++) {
         const struct joint_source *source = &m->fit.source[m->first_cell + k];
-        double error = sqrt(m->patches_alike) * source->error;
-        if (!m->sky.surround->is_seen[k] && source->value - source->mean > SURE * error)
-            chosen[count++] = (struct opening_candidate){k, exp(source->value), error};
+        if (!m->sky.surround->is_seen[k] && source->value - source->mean > SURE * source->error)
+            chosen[count++] = (struct opening_candidate){k, exp(source->value), source->error};
     }
     qsort(chosen, count, sizeof *chosen, by_error);
     return count < LIGHT_OPENINGS_MAX ? count : LIGHT_OPENINGS_MAX;

@@ -7,6 +7,7 @@
 #include "common/rng.h"
 #include "server/light/joint_alike.h"
 #include "server/light/joint_fit.h"
+#include "server/light/light_model.h"
 #include "tests/check.h"
 
 #define SIDE 40 /* points along each side of a floor of 4 x 4 m */
@@ -240,6 +241,37 @@ static void test_patches_alike(struct parallel *pool) {
     CHECK_NEAR(mean[1], 4.0, 0.8);
 }
 
+/* The same of stated deviations (light_model.h): as many errors are within one as for independent patches, though four
+ * agree. Patch by patch the deviations would be too small. */
+static void test_deviations_alike(struct parallel *pool) {
+    const float x[2] = {60.0f, 25.0f};
+    static struct light_point at[POINTS];
+    int one = 0, too_sure = 0, all = 0;
+    for (uint64_t seed = 1; seed <= 20; seed++) {
+        struct joint_source prior = source_about(log(30.0), 1.5);
+        struct light_model m = {.points = {.count = POINTS, .point = at, .edge_m = 0.1f * PATCH}};
+        make_floor(seed, 0.5f, x, 0.0f);
+        for (size_t i = 0; i < POINTS; i++) {
+            uint32_t row = point[i].patch / (SIDE / PATCH), column = point[i].patch % (SIDE / PATCH);
+            at[i].at.position = (vec3){0.1f * PATCH * (float)column, 0.0f, 0.1f * PATCH * (float)row};
+            point[i].observed *= expf(0.15f * deviate(seed, row / 2 * SIDE + column / 2, 7));
+        }
+        start(&m.fit, pool);
+        joint_fit_add(&m.fit, &prior, lit[0]);
+        joint_fit_add(&m.fit, &prior, lit[1]);
+        joint_fit_solve(&m.fit, JOINT_STEPS);
+        light_model_find_errors(&m);
+        for (int k = 0; k < 2; k++, all++) {
+            double off = fabs(m.fit.source[1 + k].value - log((double)x[k])) / m.fit.source[1 + k].error;
+            one += off < 1.0;
+            too_sure += off * sqrt(m.patches_alike) >= 1.0;
+        }
+        joint_fit_release(&m.fit);
+    }
+    printf("of %d errors %d within one deviation, %d if patches were independent\n", all, one, all - too_sure);
+    CHECK(one > 18);
+}
+
 static void test_threads(void) {
     const float x[2] = {60.0f, 25.0f};
     double value[2][3];
@@ -272,6 +304,7 @@ int main(void) {
     test_minimum(pool);
     test_patches(pool);
     test_patches_alike(pool);
+    test_deviations_alike(pool);
     test_threads();
     parallel_free(pool);
     return check_result();
