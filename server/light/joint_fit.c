@@ -135,7 +135,7 @@ static double add_patch_points(const struct assembly *a, struct joint_chunk *c, 
     return weights;
 }
 
-/* The patch's mean is to be no whiter than white; its offset is eliminated. */
+/* The patch's mean is bounded by white paint; its offset is eliminated. */
 static void add_patch(const struct assembly *a, struct joint_chunk *c, const struct joint_block *b,
                       const struct joint_scratch *s, struct derivative *d, size_t patch, double *block_weight) {
     const struct joint_fit *f = a->f;
@@ -144,13 +144,13 @@ static void add_patch(const struct assembly *a, struct joint_chunk *c, const str
     double stiffness = s->stiffness[patch - b->first_patch];
     for (size_t i = f->patch[patch]; i < f->patch[patch + 1]; i++)
         base += s->weight[i - b->first] * s->base[i - b->first] / weights;
-    struct joint_white white = joint_whiteness(base - f->source[0].value, 1.0 / weights);
+    struct joint_white_bound white = joint_white_bound(base - f->source[0].value, 1.0 / weights);
     for (size_t j = 0; j < n; j++) {
         c->slope[j] -= white.slope * d->patch[j] / weights;
         d->block[j] += d->patch[j] * stiffness / (weights + stiffness);
     }
     add_square(c->curvature, n, d->patch, -1.0 / (weights + stiffness));
-    d->patch[0] = weights; /* what is too white falls with white paint as with light */
+    d->patch[0] = weights; /* the loss of the bound falls with white paint as with light */
     add_square(c->curvature, n, d->patch, white.curvature / square(weights));
     c->slope[0] -= white.slope;
     *block_weight += weights * stiffness / (weights + stiffness);

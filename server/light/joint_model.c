@@ -61,12 +61,12 @@ void joint_find_base(const struct joint_fit *f, const struct joint_block *b, con
 static double t_loss(double e) { return 0.5 * (FREEDOM + 1.0) * log1p(e * e / FREEDOM); }
 static double t_weight(double e) { return (FREEDOM + 1.0) / (FREEDOM + e * e); }
 
-struct joint_white joint_whiteness(double beyond, double variance) {
+struct joint_white_bound joint_white_bound(double beyond, double variance) {
     double deviation = sqrt(square(ALBEDO_PATCH) + variance);
     if (!(beyond > 0.0))
-        return (struct joint_white){0.0, 0.0, 0.0};
+        return (struct joint_white_bound){0.0, 0.0, 0.0};
     double e = beyond / deviation, weight = t_weight(e) / square(deviation);
-    return (struct joint_white){t_loss(e), weight * beyond, weight};
+    return (struct joint_white_bound){t_loss(e), weight * beyond, weight};
 }
 
 static double variance_of(const struct joint_point *p) { return square(ALBEDO_POINT) + square((double)p->deviation); }
@@ -126,7 +126,7 @@ static double loss_of(const struct joint_fit *f, const struct joint_block *b, st
         struct patch_sums patch = weigh_patch(f, b, s, p);
         double offset = s->offset[p - b->first_patch];
         loss += t_loss(offset / ALBEDO_PATCH) +
-                joint_whiteness(patch.base / patch.weight - f->source[0].value, 1.0 / patch.weight).loss;
+                joint_white_bound(patch.base / patch.weight - f->source[0].value, 1.0 / patch.weight).loss;
         for (size_t i = f->patch[p]; i < f->patch[p + 1]; i++) {
             double deviation = sqrt(variance_of(&f->point[i]));
             s->residual[i - b->first] = s->base[i - b->first] - s->mean - offset;

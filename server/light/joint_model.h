@@ -73,11 +73,11 @@ void joint_find_base(const struct joint_fit *f, const struct joint_block *block,
 /* Fills the scratch for a block from base[0, end - first), and returns its share of the loss. */
 double joint_settle(const struct joint_fit *f, const struct joint_block *block, struct joint_scratch *s);
 
-/* How much a patch is too white: derivative and second derivative of that part of the loss by `beyond`, the mean of its
- * b over the logarithm of white paint. variance: of that mean by noise of its points. */
-struct joint_white {
+/* The bound of a patch's albedo by white paint: its part of the loss, and the derivatives of that by `beyond`, the mean
+ * of the patch's b less the logarithm of white paint. variance: of that mean by noise of its points. */
+struct joint_white_bound {
     double loss, slope, curvature;
 };
-struct joint_white joint_whiteness(double beyond, double variance);
+struct joint_white_bound joint_white_bound(double beyond, double variance);
 
 #endif

@@ -146,8 +146,9 @@ static void test_bound(struct parallel *pool) {
 
 /* What is whiter than white asks for light; what is darker does not ask for less. */
 static void test_white(void) {
-    CHECK(joint_whiteness(-1.0, 0.01).loss == 0.0 && joint_whiteness(-1.0, 0.01).slope == 0.0);
-    CHECK(joint_whiteness(0.3, 0.01).loss > joint_whiteness(0.2, 0.01).loss && joint_whiteness(0.2, 0.01).slope > 0.0);
+    CHECK(joint_white_bound(-1.0, 0.01).loss == 0.0 && joint_white_bound(-1.0, 0.01).slope == 0.0);
+    CHECK(joint_white_bound(0.3, 0.01).loss > joint_white_bound(0.2, 0.01).loss &&
+          joint_white_bound(0.2, 0.01).slope > 0.0);
 }
 
 static void test_try(struct parallel *pool) {
