@@ -28,8 +28,6 @@
 #define MIN_CONTRAST 2.0f
 /* Triangles below this part of their part's radiance are mixed with their neighbours. */
 #define PURE 0.3f
-/* A piece that a part cuts off from its segment is added to the part if it is smaller than this part of it. */
-#define HOLE 0.02f
 
 struct split_job {
     const struct reconstruction *r;
@@ -39,7 +37,6 @@ struct split_job {
     float first_level;
     struct triangles_by_segment triangles;
     uint32_t *parent; /* [triangle_count] connected sets at the present level, written by segment */
-    float *size;      /* [triangle_count] of a root of those: pixels or m^2 */
     uint32_t *part;   /* [triangle_count] number of the part among its segment's, from 1; 0: the rest */
     bool *settled;    /* [triangle_count] belongs to no further part */
     float *needed;    /* [triangle_count] no level below this is tested */
@@ -70,18 +67,16 @@ static bool is_bright(const struct split_level *l, uint32_t t) {
     return !l->job->settled[t] && l->job->light.observed[t] >= l->radiance;
 }
 
-static bool is_remainder(const struct split_level *l, uint32_t t) { return l->job->part[t] == 0; }
-
-/* Joins neighbouring triangles of the set. */
-static void connect(const struct split_level *l, bool (*belongs)(const struct split_level *l, uint32_t t)) {
+/* Joins neighbouring triangles of at least the level. */
+static void connect(const struct split_level *l) {
     const struct split_job *job = l->job;
     for (size_t i = 0; i < l->triangle_count; i++)
         job->parent[l->triangle[i]] = l->triangle[i];
     for (size_t i = 0; i < l->triangle_count; i++) {
         uint32_t t = l->triangle[i];
-        for (uint32_t h = 3 * t; belongs(l, t) && h < 3 * t + 3; h++) {
+        for (uint32_t h = 3 * t; is_bright(l, t) && h < 3 * t + 3; h++) {
             uint32_t other = job->adjacency.next[h] / 3;
-            if (job->r->segments.of_triangle[other] != l->segment || !belongs(l, other))
+            if (job->r->segments.of_triangle[other] != l->segment || !is_bright(l, other))
                 continue;
             uint32_t a = root_of(job->parent, t), b = root_of(job->parent, other);
             job->parent[a > b ? a : b] = a > b ? b : a;
@@ -115,36 +110,6 @@ static size_t collect_darker(const struct split_level *l) {
     return count;
 }
 
-/* Adds small enclosed pieces to a part: dark writing on a bright screen. */
-static void fill_holes(const struct split_level *l, size_t part_size, uint32_t part) {
-    const struct split_job *job = l->job;
-    float area = 0.0f;
-    connect(l, is_remainder);
-    for (size_t i = 0; i < l->triangle_count; i++)
-        job->size[l->triangle[i]] = 0.0f;
-    for (size_t i = 0; i < l->triangle_count; i++)
-        job->size[root_of(job->parent, l->triangle[i])] += mesh_triangle_area(&job->r->scene->mesh, l->triangle[i]);
-    for (size_t i = 0; i < part_size; i++)
-        area += mesh_triangle_area(&job->r->scene->mesh, l->part[i]);
-    for (size_t i = 0; i < part_size; i++) {
-        for (uint32_t h = 3 * l->part[i]; h < 3 * l->part[i] + 3; h++) {
-            uint32_t other = job->adjacency.next[h] / 3;
-            if (job->r->segments.of_triangle[other] != l->segment || !is_remainder(l, other))
-                continue;
-            uint32_t root = root_of(job->parent, other);
-            if (job->size[root] < HOLE * area)
-                job->size[root] = -1.0f;
-        }
-    }
-    for (size_t i = 0; i < l->triangle_count; i++) {
-        uint32_t t = l->triangle[i];
-        if (!is_remainder(l, t) || job->size[root_of(job->parent, t)] >= 0.0f)
-            continue;
-        job->part[t] = part;
-        job->settled[t] = true;
-    }
-}
-
 /* Keeps those of the part's triangles that show it alone. All of them are settled. */
 static size_t settle(const struct split_level *l, size_t part_size, float radiance) {
     size_t kept = 0;
@@ -161,7 +126,6 @@ static void make_part(const struct split_level *l, size_t part_size) {
     uint32_t part = ++l->job->count[l->segment];
     for (size_t i = 0; i < part_size; i++)
         l->job->part[l->part[i]] = part;
-    fill_holes(l, part_size, part);
 }
 
 /* Tests one connected set of triangles of at least the level's radiance. */
@@ -199,7 +163,7 @@ static int by_root(const void *a, const void *b) {
 static void try_level(const struct split_level *l) {
     size_t darker_count = collect_darker(l), members = 0;
     struct split_measure darker = measure(l, l->darker, darker_count);
-    connect(l, is_bright);
+    connect(l);
     for (size_t i = 0; i < l->triangle_count; i++) {
         if (is_bright(l, l->triangle[i]))
             l->member[members++] = (struct member){root_of(l->job->parent, l->triangle[i]), l->triangle[i]};
@@ -276,7 +240,6 @@ void split_segments(struct split *split, struct reconstruction *r, const struct 
     adjacency_make(&job.adjacency, &r->scene->mesh);
     by_segment_sort_triangles(&job.triangles, &r->segments, triangles);
     job.parent = mem_array(triangles, sizeof *job.parent);
-    job.size = mem_array(triangles, sizeof *job.size);
     job.part = mem_calloc(triangles, sizeof *job.part);
     job.settled = mem_calloc(triangles, sizeof *job.settled);
     job.needed = mem_calloc(triangles, sizeof *job.needed);
@@ -287,7 +250,6 @@ void split_segments(struct split *split, struct reconstruction *r, const struct 
     mem_free(job.needed);
     mem_free(job.settled);
     mem_free(job.part);
-    mem_free(job.size);
     mem_free(job.parent);
     by_segment_release_triangles(&job.triangles);
     adjacency_release(&job.adjacency);
