@@ -19,12 +19,8 @@
 /* Assumed ratio of true to observed radiance where all photographs saturate. High, since overestimated light only makes
  * fewer splits. */
 #define SATURATED_FACTOR 16.0f
-/* The sun is looked for in so many directions; from the best ones on in steps that grow smaller. */
+/* Directions in which the sun is looked for, some 3 degrees apart. */
 #define SUN_DIRECTIONS 2048
-#define SUN_BEST 8
-#define SUN_STEPS 96
-#define SUN_STEP 0.05f /* radians, about half the spacing of the directions */
-#define SUN_SMALLEST 0.003f
 /* It is found where it reaches this much more of the part than of what is beside it. */
 #define SUN_CONTRAST 0.6f
 /* Whatever else it reaches is this much brighter than what it does not. */
@@ -220,10 +216,10 @@ static float share_open(const struct sunlight *sun, const struct surface_point *
     return (float)open / (float)count;
 }
 
-/* Visibility of a direction from the part, less that from beside it. */
-static float contrast(const struct sunlight *sun, vec3 direction) {
+/* Whether a direction reaches much more of the part than of what is beside it. */
+static bool separates(const struct sunlight *sun, vec3 direction) {
     float share = share_open(sun, sun->part, sun->part_count, direction);
-    return share > SUN_CONTRAST ? share - share_open(sun, sun->beside, sun->beside_count, direction) : share - 1.0f;
+    return share >= SUN_CONTRAST && share - share_open(sun, sun->beside, sun->beside_count, direction) >= SUN_CONTRAST;
 }
 
 /* The places of `darker` that are beside the part. */
@@ -250,28 +246,6 @@ static size_t choose_beside(struct sunlight *sun, const struct mesh *mesh, const
     return near_count < MIN_BESIDE ? 0 : chosen;
 }
 
-struct shining_candidate {
-    vec3 direction;
-    float contrast;
-};
-
-/* Climbs from a direction to better ones near it. */
-static void climb(const struct sunlight *sun, struct shining_candidate *c, uint32_t key) {
-    float step = SUN_STEP;
-    for (uint32_t i = 0; i < SUN_STEPS && step > SUN_SMALLEST && c->contrast < SUN_CONTRAST; i++) {
-        vec3 s, t;
-        vec3_frame(c->direction, &s, &t);
-        vec2 u = sampler_pair(key, i, 0);
-        vec3 moved = vec3_mad(c->direction, step * (2.0f * u.x - 1.0f), s);
-        struct shining_candidate next = {.direction = vec3_normalize(vec3_mad(moved, step * (2.0f * u.y - 1.0f), t))};
-        next.contrast = contrast(sun, next.direction);
-        if (next.contrast > c->contrast)
-            *c = next;
-        else if (i % 8 == 7)
-            step *= 0.8f;
-    }
-}
-
 /* Whether the places that a direction reaches are no brighter than the rest of the room. */
 static bool is_contradicted(const struct sunlight *sun, vec3 direction) {
     const struct shining *s = sun->shining;
@@ -289,30 +263,16 @@ bool shining_is_sunlit(const struct shining *s, const uint32_t *part, size_t par
                        size_t darker_count) {
     const struct mesh *mesh = &s->r->scene->mesh;
     struct sunlight sun = {.shining = s, .accel = s->r->world.accel};
-    struct shining_candidate best[SUN_BEST];
     sun.part_count = choose_places(mesh, part, part_size, PLACES, sun.part);
     sun.beside_count = choose_beside(&sun, mesh, darker, darker_count);
     if (sun.beside_count == 0)
         return false;
-    for (int k = 0; k < SUN_BEST; k++)
-        best[k] = (struct shining_candidate){.direction = sun.part[0].normal, .contrast = -2.0f};
     uint32_t key = sampler_key(KEY_SUN, part[0], 0);
     vec3 frame[3] = {[2] = sun.part[0].normal};
     vec3_frame(frame[2], &frame[0], &frame[1]);
     for (uint32_t i = 0; i < SUN_DIRECTIONS; i++) {
-        struct shining_candidate c = {.direction = incident_cosine_direction(frame, sampler_pair(key, i, 0))};
-        c.contrast = contrast(&sun, c.direction);
-        for (int k = 0; k < SUN_BEST; k++) {
-            if (c.contrast > best[k].contrast) {
-                struct shining_candidate worse = best[k];
-                best[k] = c;
-                c = worse;
-            }
-        }
-    }
-    for (uint32_t k = 0; k < SUN_BEST; k++) {
-        climb(&sun, &best[k], sampler_key(KEY_SUN, part[0], k + 1));
-        if (best[k].contrast >= SUN_CONTRAST && !is_contradicted(&sun, best[k].direction))
+        vec3 direction = incident_cosine_direction(frame, sampler_pair(key, i, 0));
+        if (separates(&sun, direction) && !is_contradicted(&sun, direction))
             return true;
     }
     return false;
