@@ -3,7 +3,7 @@
 
 import { $, element, showEach } from "./dom.js";
 import { go, place } from "./address.js";
-import { get, load, post, send } from "./ask.js";
+import { get, load, post, send } from "./api.js";
 import { openLarge } from "./pictures.js";
 import { givenSettings, showSettings, useSettings } from "./settings.js";
 import { bundle, chosenFiles, droppedFiles } from "./tar.js";

@@ -50,4 +50,4 @@ export const duration = (s) =>
   s < 90 ? `${Math.round(s)} s` : s < 5400 ? `${Math.round(s / 60)} min` : `${(s / 3600).toFixed(1)} h`;
 
 // Whether a job may be changed by who looks at it.
-export const isHis = (me, job) => me.role === "admin" || (me.role === "user" && job.owner === me.user);
+export const isOwn = (me, job) => me.role === "admin" || (me.role === "user" && job.owner === me.user);

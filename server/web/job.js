@@ -1,10 +1,10 @@
 // job.js -- one job closely: its pictures, its room, its figures, what can be done with it. Two may stand side by side.
 
-import { $, bytes, duration, element, isHis, showEach, showFigures } from "./dom.js";
-import { ask, get, post, send } from "./ask.js";
+import { $, bytes, duration, element, isOwn, showEach, showFigures } from "./dom.js";
+import { ask, get, post, send } from "./api.js";
 import { go } from "./address.js";
 import { drawCurve } from "./curve.js";
-import { Mixer } from "./mixer.js";
+import { Mixer } from "./light_mixer.js";
 import { Slider, showThumbnails } from "./pictures.js";
 import { verdictOf } from "./verdict.js";
 
@@ -90,7 +90,7 @@ export class JobView {
   }
 
   showActions(job) {
-    const { me } = this.server, mine = isHis(me, job);
+    const { me } = this.server, mine = isOwn(me, job);
     const actions = mine ? [...ACTIONS[job.state] ?? []] : [];
     if (mine && !me.open) actions.push(job.shared ? "unshare" : "share");
     showEach(this.at("actions"), actions, (action) => action, (action) => element("button", action), (button, action) => {

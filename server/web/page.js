@@ -1,12 +1,12 @@
 // page.js -- the web page: who is signed in, the jobs of the server as they go on, and one or two of them closely.
 
 import { $, bytes } from "./dom.js";
-import { get, onSignedOut } from "./ask.js";
+import { get, onSignedOut } from "./api.js";
 import { go, onMove, place } from "./address.js";
 import { forgetCheck, onStarted, showScene } from "./check.js";
 import { JobView } from "./job.js";
 import { showList } from "./list.js";
-import { forgetPeople, showPeople } from "./people.js";
+import { forgetUsers, showUsers } from "./users.js";
 
 const DAY_MS = 86400000, WARN_DAYS = 14;  // before a token ends
 const PAGES_MAX = 20, PAGE_JOBS = 200; // of the list
@@ -44,7 +44,7 @@ $("sign-out").addEventListener("click", async () => {
   await fetch("v1/session", { method: "DELETE" });
   server.jobs.clear();
   forgetCheck();
-  forgetPeople();
+  forgetUsers();
   go({ job: null, with: null, scene: null, like: null });
   start();
 });
@@ -139,7 +139,7 @@ async function start() {
   $("sign-out").hidden = server.me.open;
   $("new").hidden = server.me.role === "viewer";
   showWho();
-  showPeople(server.me);
+  showUsers(server.me);
   await loadJobs();
   const done = [...server.jobs.values()].filter((job) => job.state === "succeeded").sort((a, b) => b.id - a.id);
   const newest = done.find((job) => job.kind !== "render") ?? done[0];

@@ -2,7 +2,7 @@
 // large.
 
 import { $, element, showEach } from "./dom.js";
-import { load } from "./ask.js";
+import { load } from "./api.js";
 
 // --- photograph and re-render -----------------------------------------------------------------
 

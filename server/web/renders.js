@@ -1,6 +1,6 @@
 // renders.js -- renders of a reconstruction that the page asks for: small ones that run beside the large jobs, and others.
 
-import { ask, get, post } from "./ask.js";
+import { ask, get, post } from "./api.js";
 
 const CAMERA = "view.json"; // the file that holds the camera of a render from elsewhere than a photograph's place
 const LANE_SPP = [64, 32, 16, 8, 4];

@@ -1,7 +1,7 @@
 // room.js -- a job's room in three dimensions: any of its textures on it, its segments named, picked, hidden and corrected.
 
 import * as THREE from "./three.module.js";
-import { ask, get, load, post } from "./ask.js";
+import { ask, get, load, post } from "./api.js";
 import { element, showEach, showFigures } from "./dom.js";
 import { readPly } from "./ply.js";
 import { RoomMesh } from "./room_mesh.js";

@@ -1,7 +1,7 @@
 // room_render.js -- renders from where the room is looked at, without what is hidden there: a small one at once, and that
 // same view large on wish.
 
-import { get, load } from "./ask.js";
+import { get, load } from "./api.js";
 import { inLane, isBusy, sizeOf, startRender } from "./renders.js";
 
 const SMALL_WIDTH = 320, LARGE_SPP = 256;

@@ -3,7 +3,7 @@
 // ("emitters.27") have no field: they are carried along from the job that the form began with, and named.
 
 import { element } from "./dom.js";
-import { get } from "./ask.js";
+import { get } from "./api.js";
 
 const FIRST = ["texture_size", "quality", "time_limit_sec"];
 const SIZES = [512, 1024, 2048, 4096, 8192];

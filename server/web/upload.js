@@ -1,7 +1,7 @@
 // upload.js -- sends a room by the tus protocol 1.0.0: in parts, going on where a broken connection or a closed page left
 // off. Which upload belongs to which bundle is kept in the browser.
 
-import { ask, get } from "./ask.js";
+import { ask, get } from "./api.js";
 import { bytes } from "./dom.js";
 
 const PART_BYTES = 8 << 20;

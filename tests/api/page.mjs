@@ -40,7 +40,7 @@ async function open(hash, viewport = { width: 1200, height: 900 }) {
 
 // In the page: the mean of the render of all lights, and of what the mixer shows, linear and as code values.
 const compare = (id) => (async () => {
-  const { readExr } = await import("/web/exr.js"), { Mix } = await import("/web/mix.js");
+  const { readExr } = await import("/web/exr.js"), { Mix } = await import("/web/light_mix.js");
   const read = async (name) => readExr(await (await fetch(`/v1/jobs/${id}/outputs/${name}`)).arrayBuffer());
   const mean = (list) => list.reduce((sum, x) => sum + x, 0) / list.length;
   const views = await (await fetch(`/v1/jobs/${id}/outputs/views.json`)).json(), { files, noise } = views.frames[0];
@@ -73,7 +73,7 @@ async function compareSum(page) {
 
 // The settings that lights mean.
 const applied = (before, name, factor) => (async () => {
-  const { applyFactor } = await import("/web/mix.js"), settings = structuredClone(before);
+  const { applyFactor } = await import("/web/light_mix.js"), settings = structuredClone(before);
   applyFactor(settings, name, factor);
   return settings;
 })();
@@ -97,7 +97,7 @@ async function saveSettings(page) {
 // Eight lights at 640 x 480; a figure to read, since no clock of a shared machine decides a test.
 async function timeMix(page) {
   const times = await page.evaluate(async () => {
-    const { Mix } = await import("/web/mix.js"), count = 3 * 640 * 480, pixels = new Uint8ClampedArray(4 * 640 * 480), times = [];
+    const { Mix } = await import("/web/light_mix.js"), count = 3 * 640 * 480, pixels = new Uint8ClampedArray(4 * 640 * 480), times = [];
     const mix = new Mix(640, 480, [...Array(8)].map((_, s) => ({ rgb: Float32Array.from({ length: count }, (_, i) => ((i * (s + 7)) % 101) / 200) })));
     for (let i = 0; i < 9; i++) {
       const began = performance.now();

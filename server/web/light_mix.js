@@ -1,4 +1,4 @@
-// mix.js -- light adds up: a picture under any strength and colour of its sources is the sum of its pictures under each of
+// light_mix.js -- light adds up: a picture under any strength and colour of its sources is the sum of its pictures under each of
 // them alone. Shown as the server shows it (server/relight/passes.c, common/png_write.c).
 
 const STEPS = 65536;

@@ -1,4 +1,4 @@
-// ask.js -- requests to the server. The token is in a cookie that no script can read; every request simply carries it.
+// api.js -- requests to the server. The token is in a cookie that no script can read; every request simply carries it.
 
 const EXPIRED = "urn:unbake:token-expired";
 

@@ -1,10 +1,10 @@
-// mixer.js -- the light mixer of a room: a switch, a strength and a colour for each lamp, the sky and the sun over renders
+// light_mixer.js -- the light mixer of a room: a switch, a strength and a colour for each lamp, the sky and the sun over renders
 // of each alone, mixed in the browser at once and saved as a render.
 
-import { ask, get } from "./ask.js";
+import { ask, get } from "./api.js";
 import { element, showEach } from "./dom.js";
 import { readExr } from "./exr.js";
-import { applyFactor, colourOf, meanOf, Mix } from "./mix.js";
+import { applyFactor, colourOf, meanOf, Mix } from "./light_mix.js";
 import { hasOtherFiles, hasOwnCamera, inLane, isBusy, isPerLight, sizeOf, startRender } from "./renders.js";
 
 const SMALL_WIDTH = 320, LARGE_WIDTH = 640; // pixels

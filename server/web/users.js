@@ -1,7 +1,7 @@
-// people.js -- for admins: who there is, what they keep and have used, and their tokens, which are made and revoked here.
+// users.js -- for admins: who there is, what they keep and have used, and their tokens, which are made and revoked here.
 
 import { $, bytes, element, showEach } from "./dom.js";
-import { get, post, send } from "./ask.js";
+import { get, post, send } from "./api.js";
 
 const DAY_MS = 86400000;
 const day = (text) => (text ? new Date(text).toLocaleDateString() : "never");
@@ -62,12 +62,12 @@ $("add-token").addEventListener("submit", (event) => {
 });
 
 // me: {role, open}: there is nothing to see for others, and no users where the daemon lets everybody in
-export function showPeople(me) {
+export function showUsers(me) {
   $("people").hidden = me.role !== "admin" || me.open;
   if ($("people").hidden) $("people").open = false;
 }
 
-export function forgetPeople() {
+export function forgetUsers() {
   for (const id of ["users", "tokens"]) $(id).replaceChildren();
   $("new-token").hidden = true;
   $("new-token-text").value = "";
