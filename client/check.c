@@ -1,10 +1,10 @@
 /* check.c -- `check`: whether the server can work with a room, before any job. */
 #include <string.h>
 
+#include "client/client_room.h"
 #include "client/collection.h"
 #include "client/commands.h"
 #include "client/findings.h"
-#include "client/client_room.h"
 #include "common/file.h"
 #include "common/mem.h"
 #include "common/protocol.h"

@@ -6,10 +6,10 @@
 #include <stdint.h>
 
 #include "client/format.h"
-#include "common/options.h"
 #include "client/terminal.h"
 #include "common/error.h"
 #include "common/json.h"
+#include "common/options.h"
 #include "common/request.h"
 
 /* Exit statuses: part of the interface, listed in the help and in README.md. */

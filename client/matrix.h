@@ -4,9 +4,9 @@
 #ifndef UNBAKE_CLIENT_MATRIX_H
 #define UNBAKE_CLIENT_MATRIX_H
 
-#include "common/options.h"
 #include "common/buf.h"
 #include "common/json.h"
+#include "common/options.h"
 
 #define MATRIX_MAX 1024 /* combinations; more are probably a mistake */
 

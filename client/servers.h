@@ -14,8 +14,8 @@
 
 #include <stddef.h>
 
-#include "common/options.h"
 #include "common/error.h"
+#include "common/options.h"
 
 struct server_entry {
     char *name, *url, *ca, *token_file; /* NULL: not said (name and url are); owned */

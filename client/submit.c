@@ -11,8 +11,8 @@
 
 #include "client/client_room.h"
 #include "client/commands.h"
-#include "client/format.h"
 #include "client/findings.h"
+#include "client/format.h"
 #include "client/matrix.h"
 #include "client/new_job.h"
 #include "common/mem.h"

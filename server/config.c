@@ -7,9 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/assignment.h"
 #include "common/file.h"
 #include "common/mem.h"
-#include "common/assignment.h"
 #include "common/nearest.h"
 #include "server/executor/sites.h"
 #include "server/net/address.h"

@@ -5,8 +5,8 @@
 
 #include "common/image.h"
 #include "common/mem.h"
-#include "server/capture/top_k.h"
 #include "server/capture/robust.h"
+#include "server/capture/top_k.h"
 #include "server/scene/surface.h"
 
 /* Radiance added before a logarithm, as a share of the median: keeps black finite. */

@@ -10,12 +10,12 @@
 #include "common/quantile.h"
 #include "server/capture/orient.h"
 #include "server/evaluate/pair_picture.h"
-#include "server/relight/recovered.h"
 #include "server/evaluate/seen.h"
 #include "server/evaluate/stated_deviation.h"
 #include "server/ingest/bundle.h"
 #include "server/ingest/pixels.h"
 #include "server/reconstruct/held_render.h"
+#include "server/relight/recovered.h"
 #include "server/render/film.h"
 #include "server/scene/scene.h"
 

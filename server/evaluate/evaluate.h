@@ -15,10 +15,10 @@
 #include "common/json.h"
 #include "common/parallel.h"
 #include "server/evaluate/found_emitters.h"
-#include "server/evaluate/smooth_areas.h"
 #include "server/evaluate/noise_floor.h"
 #include "server/evaluate/plain_surface.h"
 #include "server/evaluate/score.h"
+#include "server/evaluate/smooth_areas.h"
 #include "server/evaluate/stated_deviation.h"
 
 struct reading; /* common/reading.h */

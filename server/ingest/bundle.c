@@ -10,17 +10,17 @@
 
 #include "common/file.h"
 #include "common/mem.h"
-#include "server/ingest/archive.h"
 #include "server/ingest/applied_transform.h"
+#include "server/ingest/archive.h"
 #include "server/ingest/duplicate_frames.h"
-#include "server/ingest/mesh_choice.h"
+#include "server/ingest/frames.h"
 #include "server/ingest/mesh/mesh_file.h"
+#include "server/ingest/mesh_choice.h"
 #include "server/ingest/path.h"
 #include "server/ingest/photos.h"
 #include "server/ingest/reading_apply.h"
-#include "server/ingest/source/unsupported.h"
 #include "server/ingest/source/sources.h"
-#include "server/ingest/frames.h"
+#include "server/ingest/source/unsupported.h"
 
 struct bundle_limits bundle_default_limits(void) {
     return (struct bundle_limits){

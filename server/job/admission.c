@@ -7,8 +7,8 @@
 #include <strings.h>
 
 #include "common/json.h"
-#include "common/machine.h"
 #include "common/kept_pixels.h"
+#include "common/machine.h"
 #include "common/mem.h"
 #include "common/output_names.h"
 #include "common/settings.h"

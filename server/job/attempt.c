@@ -12,9 +12,9 @@
 #include "server/data/attempt_folder.h"
 #include "server/data/layout.h"
 #include "server/job/admission.h"
-#include "server/job/scene_fit.h"
 #include "server/job/housekeeping.h"
 #include "server/job/orders.h"
+#include "server/job/scene_fit.h"
 
 #define EVENTS_MAX 500000      /* of one attempt: three days at 2 a second, which is a lot */
 #define CHECK_LIMIT_SEC 3600.0 /* a scene's check that takes longer is considered stuck */

@@ -14,8 +14,8 @@
 
 #include "common/json.h"
 #include "server/job/counters.h"
-#include "server/job/scheduler_config.h"
 #include "server/job/run.h"
+#include "server/job/scheduler_config.h"
 #include "server/store/store.h"
 
 enum attempt_phase { ATTEMPT_EMPTY, ATTEMPT_ALIVE, ATTEMPT_ENDED };

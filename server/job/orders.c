@@ -6,8 +6,8 @@
 
 #include "common/render_settings.h"
 #include "server/data/attempt_folder.h"
-#include "server/job/scene_fit.h"
 #include "server/job/memory_reduction.h"
+#include "server/job/scene_fit.h"
 
 cJSON *orders_new(const char *kind, const struct scheduler_config *config, int thread_count) {
     cJSON *order = cJSON_CreateObject();

@@ -11,11 +11,11 @@
 #include "common/protocol.h"
 #include "server/data/layout.h"
 #include "server/data/trash.h"
+#include "server/job/disk_usage.h"
+#include "server/job/housekeeping.h"
+#include "server/job/memory_reduction.h"
 #include "server/job/worker_log.h"
 #include "server/job/worker_messages.h"
-#include "server/job/housekeeping.h"
-#include "server/job/disk_usage.h"
-#include "server/job/memory_reduction.h"
 #include "server/worker/progress.h"
 
 #define LOG_TAIL_MAX 400 /* bytes */

@@ -2,8 +2,8 @@
 #include "server/refine/refine.h"
 
 #include "common/mem.h"
-#include "server/refine/correction.h"
 #include "server/refine/comparison.h"
+#include "server/refine/correction.h"
 
 /* Cells of the correction along the longer side of the texture: 16 texels of 2048, twice a probe's block (solve.c), as
  * errors of light are no finer. */

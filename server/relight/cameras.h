@@ -4,8 +4,8 @@
 
 #include <stddef.h>
 
-#include "server/relight/compass.h"
 #include "common/error.h"
+#include "server/relight/compass.h"
 #include "server/relight/relight_job.h"
 #include "server/scene/camera.h"
 

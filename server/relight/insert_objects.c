@@ -1,5 +1,5 @@
 /* insert_objects.c -- see insert_objects.h. A material without pictures has one texel in a square of four, so that no
- * lookup mixes it with others; a object with pictures has a block as large as its atlas. */
+ * lookup mixes it with others; an object with pictures has a block as large as its atlas. */
 #include "server/relight/insert_objects.h"
 
 #include <string.h>
@@ -121,7 +121,7 @@ static vec2 set_cell(struct materials *m, const struct texel_plan *l, size_t i, 
     return vec2_make((float)x + 0.5f, (float)y + 0.5f);
 }
 
-/* The block of a object from row `top` on; its first material is segment `first`. */
+/* The block of an object from row `top` on; its first material is segment `first`. */
 static void set_block(struct materials *m, const struct texel_plan *l, const struct baked *b, uint32_t top,
                       size_t first) {
     if (b->emission && !m->emission_pattern)
@@ -167,7 +167,7 @@ static void append_mesh(struct mesh *mesh, const struct mesh *more) {
     mesh->triangle_count = triangles;
 }
 
-/* `place` of each material, for a object without pictures. */
+/* `place` of each material, for an object without pictures. */
 static void put_thing(struct recovered *r, struct mesh *mesh, const struct virtual_object *object, size_t first_segment,
                       const vec2 *place, uint32_t top) {
     size_t first = mesh->triangle_count;

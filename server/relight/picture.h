@@ -5,8 +5,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "common/image.h"
 #include "common/error.h"
+#include "common/image.h"
 #include "common/parallel.h"
 #include "server/render/path.h"
 #include "server/render/world.h"

@@ -16,11 +16,11 @@
 #include "server/relight/cameras.h"
 #include "server/relight/denoise.h"
 #include "server/relight/environment.h"
+#include "server/relight/luminance_per_unit.h"
 #include "server/relight/output.h"
 #include "server/relight/picture.h"
 #include "server/relight/relight_plan.h"
 #include "server/relight/relit.h"
-#include "server/relight/luminance_per_unit.h"
 #include "server/render/film.h"
 
 #define ROULETTE_DEPTH 5 /* segment of a path from which Russian roulette may end it */

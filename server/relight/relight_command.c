@@ -11,9 +11,9 @@
 #include "common/mem.h"
 #include "server/relight/cameras.h"
 #include "server/relight/denoise.h"
-#include "server/relight/setting_files.h"
 #include "server/relight/relight.h"
 #include "server/relight/relight_plan.h"
+#include "server/relight/setting_files.h"
 
 const struct command_option relight_flags[] = {
     {"out", 0, OPTION_TEXT, "FILE|DIR",

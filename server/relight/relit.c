@@ -6,10 +6,10 @@
 #include <string.h>
 
 #include "common/mem.h"
-#include "server/relight/insert_objects.h"
 #include "server/relight/environment.h"
-#include "server/relight/setting_files.h"
+#include "server/relight/insert_objects.h"
 #include "server/relight/recovered.h"
+#include "server/relight/setting_files.h"
 #include "server/relight/virtual_objects.h"
 
 /* --- settings of segments --------------------------------------------------------------------------------------- */

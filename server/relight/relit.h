@@ -6,14 +6,14 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "server/relight/cameras.h"
 #include "common/error.h"
 #include "common/parallel.h"
+#include "server/relight/cameras.h"
 #include "server/relight/relight_job.h"
 #include "server/relight/sky.h"
 #include "server/render/world.h"
 
-/* What shines: a segment of the room, a object that was added, or distant light. */
+/* What shines: a segment of the room, an object that was added, or distant light. */
 struct relit_source {
     char *name;       /* "light_27", "lamp_1", "insert_2", "insert_2_0" (its first material), "sky", "sun"; owned */
     uint32_t segment; /* or LIGHT_ENVIRONMENT */
@@ -22,7 +22,7 @@ struct relit_source {
 
 struct relit {
     struct mesh mesh;
-    struct segments segments; /* those of the outputs, then one for each material of a object; no names */
+    struct segments segments; /* those of the outputs, then one for each material of an object; no names */
     struct atlas atlas;       /* no charts: corners only */
     struct materials materials;
     struct world world;

@@ -2,9 +2,9 @@
 #ifndef UNBAKE_RELIGHT_VIRTUAL_OBJECTS_H
 #define UNBAKE_RELIGHT_VIRTUAL_OBJECTS_H
 
-#include "server/relight/compass.h"
 #include "common/error.h"
 #include "common/parallel.h"
+#include "server/relight/compass.h"
 #include "server/relight/relight_job.h"
 #include "server/relight/virtual_object.h"
 

@@ -19,8 +19,8 @@
 #include "common/mem.h"
 #include "common/protocol.h"
 #include "common/url.h"
-#include "server/worker/sandbox.h"
 #include "server/worker/progress.h"
+#include "server/worker/sandbox.h"
 #include "server/worker/tasks.h"
 
 #define PATIENCE_SEC 10 /* for each step; the daemon limits the whole */

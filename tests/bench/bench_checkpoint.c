@@ -8,10 +8,10 @@
 
 #include "common/clock.h"
 #include "common/file.h"
+#include "common/hash64.h"
 #include "common/mem.h"
 #include "server/worker/checkpoint.h"
 #include "server/worker/checkpoint_file.h"
-#include "common/hash64.h"
 
 static void touch(const struct state_array *array, size_t count, size_t every, uint32_t value) {
     for (size_t i = 0; i < count; i++)

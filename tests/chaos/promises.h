@@ -17,8 +17,8 @@
 #include "common/sha256.h"
 #include "server/data/attempt_folder.h"
 #include "server/data/layout.h"
-#include "server/uploads/resumable.h"
 #include "server/http/service.h"
+#include "server/uploads/resumable.h"
 #include "server/worker/checkpoint.h"
 #include "tests/chaos/cut.h"
 

@@ -8,10 +8,10 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "server/http/views.h"
-#include "server/job/worker_messages.h"
+#include "server/job/counters.h"
 #include "server/job/line_reader.h"
 #include "server/job/outcome.h"
-#include "server/job/counters.h"
+#include "server/job/worker_messages.h"
 #include "server/worker/progress.h"
 #include "tests/fuzz/fuzz.h"
 

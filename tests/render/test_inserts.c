@@ -1,8 +1,8 @@
 /* Meshes of files that are put into a room with their own materials (mesh_object.h): an emissive one against a lamp,
  * metals in a furnace, pictures and several materials of GLB and OBJ by what the first hits see, and what is said of
  * the rest. */
-#include "server/relight/bake.h"
 #include "common/buf.h"
+#include "server/relight/bake.h"
 #include "tests/check.h"
 #include "tests/relit_room.h"
 

@@ -4,8 +4,8 @@
  * itself: `test_attempt_faults worker DIR`. */
 #include "server/job/attempt.h"
 
-#include "server/job/worker_messages.h"
 #include "server/job/outcome.h"
+#include "server/job/worker_messages.h"
 #include "server/store/internal.h"
 #include "server/worker/progress.h"
 #include "tests/unit/fault_rig.h"

@@ -1,8 +1,8 @@
 /* test_attempt_folder.c -- the folders of attempts: a checkpoint has one owner, which it changes by one rename; what no
  * row names goes, and nothing else; folders of an older version become folders of attempts, wherever that is
  * interrupted. Calls of the system fail, one after the other. */
-#include "server/data/attempt_folder.h"
 #include "server/data/attempt_cleanup.h"
+#include "server/data/attempt_folder.h"
 
 #include "server/data/layout.h"
 #include "server/store/internal.h"

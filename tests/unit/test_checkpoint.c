@@ -12,9 +12,9 @@
 #include <sys/wait.h>
 
 #include "common/file.h"
+#include "common/hash64.h"
 #include "common/mem.h"
 #include "common/protocol.h"
-#include "common/hash64.h"
 #include "tests/check.h"
 
 static struct error err;

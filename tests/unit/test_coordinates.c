@@ -7,8 +7,8 @@
 #include "server/ingest/mesh/mesh_file.h"
 #include "server/ingest/mesh/obj.h"
 #include "server/ingest/mesh/ply.h"
-#include "server/ingest/pose.h"
 #include "server/ingest/mesh/positions.h"
+#include "server/ingest/pose.h"
 #include "tests/check.h"
 
 #define HEAD "ply\nformat ascii 1.0\n"

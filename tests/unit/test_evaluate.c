@@ -9,9 +9,9 @@
 #include "server/demo/generate.h"
 #include "server/demo/room.h"
 #include "server/evaluate/evaluate.h"
-#include "server/relight/recovered.h"
 #include "server/evaluate/score.h"
 #include "server/export/outputs.h"
+#include "server/relight/recovered.h"
 #include "tests/check.h"
 
 enum { BASE = 0, ROUGHNESS = 3, SPECULAR = 4, EMISSION = 5, OBJECT = 8, CHANNELS = 9 };

@@ -1,9 +1,9 @@
 /* fill.h: the angle to what is known, held against that to each known pixel in turn: at the seam, beside the poles,
  * far away; and behind one's back a sky above and ground below, as a window shows them. (Next to what is known:
  * render/test_environment.) */
-#include "server/capture/fill.h"
 #include "common/mem.h"
 #include "common/vec.h"
+#include "server/capture/fill.h"
 #include "server/scene/latlong.h"
 #include "tests/check.h"
 

@@ -1,8 +1,8 @@
 /* footprint.h: of a plane seen aslant, what a pixel covers in closed form; its texels' shares come to 1, have their
  * middle where the footprint's is, and read a pattern as an integral over the footprint does; what is of another chart
  * or beyond the texture is told; nothing is seen edge-on or from behind. */
-#include "server/material/footprint.h"
 #include "common/parallel.h"
+#include "server/material/footprint.h"
 #include "tests/check.h"
 
 #define SIDE 256    /* texels */

@@ -1,8 +1,8 @@
 /* Header fields: entity tags, ranges, digests, hosts. */
 #include "server/net/field.h"
 
-#include "tests/check.h"
 #include "common/sha256.h"
+#include "tests/check.h"
 
 static void check_range(const char *text, uint64_t size, enum field_range wanted, uint64_t first, uint64_t count) {
     uint64_t found_first = 0, found_count = 0;

@@ -1,9 +1,9 @@
 /* latlong.h: places and directions lead back to each other; solid angles come to 4 pi and weigh a map as the renderer's
  * interpolation does; the layout is that of Mitsuba 3, by the colours that it reads in nine directions. */
-#include "server/scene/latlong.h"
 #include "common/image.h"
 #include "common/rng.h"
 #include "server/render/light.h"
+#include "server/scene/latlong.h"
 #include "tests/check.h"
 
 #define DIRECTIONS 20000

@@ -1,6 +1,6 @@
 /* The OBJ reader: what it takes, what it refuses and where it says the fault lies. */
-#include "server/ingest/mesh/obj.h"
 #include "server/ingest/mesh/mesh_file.h"
+#include "server/ingest/mesh/obj.h"
 
 #include "server/ingest/mesh/intern.h"
 #include "tests/check.h"

@@ -1,6 +1,6 @@
 /* The PLY reader: what it takes, what it refuses and where it says the fault lies. */
-#include "server/ingest/mesh/ply.h"
 #include "server/ingest/mesh/mesh_file.h"
+#include "server/ingest/mesh/ply.h"
 
 #include "server/ingest/mesh/polygon.h"
 #include "tests/check.h"

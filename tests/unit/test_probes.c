@@ -1,8 +1,8 @@
 /* probes.h: what arrives from a rectangular lamp is what its form factor says, wherever a probe stands, and nothing
  * does behind what stands in the way; between probes it is interpolated by weights that come to 1, within a chart, by
  * likeness of normals and, for what is seen, by probes that are. */
-#include "server/gather/probes.h"
 #include "common/mem.h"
+#include "server/gather/probes.h"
 #include "server/scene/materials.h"
 #include "tests/check.h"
 

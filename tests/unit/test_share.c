@@ -4,10 +4,10 @@
  * `test_share worker DIR`. */
 #include "server/job/attempt.h"
 
-#include "server/job/worker_messages.h"
-#include "server/job/housekeeping.h"
 #include "server/job/disk_usage.h"
+#include "server/job/housekeeping.h"
 #include "server/job/outcome.h"
+#include "server/job/worker_messages.h"
 #include "server/worker/progress.h"
 #include "tests/unit/fault_rig.h"
 

@@ -1,8 +1,8 @@
 /* sun.h: a sun that is drawn into the map of distant light is read back by the renderer where it is and as strong as it
  * is: at the poles, near them, at the horizon, around the seam, in a small map and in one that is made finer for it;
  * what the map had before stays where it was. */
-#include "server/gather/sun.h"
 #include "common/mem.h"
+#include "server/gather/sun.h"
 #include "server/render/light.h"
 #include "server/scene/latlong.h"
 #include "tests/check.h"

@@ -1,8 +1,8 @@
 /* sun_seen.h: a sun that was drawn into a map of distant light is taken out of it again, as strong, as wide and where
  * it was, also blurred as photographs blur it, and the sky about it is what it was; at a pole, around the seam. What is
  * cut by unseen or saturated directions, wide or weak stays. */
-#include "server/light/sun_seen.h"
 #include "common/mem.h"
+#include "server/light/sun_seen.h"
 #include "server/scene/latlong.h"
 #include "tests/check.h"
 

@@ -4,8 +4,8 @@
 #include "common/file.h"
 #include "common/mem.h"
 #include "server/ingest/mesh/gltf.h"
-#include "server/ingest/mesh/obj.h"
 #include "server/ingest/mesh/mesh_file.h"
+#include "server/ingest/mesh/obj.h"
 #include "tests/check.h"
 
 #define TEXT(...) ((const char *const[]){__VA_ARGS__})

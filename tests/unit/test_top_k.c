@@ -1,8 +1,8 @@
 /* top_k.h: of any number of items the best are kept by weight, as sorting all of them would choose, in whatever order
  * they come; equal weights go by index; what weighs nothing, or is no number, is not taken. */
-#include "server/capture/top_k.h"
 #include "common/mem.h"
 #include "common/rng.h"
+#include "server/capture/top_k.h"
 #include "tests/check.h"
 
 #define MOST 48

@@ -8,9 +8,9 @@
 #include "server/ingest/mapping.h"
 #include "server/ingest/mesh/gltf.h"
 #include "server/ingest/mesh/obj.h"
-#include "server/ingest/path.h"
 #include "server/ingest/mesh/ply.h"
 #include "server/ingest/mesh/positions.h"
+#include "server/ingest/path.h"
 
 typedef enum status mesh_parser(const void *data, size_t size, const char *name, const char *folder,
                                 size_t triangle_limit, struct mesh *mesh, struct mesh_materials *materials,

@@ -7,9 +7,9 @@
 #include <stdint.h>
 
 #include "common/error.h"
+#include "server/ingest/findings.h"
 #include "server/ingest/mesh/faces.h"
 #include "server/ingest/mesh/mesh_materials.h"
-#include "server/ingest/findings.h"
 #include "server/scene/mesh.h"
 
 /* Whether the name has an extension of a supported format. */

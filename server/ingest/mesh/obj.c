@@ -7,8 +7,8 @@
 #include <string.h>
 
 #include "common/mem.h"
-#include "server/ingest/mesh/intern.h"
 #include "server/ingest/mapping.h"
+#include "server/ingest/mesh/intern.h"
 #include "server/ingest/mesh/obj_materials.h"
 #include "server/ingest/mesh/obj_objects.h"
 #include "server/ingest/mesh/positions.h"

@@ -6,8 +6,8 @@
 #include "common/file.h"
 #include "common/mem.h"
 #include "server/ingest/mapping.h"
-#include "server/ingest/path.h"
 #include "server/ingest/mesh/texture_pages.h"
+#include "server/ingest/path.h"
 
 #define MAX_LIBRARY_BYTES ((size_t)16 << 20) /* of an MTL file */
 

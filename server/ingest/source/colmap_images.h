@@ -4,8 +4,8 @@
 
 #include "common/error.h"
 #include "server/ingest/findings.h"
-#include "server/ingest/source/colmap_cameras.h"
 #include "server/ingest/frames.h"
+#include "server/ingest/source/colmap_cameras.h"
 
 /* Parses an images file in memory. `prefix` is prepended to the photographs' names. */
 enum status colmap_images_parse(const void *data, size_t size, const char *name, bool binary,

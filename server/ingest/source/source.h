@@ -8,8 +8,8 @@
 
 #include "common/error.h"
 #include "server/ingest/findings.h"
-#include "server/ingest/listing.h"
 #include "server/ingest/frames.h"
+#include "server/ingest/listing.h"
 
 /* What a source works on. */
 struct source_place {
