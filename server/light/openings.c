@@ -7,6 +7,7 @@
 #include "common/mem.h"
 #include "server/light/emitters.h"
 #include "server/light/light_model.h"
+#include "server/light/unseen_light.h"
 
 /* Standard deviations by which an opening is brighter than the mean of its prior. */
 #define SURE 2.0
@@ -124,6 +125,14 @@ static size_t add_surface(struct reconstruction *r, const struct surround *s, co
 
 /* --- the whole --------------------------------------------------------------------------------------------- */
 
+/* Part of the points' rays that leave the room where nothing is known. */
+static double escaping_share(const struct light_points *points) {
+    double sum = 0.0;
+    for (size_t i = 0; i < points->count; i++)
+        sum += (double)points->point[i].escaping;
+    return sum / fmax((double)points->count, 1.0);
+}
+
 size_t openings_find(struct reconstruction *r, const struct views *views) {
     struct light_model m;
     struct surround surround;
@@ -135,6 +144,11 @@ size_t openings_find(struct reconstruction *r, const struct views *views) {
     light_model_init(&m, r, views, false);
     m.sky.surround = &surround;
     light_model_survey(&m, views, NULL, NULL);
+    r->is_surrounded = escaping_share(&m.points) <= UNSEEN_LIGHT_MOSTLY;
+    if (!r->is_surrounded) {
+        light_model_release(&m);
+        return 0;
+    }
     joint_fit_solve(&m.fit, JOINT_STEPS);
     size_t count = choose(&m, chosen);
     light_model_release(&m);

@@ -5,7 +5,8 @@
  * cells of a box around the scan (surround.h) are in its place. Those that photographs look at through the mesh become
  * surface, which shows what they show. The others are fitted together with all other sources (light_model.h), and those
  * of which surfaces tell become surface, too: lamps of the kind ESTIMATED_OPENING. Each is a segment, at the end of
- * mesh and segments, the lamps last. The rest of the box stays open and dark.
+ * mesh and segments, the lamps last. The rest of the box stays open and dark. Not where most of the room was not
+ * scanned (UNSEEN_LIGHT_MOSTLY): a few lamps in much darkness do not light it as what stands there does.
  *
  * Limits: a source behind a gap lies farther away than it is; a light that several cells share is spread over them. */
 #ifndef UNBAKE_LIGHT_OPENINGS_H
@@ -14,10 +15,11 @@
 #include "server/capture/views.h"
 #include "server/state/reconstruction.h"
 
-/* Needs fused radiance, and a world lit by r->environment if that has a map. Does nothing unless r->is_surrounded. Sets
- * r->opening_count and r->light.source, takes r->environment away, and returns the number of new segments, each of
- * OPENINGS_TRIANGLES, the last ones of the mesh. Where there are any, the mesh's arrays may have moved, and what was
- * made of mesh and segments must be made again. The same for any number of threads. */
+/* Needs fused radiance, and a world lit by r->environment if that has a map. Does nothing unless r->is_surrounded, which
+ * it takes back where most of the room was not scanned. Sets r->opening_count and r->light.source, takes r->environment
+ * away, and returns the number of new segments, each of OPENINGS_TRIANGLES, the last ones of the mesh. Where there are
+ * any, the mesh's arrays may have moved, and what was made of mesh and segments must be made again. The same for any
+ * number of threads. */
 #define OPENINGS_TRIANGLES 2
 size_t openings_find(struct reconstruction *r, const struct views *views);
 

@@ -18,9 +18,6 @@
 /* Nothing is so white. Light is missing, and not only known badly, if more than the rest of the points are. */
 #define IMPOSSIBLE_BASE_COLOR 1.5
 #define NOT_IMPOSSIBLE 0.8
-/* Where more of all rays than this leave the room that way, light is a guess for the most part, and what surfaces say
- * is a better one however credible it looks (redkitchen .51; staircase2 .13, rooms with windows .02 at most). */
-#define MOSTLY_UNSEEN 0.3
 
 struct unseen {
     struct reconstruction *r;
@@ -131,7 +128,7 @@ void unseen_light_estimate(struct reconstruction *r, const struct views *views) 
     u.count = unseen_keep_informative(u.point, u.count);
     double base_color = unseen_base_color(u.point, u.count, NOT_IMPOSSIBLE, NULL);
     bool matters = !r->is_surrounded && u.count >= UNSEEN_MIN_POINTS &&
-                   (base_color > IMPOSSIBLE_BASE_COLOR || r->unseen_share > MOSTLY_UNSEEN);
+                   (base_color > IMPOSSIBLE_BASE_COLOR || r->unseen_share > UNSEEN_LIGHT_MOSTLY);
     if (matters)
         relight(&u);
     r->sky_is_fitted = matters;

@@ -13,6 +13,11 @@
 #include "server/capture/views.h"
 #include "server/state/reconstruction.h"
 
+/* Where more of all rays than this leave the room where nothing is known, light is a guess for the most part, and what
+ * surfaces say is a better one however credible it looks (redkitchen .51; staircase2 .13, rooms with windows .02 at
+ * most). */
+#define UNSEEN_LIGHT_MOSTLY 0.3
+
 /* Needs r->fused, and a world lit by r->environment if that has a map. Changes the filled-in part of the map, or makes
  * one, unless the guess suffices or hardly any ray leaves the room that way (r->unseen_share). Adds "unseen_light" to
  * the report. The same for any number of threads. */

@@ -1,5 +1,6 @@
-/* openings.h, surround.h: which cell of the box around a scan a ray leaves through; and a room whose ceiling was not
- * scanned, nor the lamp beneath it: light comes in from where it does. The same for any number of threads. */
+/* openings.h, surround.h: which cell of the box around a scan a ray leaves through; a room whose ceiling was not scanned,
+ * nor the lamp beneath it: light comes in from where it does; and one of which hardly more than a wall and the floor
+ * were. The same for any number of threads. */
 #include "server/light/surround.h"
 #include "tests/check.h"
 #include "tests/render/shell.h"
@@ -156,11 +157,39 @@ static void test_room(struct parallel *pool) {
     scene_release(&scene);
 }
 
+static vec3 look_at_wall(int frame) { return look_low(2 * frame); }
+
+/* Only the floor and the wall with the hole were scanned: the hole is filled, and all else stays distant. */
+static void test_mostly_unscanned(struct parallel *pool) {
+    struct settings settings = shell_settings(SETTINGS);
+    struct shell shell = {.polls_until_stop = 1}; /* after fuse */
+    struct reconstruction r;
+    struct scene scene = {0};
+    make_mesh(&scene.mesh);
+    photograph_samples = 16;
+    photograph_mesh(&scene, lamp_radiance, NULL, look_at_wall, pool);
+    scan(&scene);
+    for (int64_t wall = 2; wall < LAMP; wall++) {
+        if (wall != 4)
+            drop(&scene.mesh, wall);
+    }
+    size_t scanned = scene.mesh.triangle_count;
+    CHECK(shell_run(&scene, &settings, 2, &shell, &r) == STATUS_CANCELLED);
+    CHECK(scene.mesh.triangle_count > scanned);
+    CHECK_THAT(r.unseen_share > 0.3, "%g of the rays", r.unseen_share);
+    CHECK(r.opening_count == 0 && !r.is_surrounded && r.sky_is_fitted);
+    reconstruct_release(&r);
+    shell_release(&shell);
+    settings_release(&settings);
+    scene_release(&scene);
+}
+
 int main(void) {
     struct parallel *pool = parallel_new(0);
     test_cells();
     test_cameras();
     test_room(pool);
+    test_mostly_unscanned(pool);
     parallel_free(pool);
     return check_result();
 }
