@@ -19,6 +19,7 @@ static const struct figure_name known[] = {
     {"outline_share", "share of pixels beside outlines", ""},
     {"msre_render_noise", "that noise, which is not in the error", ""},
     {"msre_photograph_noise", "noise of the photograph, which is", ""},
+    {"brightness_error", "by how much whole views are too bright or dark", ", 0 is best"},
     {"psnr_db", "PSNR in dB", ", 25 and more is good"},
     {"psnr_noise_left_db", "give or take", " dB"},
     {"ssim", "SSIM", ", 1 is best"},

@@ -59,6 +59,19 @@ struct metric metrics_msre(const struct image *photograph, const struct image *h
     return mean_product(photograph, halves, relative_error, median);
 }
 
+double metrics_brightness_error(const struct image *photograph, const struct image *halves) {
+    double of_photograph = 0.0, a = 0.0, b = 0.0;
+    for (size_t i = 0; i < (size_t)photograph->width * photograph->height; i++) {
+        const float *r = photograph->pixel + 3 * i, *v = halves->pixel + 6 * i;
+        for (int c = 0; c < 3 && pixel_is_finite(r, 3) && pixel_is_finite(v, 6); c++) {
+            of_photograph += (double)r[c];
+            a += (double)v[c];
+            b += (double)v[3 + c];
+        }
+    }
+    return of_photograph > 0.0 && a > 0.0 && b > 0.0 ? log(a / of_photograph) * log(b / of_photograph) : (double)NAN;
+}
+
 /* Half of the difference, twice. */
 static struct error_pair relative_noise(float photograph, float a, float b, double median) {
     double half = 0.5 * ((double)a - (double)b) * relative_to((double)photograph, median);

@@ -27,6 +27,10 @@ double metrics_msre_of_renders(const struct image *photograph, const struct imag
 double metrics_msre_of_photograph(const struct image *photograph, const struct image *deviation,
                                   double median_radiance);
 
+/* Square of the logarithm of the mean radiance of a re-render over that of the photograph; negative where noise is more
+ * than that. NaN also where either is not positive. */
+double metrics_brightness_error(const struct image *photograph, const struct image *halves);
+
 /* Peak signal-to-noise ratio in dB of the displayed pictures: sRGB of radiance x exposure, clamped to [0, 1]. Infinite
  * for equal pictures. Where the mean squared error is below its own standard error it is taken for that: then the ratio
  * is at least what is returned. */

@@ -165,13 +165,13 @@ static enum status run_resumable(struct stage_run *run, struct error *err) {
 
 static enum status report(struct stage_run *run, struct error *err) {
     measure_spread(run->r);
-    json_add_number(run->r->report, "base_color_deviation", (double)run->r->materials.spread);
     world_update_lights(&run->r->world);
     report_emitters(run->r);
     light_report(run->r);
     report_grey_card(run->r, run->hooks);
     report_luminance(run->r, run->hooks);
     enum status status = report_held_out(run->r, &run->views, &run->pace, err);
+    json_add_number(run->r->report, "base_color_deviation", (double)run->r->materials.spread);
     plan_close(&run->r->plan, PLAN_REPORT);
     if (status == STATUS_OK)
         pace_report(&run->pace, run->r->report, run->r->left_out, sizeof run->r->left_out);

@@ -8,6 +8,7 @@
 #include "common/mem.h"
 #include "common/quantile.h"
 #include "server/capture/luminance_unit.h"
+#include "server/reconstruct/held_out_means.h"
 #include "server/reconstruct/held_render.h"
 #include "server/reconstruct/metrics.h"
 #include "server/reconstruct/outlines.h"
@@ -143,6 +144,7 @@ static void measure_view(const struct reconstruction *r, const struct photograph
         outlines_of_view(r->world.accel, &photo->camera, r->pool, &view->photograph, halves, median);
     view->msre_at_outlines = outlines.msre_part;
     view->outline_share = outlines.pixel_share;
+    view->brightness_error = metrics_brightness_error(&view->photograph, halves);
     image_release(&noise);
 }
 
@@ -221,34 +223,6 @@ void report_release_held_out(struct reconstruction *r) {
     r->held_out_count = 0;
 }
 
-/* Mean over the views that have a value; a view without valid pixels has none. */
-struct metric_mean {
-    double sum, count;
-};
-
-static void mean_add(struct metric_mean *mean, double value) {
-    if (isnan(value))
-        return;
-    mean->sum += value;
-    mean->count += 1.0;
-}
-
-struct held_out_means {
-    struct metric_mean msre, noise_left, render_noise, photograph_noise, psnr_db, ssim; /* noise_left: of squares */
-    struct metric_mean at_outlines, outline_share;
-};
-
-static void means_add(struct held_out_means *means, const struct held_out *view) {
-    mean_add(&means->msre, view->msre);
-    mean_add(&means->at_outlines, view->msre_at_outlines);
-    mean_add(&means->outline_share, view->outline_share);
-    mean_add(&means->noise_left, view->msre_noise_left * view->msre_noise_left);
-    mean_add(&means->render_noise, view->msre_render_noise);
-    mean_add(&means->photograph_noise, view->msre_photograph_noise);
-    mean_add(&means->psnr_db, view->psnr_db);
-    mean_add(&means->ssim, view->ssim);
-}
-
 static cJSON *view_entry(const struct held_out *view) {
     cJSON *entry = cJSON_CreateObject();
     json_add_string(entry, "name", view->name);
@@ -265,24 +239,6 @@ static cJSON *view_entry(const struct held_out *view) {
     json_add_number(entry, "psnr_noise_left_db", view->psnr_noise_left_db);
     json_add_number(entry, "ssim", view->ssim);
     return entry;
-}
-
-static void report_means(const struct held_out_means *means, size_t view_count, const struct reconstruct_hooks *hooks,
-                         cJSON *report) {
-    cJSON *metrics = cJSON_AddObjectToObject(report, "metrics");
-    double count = means->msre.count;
-    json_add_int(metrics, "held_out_views", (int64_t)view_count);
-    if (count == 0.0)
-        return;
-    json_add_number(metrics, "msre", means->msre.sum / count);
-    json_add_number(metrics, "msre_noise_left", sqrt(means->noise_left.sum) / means->noise_left.count);
-    json_add_number(metrics, "msre_render_noise", means->render_noise.sum / means->render_noise.count);
-    json_add_number(metrics, "msre_photograph_noise", means->photograph_noise.sum / means->photograph_noise.count);
-    json_add_number(metrics, "msre_at_outlines", means->at_outlines.sum / means->at_outlines.count);
-    json_add_number(metrics, "outline_share", means->outline_share.sum / means->outline_share.count);
-    json_add_number(metrics, "psnr_db", means->psnr_db.sum / means->psnr_db.count);
-    json_add_number(metrics, "ssim", means->ssim.sum / means->ssim.count);
-    hooks->metric(hooks->user, "msre", 0, means->msre.sum / count);
 }
 
 enum status report_held_out(struct reconstruction *r, const struct views *views, const struct pace *pace,
@@ -306,13 +262,14 @@ enum status report_held_out(struct reconstruction *r, const struct views *views,
         compare_view(r, &scene->photograph[i], view, samples, (double)views->median_radiance, total, hooks);
         double pixels = (double)view->camera.width * (double)view->camera.height;
         pixels_left -= pixels;
-        means_add(&means, view);
+        held_out_means_add(&means, view);
         cJSON_AddItemToArray(list, view_entry(view));
         pace_advance(pace, "report", PLAN_REPORT, pixels * (double)view->samples);
         if (hooks->stop_requested(hooks->user))
             return error_set(err, STATUS_CANCELLED, "stopped while rendering the held-out views");
     }
-    report_means(&means, total, hooks, r->report);
+    held_out_means_report(&means, total, hooks, r->report);
+    r->materials.spread = hypotf(r->materials.spread, (float)held_out_means_brightness(&means));
     return STATUS_OK;
 }
 

@@ -34,6 +34,7 @@ struct held_out {
     double msre_render_noise;                   /* what it would add to msre, in the mean */
     double msre_photograph_noise;               /* what the photograph's noise adds */
     double msre_at_outlines, outline_share;     /* part of msre and of the pixels that lie beside outlines */
+    double brightness_error;                    /* squared, of the whole view, relative (metrics_brightness_error) */
 };
 
 struct reconstruction {

@@ -28,6 +28,7 @@ static void test_by_hand(void) {
     /* sRGB(0.5) = 0.735357, sRGB(0.6) = 0.797738 */
     CHECK_NEAR(metrics_psnr_db(&photograph, &halves, 1.0).value, -20.0 * log10(0.797738 - 0.735357), 1e-3);
     /* Constant pictures: only the luminance term, (2ab + c1) / (a^2 + b^2 + c1). */
+    CHECK_NEAR(metrics_brightness_error(&photograph, &halves), log(1.2) * log(1.2), 1e-6);
     double a = 0.735357, b = 0.797738, c1 = 1e-4;
     CHECK_NEAR(metrics_ssim(&photograph, &halves, 1.0), (2 * a * b + c1) / (a * a + b * b + c1), 1e-4);
     /* Both halves off by as much, to either side: no error that is known of. */
@@ -35,17 +36,20 @@ static void test_by_hand(void) {
         halves.pixel[i] = i % 6 < 3 ? 0.6f : 0.4f;
     CHECK_NEAR(metrics_msre(&photograph, &halves, 2.0).value, -0.01 / 0.29, 1e-6);
     CHECK_NEAR(metrics_msre_of_renders(&photograph, &halves, 2.0), 0.01 / 0.29, 1e-6);
+    CHECK_NEAR(metrics_brightness_error(&photograph, &halves), log(1.2) * log(0.8), 1e-6);
     /* A pixel that cannot be used does not count. */
     fill(&halves, 0.6f);
     photograph.pixel[0] = NAN;
     halves.pixel[1] = halves.pixel[5] = 1e9f;
     CHECK_NEAR(metrics_msre(&photograph, &halves, 2.0).value, 0.01 / 0.29, 1e-6);
+    CHECK_NEAR(metrics_brightness_error(&photograph, &halves), log(1.2) * log(1.2), 1e-6);
     fill(&halves, 0.5f);
     CHECK(isinf(metrics_psnr_db(&photograph, &halves, 1.0).value));
     CHECK_NEAR(metrics_ssim(&photograph, &halves, 1.0), 1.0, 1e-9);
     /* Where no pixel can be used, nothing was measured: that is no perfect score. */
     fill(&photograph, NAN);
     CHECK(isnan(metrics_msre(&photograph, &halves, 2.0).value));
+    CHECK(isnan(metrics_brightness_error(&photograph, &halves)));
     CHECK(isnan(metrics_psnr_db(&photograph, &halves, 1.0).value));
     CHECK(isnan(metrics_ssim(&photograph, &halves, 1.0)));
     image_release(&photograph);
