@@ -6,6 +6,7 @@
 
 #include "common/mem.h"
 #include "server/gather/probes.h"
+#include "server/gather/probes_refine.h"
 #include "server/gather/sun_caustics.h"
 #include "server/light/emitters.h"
 #include "server/light/light_estimate.h"
@@ -72,14 +73,24 @@ static double wanted_samples(const struct solve *s, int pass) {
     return pass == PASS_ALL ? samples : ceil(samples * EARLY_PASS_PART);
 }
 
+/* Directions wanted from pass `first` on, with today's probes in it and more in each that follows. */
+static double wanted_directions(const struct solve *s, int first) {
+    double directions = 0.0, probes = (double)s->probes.count;
+    for (int pass = first; pass < PASSES; pass++) {
+        if (is_skipped(s, pass))
+            continue;
+        directions += probes * wanted_samples(s, pass);
+        probes *= 1.0 + PROBES_REFINED_SHARE;
+    }
+    return directions;
+}
+
 /* Directions of a probe in pass `first`, as planned for it and those after it. */
 static size_t planned_samples(const struct solve *s, int first) {
     const struct plan_work *work = &s->r->plan.part[PLAN_GATHER];
-    double left = 0.0;
+    double left = wanted_directions(s, first);
     if (!plan_is_cut(&s->r->plan, PLAN_GATHER))
         return (size_t)wanted_samples(s, first);
-    for (int pass = first; pass < PASSES; pass++)
-        left += is_skipped(s, pass) ? 0.0 : wanted_samples(s, pass) * (double)s->probes.count;
     double share = left > 0.0 ? (work->now - work->done) / left : 1.0;
     return (size_t)ceil(fmin(fmax(share, PACE_MIN_GATHER), 1.0) * wanted_samples(s, first));
 }
@@ -95,15 +106,11 @@ static bool finds_detail(const struct solve *s) {
 }
 
 static void plan_work(struct solve *s) {
-    double valid = (double)s->r->inverse.valid_count, directions = 0.0, early = 0.0;
+    double valid = (double)s->r->inverse.valid_count, early = 0.0;
     double last = (double)stride_of(s, PASS_ALL), coarse = (double)stride_of(s, PASS_LIGHT);
-    for (int pass = 0; pass < PASSES; pass++) {
-        if (is_skipped(s, pass))
-            continue;
-        directions += (double)s->probes.count * wanted_samples(s, pass);
-        early += pass == PASS_ALL ? 0.0 : valid / (coarse * coarse);
-    }
-    pace_plan_solve(s->pace, valid, directions, early, valid / (last * last),
+    for (int pass = 0; pass < PASS_ALL; pass++)
+        early += is_skipped(s, pass) ? 0.0 : valid / (coarse * coarse);
+    pace_plan_solve(s->pace, valid, wanted_directions(s, PASS_LIGHT), early, valid / (last * last),
                     finds_detail(s) ? settings_number(s->r->settings, "detail_steps") * valid : 0.0);
 }
 
@@ -240,6 +247,7 @@ static enum status solve_pass(struct solve *s, int pass, struct error *err) {
     } else {
         refit_light(s, pass);
         solve_emitters_light(&s->emitters);
+        probes_refine(&s->probes, PROBES_REFINED_SHARE, &s->r->scene->mesh, &s->r->atlas, &s->r->inverse, &s->r->fused);
     }
     enum status status = gather(s, pass, err);
     if (status == STATUS_OK)

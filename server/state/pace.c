@@ -11,7 +11,7 @@
 
 #include "common/kept_pixels.h"
 #include "common/parallel.h"
-#include "server/gather/probes.h"
+#include "server/gather/probes_refine.h"
 #include "server/scene/photograph_reduce.h"
 #include "server/state/held_out_size.h"
 
@@ -90,7 +90,9 @@ static void plan_texels(const struct pace *p, double valid) {
         return;
     double spacing = (double)probes_spacing((uint32_t)side(p));
     double probes = USUAL_PROBES * valid / (spacing * spacing), texels = valid / (stride * stride);
-    pace_plan_solve(p, valid, 1.5 * probes * settings_number(p->settings, "gather_samples"), 0.5 * texels, texels,
+    /* Two passes with a quarter of the directions come before the last. */
+    double more = 1.0 + PROBES_REFINED_SHARE, passes = 0.25 + 0.25 * more + more * more;
+    pace_plan_solve(p, valid, passes * probes * settings_number(p->settings, "gather_samples"), 0.5 * texels, texels,
                     settings_number(p->settings, "detail_steps") * valid);
 }
 

@@ -57,7 +57,8 @@ static void test_limit(struct scene *scene) {
     const cJSON *solved = cJSON_GetObjectItem(r.report, "solve"), *limit = cJSON_GetObjectItem(r.report, "time_limit");
     CHECK(cJSON_GetNumberValue(cJSON_GetObjectItem(solved, "measured_one_texel_in")) == 4.0);
     double directions = cJSON_GetNumberValue(cJSON_GetObjectItem(solved, "directions_a_probe"));
-    CHECK_THAT(directions == 32.0, "%g directions", directions); /* a quarter */
+    /* A quarter, and the part of probes that were planned but not added. */
+    CHECK_THAT(directions >= 32.0 && directions < 64.0, "%g directions", directions);
     CHECK(cJSON_GetNumberValue(cJSON_GetObjectItem(cJSON_GetObjectItem(r.report, "refine"), "iterations")) == 0.0);
     const cJSON *view = cJSON_GetArrayItem(cJSON_GetObjectItem(r.report, "views"), 0);
     CHECK(cJSON_GetNumberValue(cJSON_GetObjectItem(view, "samples")) == 1.0);

@@ -1,8 +1,8 @@
 /* probes.h: what arrives from a rectangular lamp is what its form factor says, wherever a probe stands, and nothing
  * does behind what stands in the way; between probes it is interpolated by weights that come to 1, within a chart, by
- * likeness of normals and, for what is seen, by probes that are. */
+ * likeness of normals and, for what is seen, by probes that are; more of them stand where light varies. */
 #include "common/mem.h"
-#include "server/gather/probes.h"
+#include "server/gather/probes_refine.h"
 #include "server/scene/materials.h"
 #include "tests/check.h"
 
@@ -162,12 +162,84 @@ static void test_normals(struct rig *r) {
     probes_release(&p);
 }
 
+/* The shadow of an edge over the plane: light goes from 1 to .2 within a quarter of a block. */
+static float shade(uint32_t texel) {
+    float x = (float)(texel % (2 * SIDE));
+    return 0.6f - 0.4f * tanhf((x - 37.0f) / 4.0f);
+}
+
+static void cast_shadow(struct probes *p) {
+    for (size_t i = 0; i < p->count; i++)
+        for (int c = 0; c < 3; c++)
+            p->probe[i].light.moment[0][c] = p->probe[i].chart == 0 ? shade(p->probe[i].texel) : 1.0f;
+}
+
+/* Root mean square error of interpolated light on the plane. */
+static double shadow_error(struct rig *r, const struct probes *p) {
+    double square = 0.0, count = 0.0;
+    for (size_t i = 0; i < r->inverse.valid_count; i++) {
+        uint32_t texel = r->inverse.valid[i];
+        struct surface_point at;
+        struct probe_mix mix;
+        struct irradiance light;
+        double sum = 0.0;
+        if (texel % (2 * SIDE) >= SIDE)
+            continue;
+        CHECK(surface_at_texel(&r->mesh, &r->atlas, &r->inverse, texel, &at));
+        probes_mix(p, &r->atlas, &r->fused, texel, &at, &mix);
+        for (size_t k = 0; k < mix.count; k++)
+            sum += (double)mix.weight[k];
+        CHECK_NEAR(sum, 1.0, 1e-5);
+        probes_irradiance(p, &mix, &light);
+        square += pow((double)(light.moment[0][0] - shade(texel)), 2.0);
+        count += 1.0;
+    }
+    return sqrt(square / count);
+}
+
+/* Probes are added along the shadow, within their share, until cells cannot be halved any more; none for noise, and
+ * none where no photograph looks. */
+static void test_refine(struct rig *r) {
+    struct probes p;
+    const uint32_t unseen_row = 3;
+    for (size_t i = 0; i < TEXELS; i++)
+        r->fused.count[i] = i / (2 * SIDE) / 16 == unseen_row ? 0.0f : 1.0f;
+    probes_init(&p, 16, &r->mesh, &r->atlas, &r->inverse, &r->fused);
+    cast_shadow(&p);
+    double error[3] = {shadow_error(r, &p)};
+    size_t before = p.count;
+    for (int i = 1; i < 3; i++) {
+        probes_refine(&p, 0.75, &r->mesh, &r->atlas, &r->inverse, &r->fused);
+        CHECK_THAT(p.count > before && (double)p.count <= 1.75 * (double)before, "%zu, %zu", before, p.count);
+        before = p.count;
+        cast_shadow(&p);
+        error[i] = shadow_error(r, &p);
+    }
+    printf("%zu probes, interpolated light off by %.4f, %.4f, %.4f\n", p.count, error[0], error[1], error[2]);
+    CHECK(error[1] < 0.8 * error[0] && error[2] < 0.6 * error[0]);
+    for (uint32_t block = 0; block < p.columns * p.rows; block++) {
+        bool shaded = block % p.columns >= 1 && block % p.columns <= 3 && block / p.columns != unseen_row;
+        CHECK_THAT(shaded || p.halvings[block] == 0, "block %u, %u", block % p.columns, block / p.columns);
+    }
+    for (size_t i = 0; i < p.count; i++) { /* as different as their noise says */
+        struct irradiance *light = &p.probe[i].light;
+        for (int c = 0; c < 3; c++)
+            light->moment[0][c] = 1.0f + (i % 2 == 0 ? 0.1f : -0.1f);
+        light->noise = rgb_gray(0.15f);
+    }
+    before = p.count;
+    probes_refine(&p, 0.75, &r->mesh, &r->atlas, &r->inverse, &r->fused);
+    CHECK(p.count == before);
+    probes_release(&p);
+}
+
 int main(void) {
     struct rig r;
     rig_init(&r);
     test_irradiance(&r);
     test_mix(&r);
     test_normals(&r);
+    test_refine(&r);
     rig_release(&r);
     return check_result();
 }
