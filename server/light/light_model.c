@@ -84,7 +84,7 @@ static void tie_ground(struct light_model *m) {
 static void add_cells(struct light_model *m) {
     float *column = mem_calloc(m->points.count + 1, sizeof *column);
     struct joint_source around = light_lamps_opening_prior(&m->lamps);
-    around.value = log(fmax((double)m->lamps.median_radiance, 1e-20)); /* of dim ones none would tell at first */
+    around.value = log(fmax((double)m->lamps.median_radiance, 1e-20)); /* not dim, or the first to gain takes all */
     m->first_cell = m->fit.source_count;
     m->has_sky = true;
     for (size_t k = 0; k < light_sky_cells(&m->sky); k++) {

@@ -25,7 +25,7 @@ static int by_error(const void *a, const void *b) {
     return (first->cell > second->cell) - (first->cell < second->cell);
 }
 
-/* The cells of which the points say that they are brighter than the prior has them; the surest ones first. */
+/* The cells that are surely brighter than the mean of their prior; the surest ones first. */
 static size_t choose(struct light_model *m, struct opening_candidate chosen[SURROUND_CELLS]) {
     size_t count = 0;
     light_model_find_errors(m);

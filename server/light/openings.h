@@ -1,11 +1,11 @@
 /* openings.h -- light that comes in through what a scan lacks, as sources that have a place.
  *
- * Where holes of a scan were filled, and what photographs show through the mesh is no brighter than white paint
- * would be in the room, nothing that is open is a window to a sky that lights it. There is no distant light then: the
- * cells of a box around the scan (surround.h) are in its place. Those that photographs look at through the mesh become
+ * Where holes of a scan were filled, and what photographs show through the mesh is no brighter than white paint would
+ * be in the room, nothing that is open is a window to a sky that lights it. There is no distant light then: the cells
+ * of a box around the scan (surround.h) are in its place. Those that photographs look at through the mesh become
  * surface, which shows what they show. The others are fitted together with all other sources (light_model.h), and those
- * of which surfaces tell become surface, too: lamps of the kind ESTIMATED_OPENING. Each is a segment, at the end of
- * mesh and segments, the lamps last. The rest of the box stays open and dark. Not where most of the room was not
+ * for which there is evidence become surface, too: lamps of the kind ESTIMATED_OPENING. Each is a segment, at the end
+ * of mesh and segments, the lamps last. The rest of the box stays open and dark. Not where most of the room was not
  * scanned (UNSEEN_LIGHT_MOSTLY): a few lamps in much darkness do not light it as what stands there does.
  *
  * Limits: a source behind a gap lies farther away than it is; a light that several cells share is spread over them. */

@@ -16,7 +16,7 @@
 #include "server/capture/views.h"
 #include "server/state/reconstruction.h"
 
-/* The segments that hold parts which shine: parts are the new segments [old_count, r->segments.count). */
+/* The segments that hold bright parts: parts are the new segments [old_count, r->segments.count). */
 struct split {
     size_t old_count, part_count;
     uint32_t *whole; /* [part_count] the segment that a part was taken from; owned */

@@ -9,7 +9,7 @@
 
 /* Half the angle of the widest disc: the sun's aureole in haze; what is wider is a sky. */
 #define WIDEST_DEGREES 3.0
-/* Least part of the map's light; what brings less has shadows that nobody sees. Of a uniform sky the widest disc brings
+/* Least part of the map's light; what brings less has no visible shadows. Of a uniform sky the widest disc brings
  * that if it is 30 times as bright; the sun is 100,000 times as bright as a clear sky, 100 times through thin
  * clouds. */
 #define MIN_SHARE 0.02

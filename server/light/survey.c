@@ -15,13 +15,13 @@ static void fill_radiance(struct survey *s) {
     double(*sum)[4] = mem_calloc(segments + 1, sizeof *sum);
     for (size_t i = 0; i < r->inverse.valid_count; i++) {
         uint32_t texel = r->inverse.valid[i];
-        rgb shown = fused_radiance(&r->fused, texel);
+        rgb radiance = fused_radiance(&r->fused, texel);
         if (!(r->fused.count[texel] > 0.0f))
             continue;
         for (size_t to = reconstruction_segment(r, texel), k = 0; k < 2; to = segments, k++) {
-            sum[to][0] += (double)shown.r;
-            sum[to][1] += (double)shown.g;
-            sum[to][2] += (double)shown.b;
+            sum[to][0] += (double)radiance.r;
+            sum[to][1] += (double)radiance.g;
+            sum[to][2] += (double)radiance.b;
             sum[to][3] += 1.0;
         }
     }
@@ -57,7 +57,7 @@ static void leave_out(struct survey *s, const bool *without) {
     }
 }
 
-/* A surface that photographs show, and do not only tell how bright it is at least, and that is no lamp. */
+/* Observed, by more than a lower bound, and no lamp. */
 static bool is_usable(const struct reconstruction *r, const bool *without, uint32_t texel) {
     uint32_t segment = reconstruction_segment(r, texel);
     return r->fused.count[texel] > 0.0f && !r->fused.is_bound[texel] && rgb_is_black(r->materials.emission[segment]) &&

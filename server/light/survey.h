@@ -31,7 +31,7 @@ struct survey {
 
 /* Outgoing radiance is that of `field`; with NULL it is fused radiance, and for unobserved texels the mean of their
  * segment, or of the room. Segments of without[segment_count] (NULL: none; borrowed) send out nothing, but polished
- * surfaces mirror them. All other segments that outshine the room by `views` (NULL: not asked) are lights of
+ * surfaces mirror them. All other segments that outshine the room by `views` (NULL: none) are lights of
  * the world until survey_release, since small lamps must be sampled; then all emission is 0. At most `points`
  * points. */
 void survey_init(struct survey *s, struct reconstruction *r, const struct views *views, const struct light_field *field,

@@ -11,13 +11,13 @@
 
 #define POINTS 2048
 #define KEY_UNSEEN 23 /* keeps these random numbers apart from others of the texel */
-/* Part of the light at a grey card that the unseen one must be, as guessed: what is wrong with the rest is taken for
- * its scale. Between a room whose light is all unseen and one where it is all seen (test_grey_card.c) it may be
- * anything: .15 and .25 give the same there. */
+/* Least part of the light at a grey card that is unseen, as fitted: errors of the rest are taken for its scale. Between
+ * a room whose light is all unseen and one where it is all seen (test_grey_card.c) it may be anything: .15 and .25 give
+ * the same there. */
 #define MIN_CARD_SHARE 0.2
-/* Nothing is so white. Light is missing, and not only known badly, if more than the rest of the points are. */
+/* Light is missing, and not only known badly, if the base colours of more than a fifth of the points exceed this. */
 #define IMPOSSIBLE_BASE_COLOR 1.5
-#define NOT_IMPOSSIBLE 0.8
+#define NOT_IMPOSSIBLE 0.8 /* quantile */
 
 struct unseen {
     struct reconstruction *r;
