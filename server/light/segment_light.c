@@ -9,7 +9,7 @@
 
 /* Inverse powers of the plastic number: the sequence of least discrepancy of its kind in the plane. */
 #define RECURRENCE_1 0.75487766624669276
-#define RECURRENCE_2 0.56984029099805327
+#define RECURRENCE_2 (RECURRENCE_1 * RECURRENCE_1)
 
 void segment_light_init(struct segment_light *l, const struct reconstruction *r) {
     const struct mesh *mesh = &r->scene->mesh;

@@ -136,7 +136,7 @@ static void try_part(const struct split_level *l, size_t part_size, const struct
     if (part.pixels < MIN_PIXELS || l->radiance < job->needed[l->part[0]])
         return;
     float lambert = shining_lambert(&job->shining, l->part, part_size);
-    float needed = lambert / (1.0f - EMITTER_SHARE - EMITTER_SHARE_UNSEEN * job->shining.unseen_share);
+    float needed = lambert / (1.0f - emitters_share(job->shining.unseen_share));
     if (l->radiance < needed) {
         for (size_t i = 0; i < part_size; i++)
             job->needed[l->part[i]] = NEAR * needed;

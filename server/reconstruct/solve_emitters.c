@@ -14,8 +14,6 @@
 #include "server/reconstruct/inputs.h"
 #include "server/scene/by_segment.h"
 
-/* EMITTER_SHARE where all pixels are mixed. */
-#define EMITTER_SHARE_MIXED 0.3f
 /* Unobserved sky may be brighter than assumed by this factor of its radiance. */
 #define SKY_DOUBT 1.0f
 /* Part of a segment's surface whose light must have changed for it to be an emitter. */
@@ -105,8 +103,7 @@ static void decide(void *user, size_t segment, int thread) {
     struct emitter_evidence *e = &r->evidence[segment];
     size_t first = d->texels.first[segment], count = d->texels.first[segment + 1] - first;
     float radiance = rgb_mean(e->radiance), lambert = rgb_mean(e->lambert);
-    float needed = e->only_mixed ? EMITTER_SHARE_MIXED : EMITTER_SHARE;
-    needed += EMITTER_SHARE_UNSEEN * (float)r->unseen_share;
+    float needed = emitters_share((float)r->unseen_share);
     bool doubts_sky = e->emitted_share > needed && !r->sky_is_fitted;
     e->sky_lambert = doubts_sky ? sky_doubt(r, d->texels.texel + first, count) : 0.0f;
     e->changing_share = changing_light(d->emitters->divide, d->texels.texel + first, count, thread);
