@@ -16,9 +16,8 @@
 /* Of an opening: most of what lies behind gaps of a scan is dark, or a surface no brighter than the room, some are
  * lamps. */
 #define OPENING_OVER_ROOM 0.1
-/* Lamps that photographs measure: in pixels of their own, and in pixels that mix them with what is beside. */
+/* Lamps that photographs measure. */
 #define SEEN_DEVIATION 0.1
-#define MIXED_DEVIATION 0.3
 /* Greatest relative difference of area of segments that look alike; of observed radiance it is that deviation. */
 #define ALIKE_AREA 0.02f
 
@@ -208,8 +207,7 @@ struct joint_source light_lamps_prior(const struct light_lamps *l, const struct 
     else if (lamp->kind != ESTIMATED_HIDDEN)
         source = (struct joint_source){.mean = log(least), .deviation = LIGHT_UNKNOWN_DEVIATION, .least = log(least)};
     if (lamp->kind == ESTIMATED_SEEN) {
-        bool is_mixed = l->r->evidence[lamp->segment[0]].only_mixed;
-        source.deviation = is_mixed ? MIXED_DEVIATION : SEEN_DEVIATION;
+        source.deviation = SEEN_DEVIATION;
         source.least = -INFINITY;
     }
     source.value = fmax(log(fmax((double)rgb_mean(lamp->radiance), 1e-30)), source.least);
