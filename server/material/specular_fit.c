@@ -11,13 +11,6 @@
 
 /* Probability from which a segment is diffuse; below, the posterior mean has the smaller error. */
 #define DIFFUSE_CERTAIN 0.95 /* +25 %: 0 dB */
-/* Material of a segment with too few observations: half way to an ordinary dielectric, which limits the error of base
- * colour to 2 % either way. It becomes diffuse if it is darker than that by this part of the misfit and this many
- * standard errors. */
-#define UNKNOWN_ROUGHNESS 0.5f /* +25 %: 0 dB, roughness -0.15 */
-#define UNKNOWN_SPECULAR 0.25f /* +25 %: 0 dB, specular +0.16 */
-#define DARKER_PART 0.03       /* +25 %: no change */
-#define DARKER_ERRORS 3.0      /* +25 %: no change */
 
 #define ROUGHNESSES HIGHLIGHT_ROUGHNESSES
 #define SPECULARS SPECULAR_LEVELS
@@ -130,48 +123,35 @@ static void set_evidence(const struct specular_job *job, size_t segment, const s
                 likelihood(e, (struct specular_candidate_levels){k, m}, best);
 }
 
-static void set_lobe(struct materials *materials, size_t segment, double roughness, double specular) {
-    materials->roughness[segment] = (float)roughness;
-    materials->specular[segment] = (float)specular;
-}
-
-/* Whether a segment without clean observations is darker than the material for unknown segments allows, which reflects
- * a window at grazing angles. This test is one-sided: base colour explains anything brighter. */
-static bool is_too_dark(const struct specular_points *e) {
+/* Posterior of a segment without clean observations. It may be darker than the guess allows, which reflects a window at
+ * grazing angles. This is one-sided: base colour explains anything brighter. */
+static struct specular_posterior posterior_unobserved(const struct specular_points *e) {
     struct specular_candidate_levels guess = {0, 0};
-    if (e->count == 0)
-        return false;
-    while (specular_levels.roughness[guess.k] < UNKNOWN_ROUGHNESS)
+    while (specular_levels.roughness[guess.k] < SPECULAR_UNKNOWN_ROUGHNESS)
         guess.k++;
-    while (specular_of[guess.m] < UNKNOWN_SPECULAR)
+    while (specular_of[guess.m] < SPECULAR_UNKNOWN_SPECULAR)
         guess.m++;
-    struct specular_gain gain = specular_misfit_gain(e, diffuse_candidate, guess);
-    return gain.part < -DARKER_PART && gain.errors < -DARKER_ERRORS;
+    return specular_posterior_unobserved(e->count > 0 ? specular_misfit_gain(e, diffuse_candidate, guess).errors : 0.0);
 }
 
 static void measure_segment(void *user, size_t segment, int thread) {
     const struct specular_job *job = user;
-    const struct segment_points *e = &job->points[segment];
     (void)thread;
-    if (e->is_observed)
-        set_evidence(job, segment, &e->points);
-    if (job->is_emitter[segment] || (!e->is_observed && is_too_dark(&e->points)))
-        set_lobe(job->materials, segment, 1.0, 0.0);
-    else
-        set_lobe(job->materials, segment, UNKNOWN_ROUGHNESS, UNKNOWN_SPECULAR);
+    if (job->points[segment].is_observed)
+        set_evidence(job, segment, &job->points[segment].points);
 }
 
 static void fit_segment(void *user, size_t segment, int thread) {
-    (void)thread;
     const struct specular_job *job = user;
-    if (!job->evidence[segment].is_observed)
-        return;
-    struct specular_posterior posterior =
-        specular_posterior(job->evidence, job->observer.in.surface.segments->count, segment);
-    if (posterior.diffuse > DIFFUSE_CERTAIN)
-        set_lobe(job->materials, segment, 1.0, 0.0);
-    else
-        set_lobe(job->materials, segment, posterior.roughness, posterior.specular);
+    struct specular_posterior posterior = {1.0, 1.0, 0.0};
+    (void)thread;
+    if (job->evidence[segment].is_observed)
+        posterior = specular_posterior(job->evidence, job->observer.in.surface.segments->count, segment);
+    else if (!job->is_emitter[segment])
+        posterior = posterior_unobserved(&job->points[segment].points);
+    bool is_diffuse = posterior.diffuse > DIFFUSE_CERTAIN;
+    job->materials->roughness[segment] = is_diffuse ? 1.0f : (float)posterior.roughness;
+    job->materials->specular[segment] = is_diffuse ? 0.0f : (float)posterior.specular;
 }
 
 /* Room for the samples of all segments. */

@@ -26,6 +26,11 @@ static inline size_t specular_candidate(size_t k, size_t m) { return 1 + k * HIG
  * to 10 standard errors. */
 #define SPECULAR_MAX_ROUGHNESS 0.8f /* +25 %: no change */
 
+/* Material of a segment without clean observations: half way to an ordinary dielectric, which limits the error of base
+ * colour to 2 % either way. */
+#define SPECULAR_UNKNOWN_ROUGHNESS 0.5f /* +25 %: 0 dB, roughness -0.15 */
+#define SPECULAR_UNKNOWN_SPECULAR 0.25f /* +25 %: 0 dB, specular +0.16 */
+
 struct specular_evidence {
     bool is_observed; /* the segment has enough observations; else the other fields are undefined */
     double part;      /* of the room's texels */
@@ -42,5 +47,9 @@ struct specular_posterior {
 
 /* Posterior of `segment`, whose evidence[segment].is_observed must be true; evidence[count]. */
 struct specular_posterior specular_posterior(const struct specular_evidence *evidence, size_t count, size_t segment);
+
+/* The same without clean observations. `errors`: misfit of a diffuse material less that of the unknown one, in standard
+ * errors; only what is below 0 tells: that is darker than the unknown one allows. */
+struct specular_posterior specular_posterior_unobserved(double errors);
 
 #endif

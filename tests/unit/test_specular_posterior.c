@@ -102,6 +102,24 @@ static void test_many(void) {
     CHECK_NEAR(b.specular, 0.5, 0.01);
 }
 
+/* What is darker than the mean material allows becomes diffuse by degrees: no threshold on which noise decides. */
+static void test_unobserved(void) {
+    struct specular_posterior nothing = specular_posterior_unobserved(0.0), last = nothing;
+    CHECK(nothing.roughness == (double)SPECULAR_UNKNOWN_ROUGHNESS);
+    CHECK(nothing.specular == (double)SPECULAR_UNKNOWN_SPECULAR);
+    CHECK(specular_posterior_unobserved(9.0).specular == nothing.specular);
+    for (int i = 1; i <= 60; i++) {
+        struct specular_posterior next = specular_posterior_unobserved(-0.1 * i);
+        CHECK(next.diffuse > last.diffuse && next.diffuse < last.diffuse + 0.06);
+        CHECK(next.roughness > last.roughness && next.roughness < last.roughness + 0.04);
+        CHECK(next.specular < last.specular && next.specular > last.specular - 0.02);
+        last = next;
+    }
+    CHECK(last.diffuse > 0.99 && last.specular < 0.001);
+    CHECK(specular_posterior_unobserved(-1.0).specular > 0.22);  /* as many a black glossy thing */
+    CHECK(specular_posterior_unobserved(-2.74).specular < 0.05); /* bathroom's black bars before its lit window */
+}
+
 int main(void) {
     test_alone();
     test_between();
@@ -109,5 +127,6 @@ int main(void) {
     test_influence();
     test_contradiction();
     test_many();
+    test_unobserved();
     return check_result();
 }
