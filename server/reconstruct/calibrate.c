@@ -9,6 +9,11 @@
 #include "server/capture/calibrate_blur.h"
 #include "server/capture/calibrate_light.h"
 #include "server/capture/poses/calibrate_poses.h"
+#include "server/capture/poses/pose_registration.h"
+
+/* Photographs that are moved by themselves beside a registration: more than half as many as without it, and so many,
+ * say that it was not what was wrong. */
+#define MANY_MOVED 12
 
 static void log_light(const struct reconstruction *r, const struct light_found *found,
                       const struct reconstruct_hooks *hooks) {
@@ -96,9 +101,104 @@ static void find_poses(struct reconstruction *r, struct views *views, const stru
     update_edges(r, views, found);
     find_light(r, views, claim, light);
     memset(found->shift, 0, views->train_count * sizeof *found->shift);
+    found->is_drift = false;
     found->moved_count = found->held_out_moved_count = 0;
     found->shift_px = found->held_out_shift_px = 0.0;
 }
+
+/* --- registration ------------------------------------------------------------------------------- */
+
+static void renew_tracks(struct reconstruction *r, struct views *views, struct tracks *tracks) {
+    for (uint32_t t = 0; t < views->train_count; t++)
+        views_update_edges(views, t, r->pool);
+    tracks_release(tracks);
+    tracks_make(tracks, views, r->pool);
+}
+
+/* Cameras as the bundle tells them, moved onto the mesh where they surely lie beside it; edges, tracks and, then, the
+ * claims follow. `is_applied` of the registration: whether. Returns whether anything was moved, for good or not. */
+static bool find_registration(struct reconstruction *r, struct views *views, struct tracks *tracks,
+                              struct photograph *claim, struct pose_registration *registration) {
+    struct pose_registration rest;
+    for (size_t i = 0; i < r->scene->photograph_count; i++)
+        r->scene->photograph[i].camera = claim[i].camera;
+    if (!pose_registration_find(r->scene, tracks, false, r->pool, registration))
+        return false;
+    renew_tracks(r, views, tracks);
+    if (pose_registration_find(r->scene, tracks, true, r->pool, &rest))
+        pose_registration_add(registration, &rest);
+    renew_tracks(r, views, tracks);
+    registration->is_applied = pose_registration_agrees(registration, tracks, claim, r->pool);
+    for (size_t i = 0; i < r->scene->photograph_count && registration->is_applied; i++)
+        claim[i].camera = r->scene->photograph[i].camera;
+    return true;
+}
+
+/* Unless poses drift, all photographs may lie beside the mesh together; then single poses are found anew from there.
+ * That stays where it explains most of those that were moved before. */
+static void register_all(struct reconstruction *r, struct views *views, struct tracks *tracks, struct photograph *claim,
+                         struct light_found *light, struct poses_found *poses, struct pose_registration *registration) {
+    const size_t bytes = r->scene->photograph_count * sizeof *claim;
+    if (poses->is_drift)
+        return;
+    struct photograph *found = save_claims(r->scene), *told = mem_array(r->scene->photograph_count + 1, sizeof *told);
+    struct poses_found single = *poses;
+    struct light_found found_light = *light;
+    memcpy(told, claim, bytes);
+    bool is_changed = find_registration(r, views, tracks, claim, registration);
+    if (registration->is_applied) {
+        find_light(r, views, claim, light);
+        find_poses(r, views, tracks, claim, light, poses);
+        registration->is_applied = poses->moved_count < MANY_MOVED || 2 * poses->moved_count <= single.moved_count;
+        poses_found_release(registration->is_applied ? &single : poses);
+    }
+    if (!registration->is_applied) {
+        memcpy(r->scene->photograph, found, bytes);
+        memcpy(claim, told, bytes);
+        *poses = single;
+        *light = found_light;
+    }
+    if (!registration->is_applied && is_changed) {
+        views_update_median(views);
+        renew_tracks(r, views, tracks);
+    }
+    mem_free(told);
+    mem_free(found);
+}
+
+static double length3(const double v[3]) { return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
+
+static void log_registration(const struct pose_registration *registration, const struct reconstruct_hooks *hooks) {
+    char line[240];
+    snprintf(
+        line, sizeof line,
+        "calibration: the photographs are turned by %.2f degrees against the mesh and lie %.1f mm beside it, %.2f px "
+        "(rms); their poses follow the mesh",
+        length3(registration->turn) * 180.0 / M_PI, 1000.0 * length3(registration->move), registration->shift_px);
+    hooks->log(hooks->user, line);
+}
+
+/* JSON's null where none was looked for. */
+static cJSON *report_registration(const struct pose_registration *registration) {
+    double turn[3], turn_error[3];
+    if (!(registration->deviations > 0.0))
+        return cJSON_CreateNull();
+    for (int k = 0; k < 3; k++) {
+        turn[k] = registration->turn[k] * 180.0 / M_PI;
+        turn_error[k] = registration->turn_error[k] * 180.0 / M_PI;
+    }
+    cJSON *report = cJSON_CreateObject();
+    json_add_bool(report, "applied", registration->is_applied);
+    json_add(report, "turn_degrees", cJSON_CreateDoubleArray(turn, 3));
+    json_add(report, "turn_error_degrees", cJSON_CreateDoubleArray(turn_error, 3));
+    json_add(report, "move_m", cJSON_CreateDoubleArray(registration->move, 3));
+    json_add(report, "move_error_m", cJSON_CreateDoubleArray(registration->move_error, 3));
+    json_add_number(report, "shift_px", registration->shift_px);
+    json_add_number(report, "deviations", registration->deviations);
+    return report;
+}
+
+/* --- report ------------------------------------------------------------------------------------- */
 
 static void log_poses(const struct poses_found *poses, const struct blur_found *blur,
                       const struct reconstruct_hooks *hooks) {
@@ -134,12 +234,14 @@ void calibrate(struct reconstruction *r, struct views *views, const struct recon
     struct light_found light;
     struct poses_found poses = {0};
     struct blur_found blur = {0};
+    struct pose_registration registration = {0};
     find_light(r, views, claim, &light);
     double spread_before = light.spread_before;
     if (settings_bool(r->settings, "calibrate")) {
         struct tracks tracks;
         tracks_make(&tracks, views, r->pool);
         find_poses(r, views, &tracks, claim, &light, &poses);
+        register_all(r, views, &tracks, claim, &light, &poses, &registration);
         calibrate_blur(r->scene, &tracks, &blur);
         tracks_release(&tracks);
     }
@@ -147,9 +249,12 @@ void calibrate(struct reconstruction *r, struct views *views, const struct recon
     r->exposures_drift = light.drift;
     r->colors_drift = light.white_balance;
     log_light(r, &light, hooks);
+    if (registration.is_applied)
+        log_registration(&registration, hooks);
     log_poses(&poses, &blur, hooks);
     cJSON *report = cJSON_AddObjectToObject(r->report, "calibration");
     report_light(r, &light, report);
+    json_add(report, "registration", report_registration(&registration));
     json_add_int(report, "poses_moved", (int64_t)poses.moved_count);
     json_add_number(report, "pose_shift_px", poses.shift_px);
     json_add_int(report, "held_out_poses_moved", (int64_t)poses.held_out_moved_count);

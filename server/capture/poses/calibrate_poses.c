@@ -7,6 +7,7 @@
 #include "common/mem.h"
 #include "common/ordered.h"
 #include "server/capture/poses/held_out_poses.h"
+#include "server/capture/poses/pose_costs.h"
 #include "server/capture/poses/pose_solver.h"
 #include "server/capture/poses/pose_walk.h"
 
@@ -21,9 +22,6 @@
 /* Of corrections that follow a walk: independent ones have 1 +- .12 in 72 photographs, drifts of simulated phones
  * .2. */
 #define MAX_ROUGHNESS 0.5
-#define DRIFT_SIGNIFICANCE 3.0 /* standard errors; of one decision, not of one a photograph */
-/* Of log residuals: 5 %. One for all photographs, so that their agreement compares. */
-#define COMMON_SCALE 0.05 /* +25 %: no change */
 
 /* Root mean squared distance, in pixels, between the image positions of a frame's own tracks in two cameras. */
 static double shift_of(const struct pose_solver *s, size_t f, const struct camera *a, const struct camera *b) {
@@ -100,13 +98,9 @@ static void add_judged(void *user, size_t index, const void *result) {
                            judged[k].now);
 }
 
-static size_t held_out_tracks(const struct pose_solver *s) {
-    return (s->track_count + POSE_HELD_OUT_EVERY - 1) / POSE_HELD_OUT_EVERY;
-}
-
 static void validate_frames(const struct pose_solver *s, struct validation *validation) {
     struct frame_validations all = {s, validation};
-    ordered_for(s->pool, held_out_tracks(s), POSE_OBSERVATIONS_MAX * sizeof(struct judged), judge_track, add_judged,
+    ordered_for(s->pool, pose_costs_count(s), POSE_OBSERVATIONS_MAX * sizeof(struct judged), judge_track, add_judged,
                 &all);
 }
 
@@ -127,55 +121,9 @@ static void judge(struct pose_solver *s) {
     mem_free(validation);
 }
 
-struct track_costs {
-    const struct pose_solver *solver;
-    double *cost; /* [held-out tracks] mean over its observations; NAN: none */
-};
-
-static void cost_of_track(void *user, size_t index, int thread) {
-    (void)thread;
-    const struct track_costs *costs = user;
-    const struct pose_solver *s = costs->solver;
-    size_t track = index * POSE_HELD_OUT_EVERY;
-    const struct pose_observation *observation = s->observation + track * POSE_OBSERVATIONS_MAX;
-    double consensus, weight[POSE_OBSERVATIONS_MAX], count = 0.0, sum = 0.0;
-    pose_weigh_track(s, track, &consensus, weight);
-    for (size_t k = 0; k < pose_observation_count(s->track[track]) && isfinite(consensus); k++) {
-        if (!isfinite(observation[k].value))
-            continue;
-        sum += pose_robust_cost((double)observation[k].value - s->x[observation[k].offset] - consensus, COMMON_SCALE);
-        count += 1.0;
-    }
-    costs->cost[index] = count > 0.0 ? sum / count : (double)NAN;
-}
-
-/* Robust cost of each held-out track with all frames where they are now and offsets fitted to that. */
-static void costs_now(struct pose_solver *s, double *cost) {
-    bool *is_fixed = mem_array(s->frames + 1, sizeof *is_fixed);
-    for (size_t f = 0; f < s->frames; f++) {
-        is_fixed[f] = s->frame[f].is_fixed;
-        s->frame[f].is_fixed = true;
-    }
-    run_rounds(s, 0, 2); /* offsets only: all frames are fixed */
-    for (size_t f = 0; f < s->frames; f++)
-        s->frame[f].is_fixed = is_fixed[f];
-    parallel_for(s->pool, held_out_tracks(s), cost_of_track, &(struct track_costs){s, cost});
-    mem_free(is_fixed);
-}
-
-static struct validation compare(const double *before, const double *now, size_t count) {
-    struct validation v = {0};
-    for (size_t i = 0; i < count; i++) {
-        if (!isfinite(before[i]) || !isfinite(now[i]))
-            continue;
-        validation_add(&v, before[i], now[i]);
-    }
-    return v;
-}
-
 /* Whether all photographs together agree significantly better than before. */
 static bool all_improved(const double *before, const double *now, size_t count) {
-    struct validation v = compare(before, now, count);
+    struct validation v = pose_costs_compare(before, now, count);
     return pose_is_improved(&v);
 }
 
@@ -208,8 +156,8 @@ static void follow_walk(struct pose_solver *s, int coarsest) {
 
 /* Whether the poses that follow a walk drift, and agree better at held-out tracks. */
 static bool is_drift(const struct pose_solver *s, const double *before, const double *now, size_t count) {
-    struct validation v = compare(before, now, count);
-    return pose_walk_roughness(s) < MAX_ROUGHNESS && validation_is_significant(&v, DRIFT_SIGNIFICANCE);
+    struct validation v = pose_costs_compare(before, now, count);
+    return pose_walk_roughness(s) < MAX_ROUGHNESS && validation_is_significant(&v, POSE_COSTS_SIGNIFICANCE);
 }
 
 /* As shift_of, and by its twist where a frame has no tracks of its own. */
@@ -228,15 +176,15 @@ static void add_drift(struct pose_solver *s, size_t held_out_count, int coarsest
         sure_count += !s->frame[f].is_fixed;
     if (sure_count < MIN_SURE)
         return;
-    double *before = mem_calloc(2 * held_out_count, sizeof *before), *now = before + held_out_count;
+    double *before = mem_calloc(2 * held_out_count + 1, sizeof *before), *now = before + held_out_count;
     double *x = mem_array(s->unknowns + 1, sizeof *x);
     struct pose_frame *sure = mem_array(s->frames, sizeof *sure);
     memcpy(sure, s->frame, s->frames * sizeof *sure);
     memcpy(x, s->x, s->unknowns * sizeof *x);
-    costs_now(s, before);
+    pose_costs(s, before);
     follow_walk(s, coarsest);
-    costs_now(s, now);
-    if (is_drift(s, before, now, held_out_count - 1)) {
+    pose_costs(s, now);
+    if (is_drift(s, before, now, held_out_count)) {
         for (size_t f = 0; f < s->frames; f++)
             s->frame[f].shift_px = shift_along_walk(s, f);
     } else {
@@ -265,13 +213,13 @@ void calibrate_poses(struct scene *scene, const struct tracks *tracks, struct pa
     struct pose_solver s;
     const struct views *views = tracks->views;
     pose_solver_init(&s, tracks, pool);
-    size_t held_out_count = s.track_count / POSE_HELD_OUT_EVERY + 1;
-    double *before = mem_calloc(2 * held_out_count, sizeof *before), *now = before + held_out_count;
-    costs_now(&s, before);
+    size_t held_out_count = pose_costs_count(&s);
+    double *before = mem_calloc(2 * held_out_count + 1, sizeof *before), *now = before + held_out_count;
+    pose_costs(&s, before);
     for (int level = coarsest_level(tracks); level >= 0; level--)
         run_rounds(&s, level, POSE_ROUNDS);
-    costs_now(&s, now);
-    bool convincing = all_improved(before, now, held_out_count - 1);
+    pose_costs(&s, now);
+    bool convincing = all_improved(before, now, held_out_count);
     mem_free(before);
     for (size_t f = 0; f < s.frames && !convincing; f++)
         pose_reset(&s, f);
@@ -279,7 +227,7 @@ void calibrate_poses(struct scene *scene, const struct tracks *tracks, struct pa
     run_rounds(&s, 0, LAST_ROUNDS);
     judge(&s);
     add_drift(&s, held_out_count, coarsest_level(tracks));
-    *found = (struct poses_found){.shift = mem_calloc(s.frames + 1, sizeof *found->shift)};
+    *found = (struct poses_found){.is_drift = s.walk.is_known, .shift = mem_calloc(s.frames + 1, sizeof *found->shift)};
     double squares = 0.0;
     for (size_t f = 0; f < s.frames; f++) {
         const struct pose_frame *frame = &s.frame[f];

@@ -13,6 +13,7 @@
 #include "server/scene/scene.h"
 
 struct poses_found {
+    bool is_drift; /* they follow a walk */
     size_t moved_count;
     double shift_px;             /* rms over the moved photographs, pixels */
     size_t held_out_moved_count; /* held-out photographs, and their rms, pixels */

@@ -98,6 +98,11 @@ void pose_twist(struct pose_frame *frame, const double twist[POSE_UNKNOWNS], dou
     set_pose(&frame->now, &frame->pose);
 }
 
+void pose_place(struct pose_frame *frame, const struct camera *camera) {
+    frame->now = *camera;
+    frame->pose = pose_of(&camera->camera_from_world);
+}
+
 void pose_move(struct pose_solver *s, size_t f, double most) {
     if (!s->frame[f].is_fixed)
         pose_twist(&s->frame[f], s->x + POSE_UNKNOWNS * f, most);
@@ -105,8 +110,7 @@ void pose_move(struct pose_solver *s, size_t f, double most) {
 
 void pose_reset(struct pose_solver *s, size_t f) {
     struct pose_frame *frame = &s->frame[f];
-    frame->now = frame->before;
-    frame->pose = pose_of(&frame->before.camera_from_world);
+    pose_place(frame, &frame->before);
     memset(frame->total, 0, sizeof frame->total);
     frame->is_fixed = true;
 }

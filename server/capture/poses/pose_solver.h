@@ -129,6 +129,12 @@ static inline void pose_factor(double a[POSE_UNKNOWNS][POSE_UNKNOWNS]) {
 /* Solves for x: twists to apply, and offsets. A walk that is learnt is improved first. */
 void pose_solve(struct pose_solver *s);
 
+/* Of POSE_UNKNOWNS motions that all frames share and, last, of the observed values: offsets that make the errors least,
+ * and what each observation then pulls at: its weight times its error less the track's mean. x[POSE_UNKNOWNS +
+ * 1][unknowns]: in, the frames' twists by a unit of each motion (0 of the values) and offsets to start with; out, the
+ * offsets. pull[POSE_UNKNOWNS + 1][observations of first_of_frame]. */
+void pose_profile(struct pose_solver *s, double *x, double *pull);
+
 /* At its camera, not moved yet. */
 void pose_frame_init(struct pose_frame *frame, const struct camera *camera);
 
@@ -141,6 +147,9 @@ double pose_squared_shift(const struct camera *a, const struct camera *b, vec3 p
 
 /* Moves a frame by a twist, clamped to `most` pixels. */
 void pose_twist(struct pose_frame *frame, const double twist[POSE_UNKNOWNS], double most);
+
+/* Puts a frame at a camera. */
+void pose_place(struct pose_frame *frame, const struct camera *camera);
 
 /* Moves a frame by its twist in x; resets it to its first camera and fixes it there. */
 void pose_move(struct pose_solver *s, size_t f, double most);

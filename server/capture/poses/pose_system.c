@@ -37,7 +37,8 @@ static double own_prior(const struct pose_solver *s, size_t f) {
  * pull at. Frames take them in the order of tracks, so that sums do not depend on threads. */
 struct product {
     struct pose_solver *solver;
-    const double *x; /* error z = A x; NULL: z = -value */
+    const double *x; /* error z = A x; NULL: 0 */
+    bool has_value;  /* z less the observed value */
     /* The frame's equations beside its observations, into its part of out; NULL: out is added to. */
     void (*start)(const void *user, size_t frame, const double *x, double *out);
     const void *user;
@@ -45,10 +46,11 @@ struct product {
 };
 
 static double error_of(const struct product *p, const struct pose_observation *observation) {
+    double z = p->has_value ? -(double)observation->value : 0.0;
     if (!p->x)
-        return -(double)observation->value;
+        return z;
     const double *twist = p->x + POSE_UNKNOWNS * observation->frame;
-    double z = -p->x[observation->offset];
+    z -= p->x[observation->offset];
     for (int j = 0; j < POSE_UNKNOWNS; j++)
         z += (double)observation->d[j] * twist[j];
     return z;
@@ -104,13 +106,6 @@ static void multiply_out(struct product *p) {
     parallel_for(s->pool, s->frames, sum_frame, p);
 }
 
-static void project(const struct pose_solver *s, double *x) {
-    for (size_t f = 0; f < s->frames; f++) {
-        if (s->frame[f].is_fixed)
-            memset(x + POSE_UNKNOWNS * f, 0, POSE_UNKNOWNS * sizeof *x);
-    }
-}
-
 /* A factorised 6 x 6 block for each frame's twist, and the diagonal of the offsets. */
 struct preconditioner {
     double (*block)[POSE_UNKNOWNS][POSE_UNKNOWNS]; /* [frames] lower Cholesky factors; owned */
@@ -119,9 +114,18 @@ struct preconditioner {
 
 struct twist_system {
     struct pose_solver *solver;
-    double *damping; /* [POSE_UNKNOWNS * frames] added to the diagonal of the twists; owned */
+    bool keeps_twists; /* offsets alone are solved for */
+    double *damping;   /* [POSE_UNKNOWNS * frames] added to the diagonal of the twists; owned */
     struct preconditioner preconditioner;
 };
+
+static void project(const struct twist_system *system, double *x) {
+    const struct pose_solver *s = system->solver;
+    for (size_t f = 0; f < s->frames; f++) {
+        if (system->keeps_twists || s->frame[f].is_fixed)
+            memset(x + POSE_UNKNOWNS * f, 0, POSE_UNKNOWNS * sizeof *x);
+    }
+}
 
 /* Priors of a frame's twist and of its offsets. */
 static void start_frame(const void *user, size_t f, const double *x, double *out) {
@@ -138,10 +142,10 @@ static void start_frame(const void *user, size_t f, const double *x, double *out
 static void multiply(const void *user, const double *x, double *out) {
     const struct twist_system *system = user;
     struct pose_solver *s = system->solver;
-    multiply_out(&(struct product){s, x, start_frame, system, out});
+    multiply_out(&(struct product){s, x, false, start_frame, system, out});
     if (s->walk.is_known)
         pose_walk_multiply(s, x, out);
-    project(s, out);
+    project(system, out);
 }
 
 /* Takes the frame's observations, and adds up its block of the matrix. */
@@ -167,9 +171,10 @@ static void take_frame(void *user, size_t f, int thread) {
     }
 }
 
-static void preconditioner_init(struct twist_system *system) {
+static void twist_system_init(struct twist_system *system) {
     struct pose_solver *s = system->solver;
     struct preconditioner *p = &system->preconditioner;
+    system->damping = mem_calloc(POSE_UNKNOWNS * s->frames + 1, sizeof *system->damping);
     p->block = mem_calloc(s->frames + 1, sizeof *p->block);
     p->diagonal = mem_calloc(s->unknowns + 1, sizeof *p->diagonal);
     parallel_for(s->pool, s->frames, take_frame, system);
@@ -187,9 +192,10 @@ static void preconditioner_init(struct twist_system *system) {
         p->diagonal[i] += 1.0 / (OFFSET_SIGMA * OFFSET_SIGMA);
 }
 
-static void preconditioner_release(struct preconditioner *p) {
-    mem_free(p->block);
-    mem_free(p->diagonal);
+static void twist_system_release(struct twist_system *system) {
+    mem_free(system->preconditioner.block);
+    mem_free(system->preconditioner.diagonal);
+    mem_free(system->damping);
 }
 
 static void precondition(const void *user, const double *r, double *z) {
@@ -203,28 +209,64 @@ static void precondition(const void *user, const double *r, double *z) {
     }
     for (size_t i = POSE_UNKNOWNS * s->frames; i < s->unknowns; i++)
         z[i] = r[i] / p->diagonal[i];
-    project(s, z);
+    project(system, z);
 }
 
 void pose_solve(struct pose_solver *s) {
     size_t n = s->unknowns, twists = POSE_UNKNOWNS * s->frames;
     double *r = mem_calloc(n, sizeof *r), *x = s->x;
-    struct twist_system twist = {.solver = s, .damping = mem_calloc(twists, sizeof *twist.damping)};
+    struct twist_system twist = {.solver = s};
     const struct conjugate_system system = {n, multiply, precondition, &twist};
-    preconditioner_init(&twist);
+    twist_system_init(&twist);
     if (s->walk.is_known && s->walk.is_learnt)
         pose_walk_update_variances(s, twist.preconditioner.block);
-    multiply_out(&(struct product){.solver = s, .out = r});
+    multiply_out(&(struct product){.solver = s, .has_value = true, .out = r});
     memset(x, 0, twists * sizeof *x);
     for (size_t i = 0; i < twists; i++)
         r[i] -= own_prior(s, i / POSE_UNKNOWNS) * s->frame[i / POSE_UNKNOWNS].total[i % POSE_UNKNOWNS];
     if (s->walk.is_known)
         pose_walk_pull(s, r);
-    project(s, r);
+    project(&twist, r);
     conjugate_residual(&system, x, r);
     double goal = CG_TOLERANCE * CG_TOLERANCE * conjugate_dot(r, r, n);
     conjugate_solve(&system, CG_STEPS, goal, r, x);
-    preconditioner_release(&twist.preconditioner);
-    mem_free(twist.damping);
+    twist_system_release(&twist);
     mem_free(r);
+}
+
+/* --- motions that all frames share ---------------------------------------------------------------- */
+
+/* Offsets of x that make the errors least, its twists as they are. In x: a start. */
+static void follow(struct twist_system *system, double *x, bool has_value) {
+    struct pose_solver *s = system->solver;
+    size_t n = s->unknowns, twists = POSE_UNKNOWNS * s->frames;
+    double *r = mem_calloc(2 * n + 1, sizeof *r), *fixed = r + n;
+    const struct conjugate_system offsets = {n, multiply, precondition, system};
+    memcpy(fixed, x, twists * sizeof *fixed);
+    memset(x, 0, twists * sizeof *x);
+    multiply_out(&(struct product){.solver = s, .x = fixed, .has_value = has_value, .out = r});
+    project(system, r);
+    for (size_t i = twists; i < n; i++)
+        r[i] = -r[i];
+    double goal = CG_TOLERANCE * CG_TOLERANCE * conjugate_dot(r, r, n);
+    conjugate_residual(&offsets, x, r);
+    conjugate_solve(&offsets, CG_STEPS, goal, r, x);
+    memcpy(x, fixed, twists * sizeof *x);
+    mem_free(r);
+}
+
+void pose_profile(struct pose_solver *s, double *x, double *pull) {
+    struct twist_system system = {.solver = s, .keeps_twists = true};
+    size_t count = s->first_of_frame[s->frames];
+    double *out = mem_array(s->unknowns + 1, sizeof *out);
+    twist_system_init(&system);
+    for (size_t k = 0; k <= POSE_UNKNOWNS; k++) {
+        follow(&system, x + k * s->unknowns, k == POSE_UNKNOWNS);
+        memset(s->pull, 0, count * sizeof *s->pull);
+        multiply_out(
+            &(struct product){.solver = s, .x = x + k * s->unknowns, .has_value = k == POSE_UNKNOWNS, .out = out});
+        memcpy(pull + k * count, s->pull, count * sizeof *pull);
+    }
+    twist_system_release(&system);
+    mem_free(out);
 }
