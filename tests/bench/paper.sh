@@ -4,8 +4,10 @@
 # writes BUILD/paper.json and under BUILD/paper all outputs with side-by-sides.
 #
 # PAPER       short: small photographs and textures, seconds instead of minutes, to see that
-#             everything runs. Its figures say little. Otherwise the long form: hours.
-# PAPER_QUALITY  setting quality of a reconstruction (standard; short: draft)
+#             everything runs. Its figures say little. draft: half of the photographs, each a quarter of the size,
+#             textures of 512, meshes as in the long form: a minute or two a reconstruction, on a quiet machine.
+#             Otherwise the long form: hours.
+# PAPER_QUALITY  setting quality of a reconstruction (standard; short, draft: draft)
 # PAPER_SEC   longest time limit that "speed" tries (600; short: 5)
 # PAPER_ONLY  some of "fig4 fig7 fig8 table1 dense fig5 speed ablations"; dense: Table 1 as a scanner would have it; fig4
 #             takes numpy, OpenEXR and pillow from PyPI into BUILD/retinex
@@ -19,6 +21,9 @@ rows=$build/paper.tsv
 if [ "${PAPER:-}" = short ]; then
     seconds=${PAPER_SEC:-5} quality=${PAPER_QUALITY:-draft} samples=4 size=512 edge=0.2 dense_edge=0.1
     views=(--width 80 --height 60 --frames 24 --test-frames 6 --spp 16 --test-spp 32)
+elif [ "${PAPER:-}" = draft ]; then
+    seconds=${PAPER_SEC:-600} quality=${PAPER_QUALITY:-draft} samples=16 size=512 edge=0.1 dense_edge=0.03
+    views=(--width 160 --height 120 --frames 40 --test-frames 15 --spp 64 --test-spp 256)
 else
     seconds=${PAPER_SEC:-600} quality=${PAPER_QUALITY:-standard} samples=16 size=2048 edge=0.1 dense_edge=0.03
     views=(--width 320 --height 240 --frames 80 --test-frames 30 --spp 64 --test-spp 256)
@@ -117,7 +122,7 @@ fig8() {
     row "Fig. 8: roughness PSNR, dB" "$(figure "$out" roughness_psnr_db)" - higher
     row "Fig. 8: specular PSNR, dB" "$(figure "$out" specular_psnr_db)" - higher
     row "Fig. 8: MSRE" "$(figure "$out" msre)" - lower
-    [ "${PAPER:-}" = short ] && return
+    [ -n "${PAPER:-}" ] && return
     out=$dir/fig8-8192
     run "$room" "$out" texture_size=8192
     read -r memory total < <(awk '/^peak memory/ { print $3 / 1024, $6 / 60 }' "$out.log")
