@@ -7,23 +7,10 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "common/clock.h"
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
 #include "server/data/layout.h"
-
-/* Whether a token that is valid now makes its holder an admin. */
-static enum status has_admin(struct store *store, bool *has, struct error *err) {
-    struct token_row *rows = NULL;
-    size_t count = 0;
-    enum status status = store_token_list(store, &rows, &count, err);
-    *has = false;
-    for (size_t i = 0; i < count; i++)
-        *has |= rows[i].role == ROLE_ADMIN && (rows[i].expires_ms == 0 || rows[i].expires_ms > clock_unix_ms());
-    mem_free(rows);
-    return status;
-}
 
 /* The first token makes an admin unless a role is asked for: from then on nobody administers without one. */
 static enum status token_add(struct store *store, const cJSON *request, cJSON *reply, struct error *err) {
@@ -41,17 +28,17 @@ static enum status token_add(struct store *store, const cJSON *request, cJSON *r
         status = error_set(err, STATUS_INPUT, "there is no role \"%.80s\": viewer, user, admin", role_text);
     if (status == STATUS_OK)
         status = json_number(request, "expires_ms", "the request", 0.0, &expires_ms, err);
+    if (status == STATUS_OK) /* before the token, whose secret is lost where anything fails after it */
+        status = store_has_admin(store, &is_administered, err);
     if (status == STATUS_OK)
         status = store_token_add(store, name, role, (int64_t)expires_ms, token, &id, err);
-    if (status == STATUS_OK)
-        status = has_admin(store, &is_administered, err);
     if (status != STATUS_OK)
         return status;
     log_info("token %lld made for %s, role %s", (long long)id, name, role_name(role));
     json_add_int(reply, "id", id);
     json_add_string(reply, "token", token);
     json_add_string(reply, "role", role_name(role));
-    json_add_bool(reply, "has_admin", is_administered);
+    json_add_bool(reply, "has_admin", is_administered || role == ROLE_ADMIN);
     return STATUS_OK;
 }
 

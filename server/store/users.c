@@ -228,6 +228,17 @@ bool store_token_is_valid(struct store *store, int64_t id) {
     return status == STATUS_OK && found != 0;
 }
 
+enum status store_has_admin(struct store *store, bool *has, struct error *err) {
+    int64_t found = 0;
+    store_lock(store);
+    enum status status = sql_int(&store->sql, 0, &found, err,
+                                 "SELECT 1 FROM tokens WHERE role = ? AND (expires_ms = 0 OR expires_ms > ?) LIMIT 1",
+                                 "ii", (int64_t)ROLE_ADMIN, store_now_ms());
+    store_unlock(store);
+    *has = found != 0;
+    return status;
+}
+
 enum status store_token_list(struct store *store, struct token_row **rows, size_t *count, struct error *err) {
     sqlite3_stmt *stmt;
     *rows = NULL;

@@ -59,6 +59,8 @@ enum status store_token_find(struct store *store, const char *token, struct call
 /* Revokes the token of that number, or all tokens of the user of that name. */
 enum status store_token_revoke(struct store *store, const char *number_or_name, size_t *count, struct error *err);
 bool store_token_is_valid(struct store *store, int64_t id);
+/* Whether a token that is valid now makes its holder an admin. */
+enum status store_has_admin(struct store *store, bool *has, struct error *err);
 
 struct token_row {
     int64_t id, created_ms, expires_ms; /* expires_ms: 0: never */
