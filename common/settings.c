@@ -75,7 +75,7 @@ static const struct setting table[] = {
      "solve: base colour is measured of one texel in so many squared"},
     {"method", SETTING_CHOICE, "", 0, 0, "solve|listing1", "solve", NULL,
      "how materials are found: solved from the measured light, then refined; or the published algorithm from a neutral start"},
-    {"padding", SETTING_INT, "texels", 0, 40, NULL, "2", NULL,
+    {"padding", SETTING_INT, "texels", 0, 40, NULL, "0", NULL,
      "free texels between two charts of the textures: 2 keep mip level 1 clean, 7 level 2, 16 level 3; 0: 7, or 2 where 7 would cost more "
      "than a tenth of texels_per_metre"},
     {"photograph_megapixels", SETTING_REAL, "megapixels", 0, 100000, NULL, "3.2", NULL,

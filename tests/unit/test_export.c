@@ -163,7 +163,7 @@ static void test_clean_levels(struct parallel *pool) {
     struct error err;
     struct settings defaults;
     settings_init(&defaults);
-    CHECK(settings_number(&defaults, "padding") == ATLAS_PADDING);
+    CHECK(settings_number(&defaults, "padding") == ATLAS_AUTOMATIC_PADDING);
     settings_release(&defaults);
     CHECK(room_init(&room, &(struct room_look){64, 0.0f, 0.0f, ROOM_LAMPS_FRAMED}, pool, &err) == STATUS_OK);
     for (size_t i = 0; i < sizeof table / sizeof *table; i++) {
