@@ -1,6 +1,7 @@
 /* probes_refine.c -- see probes_refine.h. */
 #include "server/gather/probes_refine.h"
 
+#include <math.h>
 #include <stdlib.h>
 
 #include "common/mem.h"
