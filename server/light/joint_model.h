@@ -7,7 +7,7 @@
 #include <stdint.h>
 
 #include "common/parallel.h"
-#include "server/light/albedo.h"
+#include "server/light/light_priors.h"
 
 struct joint_point {
     uint32_t segment, patch; /* points of a segment are adjacent, and in it those of a patch */

@@ -4,14 +4,7 @@
 #include <math.h>
 
 #include "common/mem.h"
-
-/* Colour: standard deviation of the logarithm of a channel about the mean of the channels. Black bodies of 2,700 K and
- * 6,500 K are .5 off in blue, coloured lamps twice as much. */
-#define COLOR_DEVIATION 1.0
-#define MEASURED_DEVIATION 0.02 /* of a channel that does not saturate */
-/* Of a lamp, by what the model lacks, beside the posterior's own deviation: with it errors of nine hidden lamps of the
- * rooms for choices are .83 of what is stated, root of the mean square. Nearly all are upwards. */
-#define SYSTEMATIC_DEVIATION 0.15
+#include "server/light/light_priors.h"
 
 /* Fits a channel of the lamps, whose means are known; the unseen sky is grey. */
 static void fit_channel(struct light_model *m, int channel) {

@@ -7,18 +7,10 @@
 
 #include "common/mem.h"
 #include "server/light/emitters.h"
+#include "server/light/light_priors.h"
 #include "server/state/evidence.h"
 
-/* Prior of a hidden lamp: the mean and the standard deviation of the logarithm of its radiance over the room's median.
- * Luminous panels and shades have 30 to 1,000 times the luminance of walls. */
-#define LAMP_OVER_ROOM 100.0
-#define LAMP_DEVIATION 1.5
-/* Of an opening: most of what lies behind gaps of a scan is dark, or a surface no brighter than the room, some are
- * lamps. */
-#define OPENING_OVER_ROOM 0.1
-/* Lamps that photographs measure. */
-#define SEEN_DEVIATION 0.1
-/* Greatest relative difference of area of segments that look alike; of observed radiance it is that deviation. */
+/* Greatest relative difference of area of segments that look alike; of observed radiance it is SEEN_DEVIATION. */
 #define ALIKE_AREA 0.02f
 
 void light_lamps_init(struct light_lamps *l, const struct reconstruction *r, float median_radiance) {

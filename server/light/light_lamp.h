@@ -14,10 +14,6 @@
 _Static_assert(LIGHT_MAX *LIGHT_MAX + LIGHT_MAX + LIGHT_OPENINGS_MAX + ENVIRONMENT_HALVES <= ESTIMATED_MAX,
                "all lamps and the sky are reported");
 
-/* Standard deviation of the logarithm of a radiance of which no more is known than a lower bound, or the
- * room's median. */
-#define LIGHT_UNKNOWN_DEVIATION 2.0
-
 /* A segment, several that look alike, or the saturated part of sky or ground, whose radiance is then a factor of the
  * map's. */
 struct light_lamp {

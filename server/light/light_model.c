@@ -8,15 +8,8 @@
 #include "common/quantile.h"
 #include "server/light/bounced_light.h"
 #include "server/light/joint_alike.h"
+#include "server/light/light_priors.h"
 
-/* What is filled in, of the sky and of surfaces that no photograph shows, is right within a factor of two: the standard
- * deviation of its logarithm; and of that of ground over sky. Between neighbouring cells of the sky. */
-#define FILL_DEVIATION 0.7
-#define SKY_SMOOTHNESS 0.5
-/* Ground over sky: the mean of the logarithm of the ratio of their radiances. Ground reflects .2 of what falls on it,
- * houses .3 to .5; overcast sky is a third as bright at the horizon as above, and under a sun the ground is as bright
- * as the sky. */
-#define GROUND_OVER_SKY 0.4
 /* Errors of patches agree up to this distance, in edges of patches: about 1 m, as far as a lamp near a surface
  * lights. */
 #define ALIKE_EDGES 3.5f

@@ -6,7 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "server/light/albedo.h"
+#include "server/light/light_priors.h"
 #include "server/light/survey.h"
 #include "server/scene/surface.h"
 

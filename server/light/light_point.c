@@ -8,12 +8,11 @@
 #include "common/mem.h"
 #include "server/gather/irradiance.h"
 #include "server/gather/sun.h"
+#include "server/light/light_priors.h"
 #include "server/render/sampler.h"
 
 #define SKY_RAYS 2048
 #define KEY_SKY 37 /* keeps these random numbers apart from others of the texel */
-/* Standard deviation of light that is not modelled, as a part of the room's median radiance: dim places say less. */
-#define DARK_DEVIATION 0.05f
 /* A patch is a cube of this part of the square root of the room's surface: some .3 m. */
 #define PATCH_PART 0.022f
 #define PATCH_BITS 9 /* of a coordinate of a patch */

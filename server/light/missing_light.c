@@ -6,7 +6,7 @@
 
 #include "common/mem.h"
 #include "common/quantile.h"
-#include "server/light/albedo.h"
+#include "server/light/light_priors.h"
 
 /* Strengths tried: from one on that adds this share of known light to the places it reaches, on average, octaves
  * apart; then nearer and nearer to the best. */

@@ -7,7 +7,7 @@
 #include "common/cholesky.h"
 #include "common/mem.h"
 #include "common/quantile.h"
-#include "server/light/albedo.h"
+#include "server/light/light_priors.h"
 
 #define CELLS SKY_CELLS
 /* Least share of a point's rays in unseen directions for it to count in the fit. */

@@ -22,7 +22,7 @@
 #define NEUTRAL_ROUGHNESS 0.5f
 #define NEUTRAL_SPECULAR 0.5f
 
-/* White paint over the room's median radiance: .85 and .4 (server/light/albedo.h). */
+/* White paint over the room's median radiance: .85 and .4 (server/light/light_priors.h). */
 #define SKY_OVER_ROOM 2.1f
 
 #define MIN_TRAINING 16 /* training photographs that must remain for any to be held out */
