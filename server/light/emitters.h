@@ -6,13 +6,6 @@
 #include "server/state/evidence.h"
 #include "server/state/reconstruction.h"
 
-/* Least part of a segment's radiance beyond the reflection of base colour 1 that makes an emitter. White walls of
- * albedo .9 stay near .1; bowls around lamps, whose pixels mix with the lamp, stay below .25. */
-#define EMITTER_SHARE 0.25f
-/* The same where a share of all rays leaves the room in unseen directions: that part of the incident light is an
- * estimate (unseen_light.h), which may be half of the truth. */
-static inline float emitters_share(float unseen_share) { return EMITTER_SHARE * (1.0f + unseen_share); }
-
 /* Fills `radiance`, `observed`, `saturated`, `is_seen`, `only_mixed` and `is_outshone` of evidence[segment_count] from
  * up to a few hundred texels of each; nothing of hidden lamps, no `radiance` of saturated lamps that is estimated. */
 void emitters_observe(const struct reconstruction *r, const struct views *views, struct emitter_evidence *evidence);

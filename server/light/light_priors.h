@@ -42,6 +42,8 @@
 
 /* What is filled in, of the sky and of surfaces that no photograph shows: right within a factor of two. */
 #define FILL_DEVIATION 0.7
+/* Of the sky where unseen_fit.h fitted it to surfaces. */
+#define FIT_DEVIATION 0.3
 
 /* Ground over sky: ground reflects .2 of what falls on it, houses .3 to .5; overcast sky is a third as bright at the
  * horizon as above, and under a sun the ground is as bright as the sky. As far as what is filled in. */

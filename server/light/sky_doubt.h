@@ -3,8 +3,8 @@
  * A window sill lies under the sky up to the zenith; photographs taken in the room look out a little above the horizon,
  * and what is above that was filled in from there (environment.h). Skies get brighter upwards, or towards the sun, by
  * factors. A sill that is brighter than white paint under the filled-in sky is no lamp as long as such a sky would
- * explain it. The light of unobserved sky is found here; how much brighter it may be, and what emits, is decided in
- * solve_emitters.c. The map is not changed. */
+ * explain it. The light of unobserved sky is found here; what emits is decided by its variance in
+ * reflection.c. The map is not changed. */
 #ifndef UNBAKE_LIGHT_SKY_DOUBT_H
 #define UNBAKE_LIGHT_SKY_DOUBT_H
 

@@ -12,7 +12,7 @@
 #include "common/mem.h"
 #include "common/quantile.h"
 #include "server/capture/triangle_light.h"
-#include "server/light/emitters.h"
+#include "server/light/reflection.h"
 #include "server/light/shining.h"
 #include "server/scene/adjacency.h"
 #include "server/scene/by_segment.h"
@@ -136,7 +136,7 @@ static void try_part(const struct split_level *l, size_t part_size, const struct
     if (part.pixels < MIN_PIXELS || l->radiance < job->needed[l->part[0]])
         return;
     float lambert = shining_lambert(&job->shining, l->part, part_size);
-    float needed = lambert / (1.0f - emitters_share(job->shining.unseen_share));
+    float needed = lambert * reflection_limit(job->shining.unseen_share);
     if (l->radiance < needed) {
         for (size_t i = 0; i < part_size; i++)
             job->needed[l->part[i]] = NEAR * needed;

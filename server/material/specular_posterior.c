@@ -26,15 +26,14 @@
 #define COLOR_SPREAD 0.04 /* +25 %: 0 dB */
 #define COMMON_MIN 0.02   /* less counts as 0; +25 %: no change */
 
-static const double specular_prior[HIGHLIGHT_SPECULARS] = {0.05, 0.15, 0.5, 0.15, 0.15};
+static const double level_prior[HIGHLIGHT_SPECULARS] = {0.05, 0.15, 0.5, 0.15, 0.15};
 
-/* Prior of each candidate for a segment that has this part of the surface. */
-static void prior_of(double part, double prior[SPECULAR_CANDIDATES]) {
+void specular_prior(double part, double prior[SPECULAR_CANDIDATES]) {
     double diffuse = DIFFUSE_PRIOR + (DIFFUSE_PRIOR_LARGE - DIFFUSE_PRIOR) * fmin(part / LARGE_PART, 1.0), sum = 0.0;
     for (size_t k = 0; k < HIGHLIGHT_ROUGHNESSES; k++) {
         for (size_t m = 0; m < HIGHLIGHT_SPECULARS; m++) {
             float roughness = specular_levels.roughness[k];
-            double p = roughness > SPECULAR_MAX_ROUGHNESS ? 0.0 : (double)(1.0f - roughness) * specular_prior[m];
+            double p = roughness > SPECULAR_MAX_ROUGHNESS ? 0.0 : (double)(1.0f - roughness) * level_prior[m];
             prior[specular_candidate(k, m)] = p;
             sum += p;
         }
@@ -72,7 +71,7 @@ static double shared_probability(const struct specular_evidence *a, const struct
 /* Multiplies the distribution of the common material by the evidence of another segment, and normalises it. */
 static void add_evidence(const struct specular_evidence *other, double chance, double belief[SPECULAR_CANDIDATES]) {
     double prior[SPECULAR_CANDIDATES], own[SPECULAR_CANDIDATES], sum = 0.0;
-    prior_of(other->part, prior);
+    specular_prior(other->part, prior);
     double is_observed = multiply(prior, other->likelihood, own);
     for (size_t c = 0; c < SPECULAR_CANDIDATES; c++) {
         belief[c] *= chance * other->likelihood[c] + (1.0 - chance) * is_observed;
@@ -85,8 +84,8 @@ static void add_evidence(const struct specular_evidence *other, double chance, d
 struct specular_posterior specular_posterior(const struct specular_evidence *evidence, size_t count, size_t segment) {
     const struct specular_evidence *own = &evidence[segment];
     double prior[SPECULAR_CANDIDATES], belief[SPECULAR_CANDIDATES];
-    prior_of(own->part, prior);
-    prior_of(own->part, belief);
+    specular_prior(own->part, prior);
+    specular_prior(own->part, belief);
     for (size_t i = 0; i < count; i++) {
         double chance = i != segment && evidence[i].is_observed ? shared_probability(own, &evidence[i]) : 0.0;
         if (chance > 0.0)

@@ -45,6 +45,9 @@ struct specular_posterior {
     double diffuse, roughness, specular;
 };
 
+/* Prior of each candidate for a segment that has this part of the surface; sums to 1. */
+void specular_prior(double part, double prior[SPECULAR_CANDIDATES]);
+
 /* Posterior of `segment`, whose evidence[segment].is_observed must be true; evidence[count]. */
 struct specular_posterior specular_posterior(const struct specular_evidence *evidence, size_t count, size_t segment);
 

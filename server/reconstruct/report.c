@@ -345,6 +345,7 @@ void report_emitters(struct reconstruction *r) {
         json_add_bool(entry, "is_emitter", r->is_emitter[s]);
         json_add_bool(entry, "hidden", evidence->is_hidden);
         json_add_number(entry, "share_beyond_reflection", (double)evidence->emitted_share);
+        json_add_number(entry, "probability_of_reflection", (double)evidence->reflection);
         json_add_number(entry, "share_that_changed", (double)evidence->changing_share);
         json_add_number(entry, "white_by_unseen_sky", (double)evidence->sky_lambert);
         const rgb *e = &r->materials.emission[s];

@@ -7,15 +7,12 @@
 #include "common/mem.h"
 #include "common/ordered.h"
 #include "server/light/changing_light.h"
-#include "server/light/emitters.h"
 #include "server/light/lambert_mean.h"
-#include "server/light/sky_doubt.h"
+#include "server/light/reflection.h"
 #include "server/material/emission_pattern.h"
 #include "server/reconstruct/inputs.h"
 #include "server/scene/by_segment.h"
 
-/* Unobserved sky may be brighter than assumed by this factor of its radiance. */
-#define SKY_DOUBT 1.0f
 /* Part of a segment's surface whose light must have changed for it to be an emitter. */
 #define EMITTER_CHANGES 0.08f
 #define EVIDENCE_STRIDE 3 /* every third valid texel is used for the mean incident light, for time */
@@ -102,13 +99,9 @@ static void decide(void *user, size_t segment, int thread) {
     struct reconstruction *r = d->emitters->r;
     struct emitter_evidence *e = &r->evidence[segment];
     size_t first = d->texels.first[segment], count = d->texels.first[segment + 1] - first;
-    float radiance = rgb_mean(e->radiance), lambert = rgb_mean(e->lambert);
-    float needed = emitters_share((float)r->unseen_share);
-    bool doubts_sky = e->emitted_share > needed && !r->sky_is_fitted;
-    e->sky_lambert = doubts_sky ? sky_doubt(r, d->texels.texel + first, count) : 0.0f;
+    reflection_find(r, d->emitters->divide, (uint32_t)segment, d->texels.texel + first, count, thread);
     e->changing_share = changing_light(d->emitters->divide, d->texels.texel + first, count, thread);
-    bool emits = e->is_hidden || e->changing_share > EMITTER_CHANGES ||
-                 radiance - lambert - SKY_DOUBT * e->sky_lambert > needed * radiance;
+    bool emits = e->is_hidden || e->changing_share > EMITTER_CHANGES || reflection_is_unlikely(e);
     r->is_emitter[segment] = settings_emitter(r->settings, (uint32_t)segment, emits);
 }
 

@@ -21,6 +21,7 @@ struct emitter_evidence {
     rgb lambert;          /* mean radiance that a Lambertian surface of albedo 1 would reflect there */
     float emitted_share;  /* part of `radiance` beyond `lambert`, in [0, 1] */
     float changing_share; /* part of its surface whose light changed between photographs (changing_light.h) */
+    float reflection;     /* probability that reflection would show as much (reflection.h) */
     float sky_lambert;    /* mean radiance of a Lambertian surface of albedo 1 by unobserved sky (sky_doubt.h) */
 };
 

@@ -1,5 +1,5 @@
 """Six furnished rooms, boxes all. Not unseen any more: constants of gloss.c, sun_find.c and measurement.c were chosen on
-these rooms, too; on the last only SKY_DOUBT of solve.c was.
+these rooms, too; on the last only the doubt about unseen sky was.
 
   kitchen   closed; four spots at the ceiling and a strip lamp, polished tiles, much steel
   parlour   two windows under a sky that the sun has just left, a lamp, a lit screen, wallpaper, books

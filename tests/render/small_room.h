@@ -116,6 +116,9 @@ static inline vec3 spread(int i, float margin) {
 
 static inline vec3 look_anywhere(int frame) { return spread(frame * 7 + 3, 0.0f); }
 
+/* A test may place the cameras. */
+static vec3 (*camera_place)(int frame);
+
 /* What a mesh needs beside itself to be rendered. */
 struct model {
     struct segments segments;
@@ -190,7 +193,7 @@ static inline void photograph_mesh(struct scene *scene, rgb lamp, const struct i
                                      .clip = INFINITY,
                                      .is_test = f % 5 == 4};
         photo->name = mem_printf("frame %d", f);
-        photo->camera = look(spread(f, 0.4f), target(f));
+        photo->camera = look(camera_place ? camera_place(f) : spread(f, 0.4f), target(f));
         struct image image;
         film_render(&truth.world, &photo->camera, photograph_samples, &path, (uint32_t)f, pool, &image);
         photo->pixel = mem_array(WIDTH * HEIGHT, sizeof *photo->pixel);
