@@ -8,10 +8,6 @@
 #include "common/quantile.h"
 #include "server/light/light_priors.h"
 
-/* Strengths tried: from one on that adds this share of known light to the places it reaches, on average, octaves
- * apart; then nearer and nearer to the best. */
-#define FAINTEST 0.01
-#define NEARER 5
 /* Rounds of weights by the last strength, and of the strength by these weights. */
 #define ROUNDS 4
 
@@ -30,9 +26,9 @@ static void find_segments(struct missing_light *m) {
 void missing_light_init(struct missing_light *m, const struct light_places *places, struct parallel *pool) {
     *m = (struct missing_light){.places = places, .pool = pool};
     find_segments(m);
-    m->base = mem_array(MISSING_STRENGTHS * places->count + 1, sizeof *m->base);
-    m->sorted = mem_array(MISSING_STRENGTHS * places->count + 1, sizeof *m->sorted);
-    m->misfit = mem_array(MISSING_STRENGTHS * m->segment_count + 1, sizeof *m->misfit);
+    m->base = mem_array(STRENGTHS * places->count + 1, sizeof *m->base);
+    m->sorted = mem_array(STRENGTHS * places->count + 1, sizeof *m->sorted);
+    m->misfit = mem_array(STRENGTHS * m->segment_count + 1, sizeof *m->misfit);
     m->weight = mem_array(places->count + 1, sizeof *m->weight);
     weigh_equally(m);
 }
@@ -69,8 +65,11 @@ static void find_base(const struct light_place *place, size_t count, float stren
                        (channel_of(place[i].lambert, channel) + strength * place[i].response));
 }
 
-/* Spread of base colours about a median: a highlight, not known yet, makes dark surfaces less alike. */
-static float spread_about(float median) { return (float)ALBEDO_WITHIN + ALBEDO_HIGHLIGHT * expf(-median); }
+/* Spread of base colours about a median, of points and patches: a highlight, not known yet, makes dark surfaces less
+ * alike. */
+static float spread_about(float median) {
+    return hypotf((float)ALBEDO_POINT, (float)ALBEDO_PATCH) + ALBEDO_HIGHLIGHT * expf(-median);
+}
 
 /* Misfit of place i, given its base colour's logarithm and the median of its segment's. */
 static double place_misfit(const struct missing_light *m, size_t i, float base, float median, float spread) {
@@ -82,7 +81,7 @@ static double place_misfit(const struct missing_light *m, size_t i, float base, 
 struct strengths {
     const struct missing_light *m;
     int channel;
-    const float *strength;
+    const double *strength;
 };
 
 /* Misfit of a segment at a strength; 0 where the light does not reach it. */
@@ -99,17 +98,19 @@ static void find_misfit(void *user, size_t index, int thread) {
         any = any || m->places->place[i].response > 0.0f;
     if (!any)
         return;
-    find_base(m->places->place + first, count, s->strength[row], s->channel, base);
+    find_base(m->places->place + first, count, (float)s->strength[row], s->channel, base);
     memcpy(sorted, base, count * sizeof *sorted);
     float median = quantile(sorted, count, 0.5), spread = spread_about(median);
     for (size_t i = 0; i < count; i++)
         m->misfit[index] += place_misfit(m, first + i, base[i], median, spread);
 }
 
-/* Misfit of all segments that the light reaches, at each of strength[count], of MISSING_STRENGTHS at most. */
-static void misfits(const struct missing_light *m, const float *strength, size_t count, int channel, double *misfit) {
-    struct strengths s = {m, channel, strength};
-    parallel_for(m->pool, count * m->segment_count, find_misfit, &s);
+/* Misfit of all segments that the light reaches. */
+static void misfits(void *user, const double *strength, size_t count, double *misfit) {
+    struct strengths *s = user;
+    const struct missing_light *m = s->m;
+    s->strength = strength;
+    parallel_for(m->pool, count * m->segment_count, find_misfit, s);
     for (size_t row = 0; row < count; row++) {
         misfit[row] = 0.0;
         for (size_t k = 0; k < m->segment_count; k++)
@@ -117,41 +118,16 @@ static void misfits(const struct missing_light *m, const float *strength, size_t
     }
 }
 
-static float faintest_strength(const struct missing_light *m, int channel) {
-    double light = 0.0, response = 0.0, reached = 0.0;
-    for (size_t i = 0; i < m->places->count; i++) {
-        light += (double)channel_of(m->places->place[i].lambert, channel);
-        response += (double)m->places->place[i].response;
-        reached += m->places->place[i].response > 0.0f;
-    }
-    return response > 0.0 ? (float)(FAINTEST * light / (double)m->places->count * reached / response) : 0.0f;
-}
-
 float missing_light_strength(const struct missing_light *m, int channel, double *explained) {
-    const float none = 0.0f;
-    float strength[MISSING_STRENGTHS], best = 0.0f, step = 2.0f;
-    double here[MISSING_STRENGTHS], without, least;
-    misfits(m, &none, 1, channel, &without);
-    least = without;
-    strength[0] = faintest_strength(m, channel);
-    for (int i = 1; i < MISSING_STRENGTHS; i++)
-        strength[i] = strength[i - 1] * 2.0f;
-    misfits(m, strength, MISSING_STRENGTHS, channel, here);
-    for (int i = 0; i < MISSING_STRENGTHS; i++) {
-        if (here[i] < least)
-            least = here[i], best = strength[i];
+    struct strengths s = {.m = m, .channel = channel};
+    double known = 0.0, response = 0.0, best;
+    for (size_t i = 0; i < m->places->count; i++) {
+        const struct light_place *p = &m->places->place[i];
+        known += p->response > 0.0f ? (double)channel_of(p->lambert, channel) : 0.0;
+        response += (double)p->response;
     }
-    for (int i = 0; i < NEARER && best > 0.0f; i++) {
-        step = sqrtf(step);
-        const float beside[2] = {best / step, best * step};
-        misfits(m, beside, 2, channel, here);
-        for (int side = 0; side < 2; side++) {
-            if (here[side] < least)
-                least = here[side], best = beside[side];
-        }
-    }
-    *explained = without - least;
-    return best;
+    *explained = strength_search(known, response, misfits, &s, &best);
+    return (float)best;
 }
 
 static void weigh_by_share(struct missing_light *m, float strength, int channel) {

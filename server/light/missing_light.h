@@ -8,10 +8,10 @@
 
 #include "common/parallel.h"
 #include "server/light/light_places.h"
+#include "server/light/strength_search.h"
 
 /* The mean of the channels, in place of one of them. */
 #define MISSING_MEAN 3
-#define MISSING_STRENGTHS 20 /* tried at once */
 
 struct missing_light {
     const struct light_places *places; /* borrowed */
@@ -19,8 +19,8 @@ struct missing_light {
     struct parallel *pool;             /* borrowed */
     size_t segment_count;              /* of those that any place is of */
     size_t *first;                     /* [segment_count + 1] first place of each; owned, as the next */
-    float *base, *sorted;              /* [MISSING_STRENGTHS][places->count] scratch */
-    double *misfit;                    /* [MISSING_STRENGTHS][segment_count] scratch */
+    float *base, *sorted;              /* [STRENGTHS][places->count] scratch */
+    double *misfit;                    /* [STRENGTHS][segment_count] scratch */
 };
 
 /* The light falls in patches and leaves most of a segment as it is: how dark that
