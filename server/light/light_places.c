@@ -6,8 +6,6 @@
 
 #include "common/mem.h"
 #include "common/quantile.h"
-#include "server/gather/sun.h"
-#include "server/render/sampler.h"
 
 #define RAYS_PER_POINT 128 /* directions a point */
 /* Bound of a residual, in the logarithm of base colour: a factor of e. */
@@ -25,16 +23,11 @@ static void gather_place(void *user, size_t index, int thread) {
     struct light_place *p = &g->place[index];
     uint32_t texel = survey->texel[index];
     struct irradiance light;
-    *p = (struct light_place){
-        .segment = reconstruction_segment(r, texel),
-        .observed = fused_around(&r->fused, &r->atlas, &r->inverse, texel, r->atlas.width / SURVEY_AROUND),
-        .weight = 1.0f};
-    if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &p->at))
-        return;
-    irradiance_gather(&light, &survey->scratch[thread], &survey->field, &p->at, sampler_key(SURVEY_KEY, texel, 0),
-                      RAYS_PER_POINT);
-    sun_add_light(&r->sun, r->world.accel, &p->at, &light);
-    p->lambert = irradiance_diffuse(&light, p->at.shading, 1.0f, p->at.shading);
+    *p = (struct light_place){.segment = reconstruction_segment(r, texel),
+                              .observed = survey_observed(survey, &r->fused, texel),
+                              .weight = 1.0f};
+    if (survey_gather(survey, texel, RAYS_PER_POINT, thread, &p->at, &light))
+        p->lambert = survey_lambert(&p->at, &light);
 }
 
 static int by_segment(const void *a, const void *b) {

@@ -6,8 +6,6 @@
 #include <string.h>
 
 #include "common/mem.h"
-#include "server/gather/irradiance.h"
-#include "server/gather/sun.h"
 #include "server/light/light_priors.h"
 #include "server/render/sampler.h"
 
@@ -16,9 +14,6 @@
 /* A patch is a cube of this part of the square root of the room's surface: some .3 m. */
 #define PATCH_PART 0.022f
 #define PATCH_BITS 9 /* of a coordinate of a patch */
-/* A texel whose centre lies beside its triangle stands for a point on that one's edge, from where rays pass between two
- * walls. So points are moved towards the triangle's middle by this part of the way. */
-#define INSIDE 1e-3f
 
 struct gathering {
     const struct survey *survey;
@@ -29,9 +24,8 @@ struct gathering {
 
 static rgb observed_at(const struct gathering *g, uint32_t texel) {
     const struct reconstruction *r = g->survey->r;
-    uint32_t around = r->atlas.width / SURVEY_AROUND;
-    rgb own = g->observed ? fused_around(g->observed, &r->atlas, &r->inverse, texel, around) : rgb_gray(0.0f);
-    return rgb_is_black(own) ? fused_around(&r->fused, &r->atlas, &r->inverse, texel, around) : own;
+    rgb own = g->observed ? survey_observed(g->survey, g->observed, texel) : rgb_gray(0.0f);
+    return rgb_is_black(own) ? survey_observed(g->survey, &r->fused, texel) : own;
 }
 
 static uint32_t patch_of(const struct gathering *g, const struct surface_point *at) {
@@ -114,11 +108,6 @@ static void look_at_sky(const struct gathering *g, struct incident *in, struct l
     }
 }
 
-static void move_inside(const struct mesh *mesh, struct surface_point *at) {
-    vec3 middle = mesh_point(mesh, at->triangle, 1.0f / 3.0f, 1.0f / 3.0f);
-    at->position = vec3_mad(at->position, INSIDE, vec3_sub(middle, at->position));
-}
-
 static void gather_point(void *user, size_t index, int thread) {
     const struct gathering *g = user;
     const struct reconstruction *r = g->survey->r;
@@ -127,14 +116,10 @@ static void gather_point(void *user, size_t index, int thread) {
     uint32_t texel = g->survey->texel[index];
     struct irradiance light;
     *p = (struct light_point){.segment = reconstruction_segment(r, texel), .observed = observed_at(g, texel)};
-    if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &p->at))
+    if (!survey_gather(g->survey, texel, SURVEY_RAYS, thread, &p->at, &light))
         return;
-    move_inside(&r->scene->mesh, &p->at);
     p->patch = patch_of(g, &p->at);
-    memset(in->escapes, 0, SURVEY_RAYS * sizeof *in->escapes); /* inside closed bodies no ray is traced */
-    irradiance_gather(&light, in, &g->survey->field, &p->at, sampler_key(SURVEY_KEY, texel, 0), SURVEY_RAYS);
-    sun_add_light(&r->sun, r->world.accel, &p->at, &light);
-    p->known = irradiance_diffuse(&light, p->at.shading, 1.0f, p->at.shading);
+    p->known = survey_lambert(&p->at, &light);
     look_at_sky(g, in, p, sampler_key(KEY_SKY, texel, 0));
     float all = light.moment[0][0] + light.moment[0][1] + light.moment[0][2];
     if (!(all > 0.0f))

@@ -5,8 +5,16 @@
 
 #include "common/mem.h"
 #include "common/spaced.h"
+#include "server/gather/sun.h"
 #include "server/light/emitters.h"
+#include "server/render/sampler.h"
 #include "server/state/evidence.h"
+
+#define KEY_SURVEY 29 /* keeps the random numbers of points apart from others of the texel */
+/* The texels around one, each way as far as this part of the atlas's width, give its observed radiance. */
+#define AROUND 640
+/* Part of the way to the middle of its triangle by which a point is moved. */
+#define INSIDE 1e-3f
 
 /* What was fused, and of those that no photograph shows the mean of their segment, or of the room. */
 static void fill_radiance(struct survey *s) {
@@ -107,4 +115,27 @@ void survey_release(struct survey *s) {
     mem_free(s->scratch);
     mem_free(s->texel);
     mem_free(s->radiance);
+}
+
+bool survey_gather(const struct survey *s, uint32_t texel, size_t rays, int thread, struct surface_point *at,
+                   struct irradiance *light) {
+    const struct reconstruction *r = s->r;
+    const struct mesh *mesh = &r->scene->mesh;
+    struct incident *in = &s->scratch[thread];
+    if (!surface_at_texel(mesh, &r->atlas, &r->inverse, texel, at))
+        return false;
+    vec3 middle = mesh_point(mesh, at->triangle, 1.0f / 3.0f, 1.0f / 3.0f);
+    at->position = vec3_mad(at->position, INSIDE, vec3_sub(middle, at->position));
+    memset(in->escapes, 0, rays * sizeof *in->escapes); /* inside closed bodies no ray is traced */
+    irradiance_gather(light, in, &s->field, at, sampler_key(KEY_SURVEY, texel, 0), rays);
+    sun_add_light(&r->sun, r->world.accel, at, light);
+    return true;
+}
+
+rgb survey_lambert(const struct surface_point *at, const struct irradiance *light) {
+    return irradiance_diffuse(light, at->shading, 1.0f, at->shading);
+}
+
+rgb survey_observed(const struct survey *s, const struct fused *fused, uint32_t texel) {
+    return fused_around(fused, &s->r->atlas, &s->r->inverse, texel, s->r->atlas.width / AROUND);
 }

@@ -7,15 +7,11 @@
 #include <stdint.h>
 
 #include "server/capture/views.h"
-#include "server/gather/incident.h"
+#include "server/gather/irradiance.h"
 #include "server/state/reconstruction.h"
 
 /* Rays of a point by which light is estimated. */
 #define SURVEY_RAYS 512
-/* Keeps the random numbers of points apart from others of the texel. */
-#define SURVEY_KEY 29
-/* The texels around one, each way as far as this part of the atlas's width, give its observed radiance. */
-#define SURVEY_AROUND 640
 /* Light added everywhere, which keeps logarithms finite, as a part of the median. */
 #define SURVEY_DARK 0.01f
 
@@ -37,5 +33,17 @@ struct survey {
 void survey_init(struct survey *s, struct reconstruction *r, const struct views *views, const struct light_field *field,
                  const bool *without, size_t points);
 void survey_release(struct survey *s);
+
+/* Light at a texel's place `at`, by `rays` rays from a little inside of its triangle: a texel whose centre lies beside it
+ * stands for a point of its edge, from where rays pass between two walls. In scratch[thread] is what the rays found. False
+ * where there is no place. Thread-safe for different threads. */
+bool survey_gather(const struct survey *s, uint32_t texel, size_t rays, int thread, struct surface_point *at,
+                   struct irradiance *light);
+
+/* What a surface of albedo 1 would send of it towards its normal. */
+rgb survey_lambert(const struct surface_point *at, const struct irradiance *light);
+
+/* Mean radiance of `fused` around a texel; black where it has none. */
+rgb survey_observed(const struct survey *s, const struct fused *fused, uint32_t texel);
 
 #endif
