@@ -113,7 +113,7 @@ static bool add_likeliest(struct lamp_search *s) {
     struct joint_source *kept = mem_array(m->fit.source_count, sizeof *kept);
     memcpy(kept, m->fit.source, bytes);
     joint_fit_add(&m->fit, &best->source, best->column);
-    bool is_likely = log_odds(m, without - joint_fit_solve(&m->fit, JOINT_STEPS_NEAR), s->count) > log(SURE);
+    bool is_likely = log_odds(m, without - joint_fit_solve(&m->fit), s->count) > log(SURE);
     if (is_likely) {
         struct light_lamp *lamp = light_lamps_add_hidden(&m->lamps, best->segment);
         lamp->source = m->fit.source_count - 1, lamp->column = best->column;

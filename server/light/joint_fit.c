@@ -10,6 +10,7 @@
 #include "server/light/joint_model.h"
 
 #define CHUNKS 16        /* parts of the blocks that are summed apart, so that sums do not depend on threads */
+#define STEPS 30         /* at most; from priors some 10 to 20 are made */
 #define LONGEST_STEP 1.0 /* of a theta */
 #define HALVINGS 6       /* of a step that does not lower the loss */
 #define CONVERGED 1e-3   /* nats by which a step lowers the loss at the end */
@@ -275,11 +276,11 @@ static double move(struct joint_fit *f, const double *step, double loss) {
     return loss;
 }
 
-double joint_fit_solve(struct joint_fit *f, int steps) {
+double joint_fit_solve(struct joint_fit *f) {
     size_t n = f->source_count;
     double *slope = mem_array(n + 1, sizeof *slope), *curvature = mem_array(n * n + 1, sizeof *curvature);
     double loss = INFINITY;
-    for (int i = 0; i < steps; i++) {
+    for (int i = 0; i < STEPS; i++) {
         memset(slope, 0, n * sizeof *slope);
         memset(curvature, 0, n * n * sizeof *curvature);
         loss = assemble(f, slope, curvature);
@@ -295,7 +296,7 @@ double joint_fit_solve(struct joint_fit *f, int steps) {
     }
     mem_free(curvature);
     mem_free(slope);
-    return steps > 0 ? loss : joint_fit_loss(f);
+    return loss;
 }
 
 void joint_fit_errors(struct joint_fit *f) {

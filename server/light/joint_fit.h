@@ -35,12 +35,8 @@ void joint_fit_remove_last(struct joint_fit *f);
 /* Negative logarithm of the posterior at the sources' values, up to a constant. */
 double joint_fit_loss(const struct joint_fit *f);
 
-/* Steps that suffice from priors, and from values that are nearly right. */
-#define JOINT_STEPS 30
-#define JOINT_STEPS_NEAR 8
-
-/* Moves the sources' values to a maximum of the posterior, in `steps` steps at most; returns joint_fit_loss there. */
-double joint_fit_solve(struct joint_fit *f, int steps);
+/* Moves the sources' values to a maximum of the posterior; returns joint_fit_loss there. */
+double joint_fit_solve(struct joint_fit *f);
 
 /* Sets the sources' errors: the curvature at their values. */
 void joint_fit_errors(struct joint_fit *f);

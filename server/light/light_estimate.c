@@ -65,9 +65,9 @@ static void hand_over(struct light_model *m) {
 
 static void estimate(struct light_model *m, const struct views *views) {
     light_model_survey(m, views, NULL, NULL);
-    joint_fit_solve(&m->fit, JOINT_STEPS);
+    joint_fit_solve(&m->fit);
     hidden_lamps_find(m);
-    joint_fit_solve(&m->fit, JOINT_STEPS);
+    joint_fit_solve(&m->fit);
     light_finish(m);
     hand_over(m);
 }
@@ -89,7 +89,7 @@ void light_estimate_again(struct reconstruction *r, const struct views *views, c
         return;
     light_model_init(&m, r, views, true);
     light_model_survey(&m, views, field, diffuse);
-    joint_fit_solve(&m.fit, JOINT_STEPS);
+    joint_fit_solve(&m.fit);
     light_finish(&m);
     hand_over(&m);
     light_model_release(&m);

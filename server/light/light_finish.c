@@ -35,7 +35,7 @@ static void fit_channel(struct light_model *m, int channel) {
         source.value = fmax(source.value, source.least);
         joint_fit_add(&fit, &source, lamp->column);
     }
-    joint_fit_solve(&fit, JOINT_STEPS_NEAR);
+    joint_fit_solve(&fit);
     for (size_t i = 0; i < m->lamps.count; i++)
         (&m->lamps.lamp[i].radiance.r)[channel] = (float)exp(fit.source[1 + i].value);
     joint_fit_release(&fit);

@@ -91,15 +91,6 @@ static void add_cells(struct light_model *m) {
     mem_free(column);
 }
 
-static void tie_cells(struct light_model *m) {
-    for (size_t k = 0; k < SKY_CELLS; k++) {
-        size_t below = sky_cells_below(k);
-        tie(m, m->first_cell + k, m->first_cell + sky_cells_right(k), 0.0, SKY_SMOOTHNESS);
-        if (below < SKY_CELLS && sky_cells_half(below) == sky_cells_half(k))
-            tie(m, m->first_cell + k, m->first_cell + below, 0.0, SKY_SMOOTHNESS);
-    }
-}
-
 static float region_mean(const struct light_point *p, size_t region) {
     const float *radiance = p->unobserved + 3 * region;
     return (radiance[0] + radiance[1] + radiance[2]) / 3.0f;
@@ -118,10 +109,7 @@ static void add_regions(struct light_model *m) {
     mem_free(column);
 }
 
-/* Adds to the points' deviations what a highlight may add to albedo, which makes dark surfaces less alike. How dark a
- * segment is is judged once, by the sources' priors: were it judged by the fit, light that makes all dark would explain
- * anything. */
-static void allow_for_highlights(struct light_model *m) {
+void light_model_allow_for_highlights(struct light_model *m) {
     struct joint_point *p = m->joint;
     float *albedo = mem_array(m->points.count + 1, sizeof *albedo);
     double *x = joint_fit_radiances(&m->fit);
@@ -229,10 +217,8 @@ static void make_fit(struct light_model *m) {
     tie_ground(m);
     if (any_escapes)
         add_cells(m);
-    if (any_escapes && !m->sky.surround)
-        tie_cells(m);
     add_regions(m);
-    allow_for_highlights(m);
+    light_model_allow_for_highlights(m);
     add_lamps(m, true);
 }
 

@@ -14,11 +14,11 @@ struct light_model {
     struct joint_point *joint; /* [points.count] means of the channels; owned */
     float *albedo;             /* [segment_count] of what points show of a segment, at the priors; owned */
     struct joint_fit fit;
-    double patches_alike;                    /* so many patches are worth one (joint_alike.h) */
-    bool has_sky;                            /* unseen sky, or what surrounds a scan, lights the points: */
-    size_t first_cell;                       /* its sources in the fit, of each cell */
-    size_t first_region;                     /* unseen surfaces: LIGHT_REGIONS factors of their fill */
-    struct joint_tie tie[3 * SKY_CELLS + 1]; /* between them, with saturated sky and ground, and of these */
+    double patches_alike;                /* so many patches are worth one (joint_alike.h) */
+    bool has_sky;                        /* unseen sky, or what surrounds a scan, lights the points: */
+    size_t first_cell;                   /* its sources in the fit, of each cell */
+    size_t first_region;                 /* unseen surfaces: LIGHT_REGIONS factors of their fill */
+    struct joint_tie tie[SKY_CELLS + 1]; /* of them to saturated sky and ground, and between these */
 };
 
 /* Chooses the lamps (light_lamps_choose), and sky and ground where they saturate. */
@@ -28,6 +28,11 @@ void light_model_release(struct light_model *m);
 /* Makes points and fit. The arguments are those of survey_init and light_points_init. */
 void light_model_survey(struct light_model *m, const struct views *views, const struct light_field *field,
                         const struct fused *observed);
+
+/* Adds to the deviations of m->joint what a highlight may add to albedo, which makes dark surfaces less alike, and fills
+ * m->albedo. How dark a segment is is judged once, by the sources' priors (light_model_survey calls it): were it judged
+ * by the fit, light that makes all dark would explain anything. */
+void light_model_allow_for_highlights(struct light_model *m);
 
 /* Adds to column[points.count] the response of a hidden lamp: its own light and what unseen surfaces reflect of it. */
 void light_model_respond_hidden(const struct light_model *m, uint32_t segment, float *column);

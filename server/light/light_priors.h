@@ -16,10 +16,9 @@
 #define ALBEDO_WHITE_DEVIATION 0.15
 
 /* About the segment: of points about their patch, by texture; of a patch, by texture and light that is not modelled,
- * which also bounds how far it exceeds white paint; and of points, by both. */
+ * which also bounds how far it exceeds white paint. */
 #define ALBEDO_POINT 0.25
 #define ALBEDO_PATCH 0.15
-#define ALBEDO_WITHIN 0.3
 
 /* What a highlight that is not known yet may add to albedo: the normal reflectance of dielectrics. */
 #define ALBEDO_HIGHLIGHT 0.04f
@@ -48,9 +47,6 @@
 /* Ground over sky: ground reflects .2 of what falls on it, houses .3 to .5; overcast sky is a third as bright at the
  * horizon as above, and under a sun the ground is as bright as the sky. As far as what is filled in. */
 #define GROUND_OVER_SKY 0.4
-
-/* Neighbouring cells of the sky. */
-#define SKY_SMOOTHNESS 0.5
 
 /* A channel about the mean of the channels: black bodies of 2,700 K and 6,500 K are .5 off in blue, coloured lamps
  * twice as much. And one that photographs measure, by noise. */

@@ -149,7 +149,7 @@ size_t openings_find(struct reconstruction *r, const struct views *views) {
         light_model_release(&m);
         return 0;
     }
-    joint_fit_solve(&m.fit, JOINT_STEPS);
+    joint_fit_solve(&m.fit);
     size_t count = choose(&m, chosen);
     light_model_release(&m);
     environment_release(&r->environment);

@@ -175,7 +175,7 @@ static void find_unseen_light(struct shining *s) {
     s->unseen_share = (float)unseen_share(survey->point, s->room_count);
     size_t kept = unseen_keep_informative(survey->point, s->room_count);
     if (kept >= UNSEEN_MIN_POINTS) {
-        unseen_fit(survey->point, kept, r->segments.count, s->log_unseen);
+        unseen_fit(survey->point, kept, r->pool, s->log_unseen);
         s->has_unseen = true;
     }
     mem_free(observed);

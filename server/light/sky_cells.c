@@ -22,10 +22,6 @@ struct sky_corners sky_cells_around(vec3 direction) {
 
 size_t sky_cells_half(size_t cell) { return cell / SKY_COLUMNS >= SKY_ROWS / 2; }
 
-size_t sky_cells_right(size_t cell) { return cell % SKY_COLUMNS + 1 < SKY_COLUMNS ? cell + 1 : cell + 1 - SKY_COLUMNS; }
-
-size_t sky_cells_below(size_t cell) { return cell + SKY_COLUMNS < SKY_CELLS ? cell + SKY_COLUMNS : SKY_CELLS; }
-
 double sky_cells_radiance(const double log_radiance[SKY_CELLS], vec3 direction) {
     struct sky_corners c = sky_cells_around(direction);
     double radiance = 0.0;

@@ -21,10 +21,6 @@ struct sky_corners sky_cells_around(vec3 direction);
 /* The half of the sphere (environment.h) in which a cell lies. */
 size_t sky_cells_half(size_t cell);
 
-/* The cells beside one: to the right (around the horizon), and below; SKY_CELLS: none. */
-size_t sky_cells_right(size_t cell);
-size_t sky_cells_below(size_t cell);
-
 /* Radiance of a unit direction, by the logarithms of the cells' radiances. */
 double sky_cells_radiance(const double log_radiance[SKY_CELLS], vec3 direction);
 

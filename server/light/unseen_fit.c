@@ -2,12 +2,12 @@
 #include "server/light/unseen_fit.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
-#include "common/cholesky.h"
 #include "common/mem.h"
 #include "common/quantile.h"
-#include "server/light/light_priors.h"
+#include "server/light/joint_fit.h"
 
 #define CELLS SKY_CELLS
 /* Least share of a point's rays in unseen directions for it to count in the fit. */
@@ -15,19 +15,7 @@
 /* The share of the points whose base colour is at most that of white paint. In scans it is not near 1: in creases of a
  * fused mesh too little light is found. */
 #define BELOW_WHITE 0.9
-/* Deviations from its segment at which a point has a quarter of its influence. */
-#define OUTLIER 2.0
-/* Weight, as a share of the points at one deviation, of a difference of neighbouring cells by a factor of e. */
-#define SMOOTHNESS 0.01
-#define STEPS 40
-#define LONGEST_STEP 0.5 /* of a logarithm */
-#define FAINTEST 1e-12   /* in place of no light */
-
-struct fit {
-    const struct unseen_point *point; /* [count] */
-    size_t count, segment_count;
-    double *cell; /* [CELLS] the logarithm of the map */
-};
+#define FAINTEST 1e-12 /* in place of no light */
 
 void unseen_add_ray(struct unseen_point *p, vec3 direction, float share, float filled) {
     struct sky_corners c = sky_cells_around(direction);
@@ -73,104 +61,53 @@ double unseen_base_color(const struct unseen_point *point, size_t count, double 
 }
 
 /* Scales the map so that BELOW_WHITE of the base colours are at most that of white paint. */
-static void scale_to_white(struct fit *f) {
+static void scale_to_white(const struct unseen_point *point, size_t count, double log_radiance[CELLS]) {
     double low = -20.0, high = 20.0, cell[CELLS];
     for (int i = 0; i < 40; i++) {
         double middle = 0.5 * (low + high);
         for (size_t k = 0; k < CELLS; k++)
-            cell[k] = f->cell[k] + middle;
-        *(unseen_base_color(f->point, f->count, BELOW_WHITE, cell) > ALBEDO_WHITE ? &low : &high) = middle;
+            cell[k] = log_radiance[k] + middle;
+        *(unseen_base_color(point, count, BELOW_WHITE, cell) > ALBEDO_WHITE ? &low : &high) = middle;
     }
     for (size_t k = 0; k < CELLS; k++)
-        f->cell[k] += high;
+        log_radiance[k] += high;
 }
 
-/* Geman and McClure's weight of a residual in deviations. */
-static double robust_weight(double deviations) {
-    double e = deviations / OUTLIER, w = 1.0 / (1.0 + e * e);
-    return w * w;
+static int by_segment(const void *a, const void *b) {
+    const struct unseen_point *first = a, *second = b;
+    if (first->segment != second->segment)
+        return first->segment < second->segment ? -1 : 1;
+    return memcmp(first, second, sizeof *first);
 }
 
-/* The mean of the logarithm of base colour in each segment. */
-static void means_of_segments(const struct fit *f, const double *log_base, double *mean) {
-    size_t segments = f->segment_count, *count = mem_calloc(segments, sizeof *count);
-    memset(mean, 0, segments * sizeof *mean);
-    for (size_t i = 0; i < f->count; i++) {
-        mean[f->point[i].segment] += log_base[i];
-        count[f->point[i].segment]++;
-    }
-    for (size_t s = 0; s < segments; s++)
-        mean[s] /= fmax((double)count[s], 1.0);
-    mem_free(count);
-}
-
-struct normal {
-    double matrix[CELLS][CELLS], residual[CELLS];
-};
-
-/* Smooths: pulls the difference of two cells to zero. */
-static void pull(struct normal *n, const double cell[CELLS], size_t a, size_t b, double weight) {
-    double difference = cell[a] - cell[b];
-    n->matrix[a][a] += weight;
-    n->matrix[b][b] += weight;
-    n->matrix[a][b] -= weight;
-    n->matrix[b][a] -= weight;
-    n->residual[a] -= weight * difference;
-    n->residual[b] += weight * difference;
-}
-
-static void add_point(struct normal *n, const struct unseen_point *p, const double cell[CELLS], double log_base,
-                      double mean) {
-    const double beyond_weight = 1.0 / (ALBEDO_PATCH * ALBEDO_PATCH);
-    double within = log_base - mean, beyond = fmax(log_base - log(ALBEDO_WHITE), 0.0);
-    double within_weight = robust_weight(within / ALBEDO_WITHIN) / (ALBEDO_WITHIN * ALBEDO_WITHIN);
-    double force = within_weight * within + beyond_weight * beyond;
-    double weight = within_weight + (beyond > 0.0 ? beyond_weight : 0.0);
-    double slope[CELLS], all = arrived(p, cell);
-    for (size_t k = 0; k < CELLS; k++)
-        slope[k] = (double)p->share[k] * exp(cell[k]) / all; /* of -log_base */
+/* The cells as sources of a joint fit, in which each point is a patch. */
+static void fit_cells(const struct unseen_point *point, size_t count, struct parallel *pool,
+                      double log_radiance[CELLS]) {
+    struct joint_point *joint = mem_array(count + 1, sizeof *joint);
+    float *column = mem_array(count + 1, sizeof *column);
+    struct joint_fit fit;
+    for (size_t i = 0; i < count; i++)
+        joint[i] = (struct joint_point){point[i].segment, (uint32_t)i, fmaxf(point[i].observed, (float)FAINTEST),
+                                        fmaxf(point[i].known, (float)FAINTEST), 0.0f};
+    joint_fit_init(&fit, joint, count, 1 + CELLS, pool);
     for (size_t k = 0; k < CELLS; k++) {
-        if (slope[k] == 0.0)
-            continue;
-        n->residual[k] += slope[k] * force;
-        for (size_t m = 0; m < CELLS; m++)
-            n->matrix[k][m] += weight * slope[k] * slope[m];
+        double even = log_radiance[k];
+        for (size_t i = 0; i < count; i++)
+            column[i] = point[i].share[k];
+        joint_fit_add(&fit, &(struct joint_source){even, LIGHT_UNKNOWN_DEVIATION, -INFINITY, even, 0.0}, column);
     }
-}
-
-static void step(struct fit *f, struct normal *n, double *log_base, double *mean) {
-    double *cell = f->cell;
-    const double smoothness = SMOOTHNESS * (double)f->count;
-    memset(n, 0, sizeof *n);
-    for (size_t i = 0; i < f->count; i++)
-        log_base[i] = log(fmax((double)f->point[i].observed, FAINTEST) / arrived(&f->point[i], cell));
-    means_of_segments(f, log_base, mean);
-    for (size_t i = 0; i < f->count; i++)
-        add_point(n, &f->point[i], cell, log_base[i], mean[f->point[i].segment]);
-    for (size_t k = 0; k < CELLS; k++) {
-        size_t right = sky_cells_right(k), below = sky_cells_below(k);
-        pull(n, cell, k, right, smoothness);
-        if (below < CELLS)
-            pull(n, cell, k, below, smoothness);
-    }
-    if (!cholesky_factor(CELLS, CELLS, &n->matrix[0][0]))
-        return;
-    cholesky_solve(CELLS, CELLS, &n->matrix[0][0], n->residual);
+    joint_fit_solve(&fit);
     for (size_t k = 0; k < CELLS; k++)
-        cell[k] += fmin(fmax(n->residual[k], -LONGEST_STEP), LONGEST_STEP);
+        log_radiance[k] = fit.source[1 + k].value;
+    joint_fit_release(&fit);
+    mem_free(column);
+    mem_free(joint);
 }
 
-void unseen_fit(const struct unseen_point *point, size_t count, size_t segment_count, double log_radiance[CELLS]) {
-    struct fit f = {.point = point, .count = count, .segment_count = segment_count, .cell = log_radiance};
-    double *log_base = mem_array(count, sizeof *log_base);
-    double *mean = mem_array(segment_count, sizeof *mean);
-    struct normal *n = mem_array(1, sizeof *n);
+void unseen_fit(struct unseen_point *point, size_t count, struct parallel *pool, double log_radiance[CELLS]) {
     memset(log_radiance, 0, CELLS * sizeof *log_radiance);
-    scale_to_white(&f);
-    for (int i = 0; i < STEPS; i++)
-        step(&f, n, log_base, mean);
-    scale_to_white(&f);
-    mem_free(n);
-    mem_free(mean);
-    mem_free(log_base);
+    qsort(point, count, sizeof *point, by_segment);
+    scale_to_white(point, count, log_radiance);
+    fit_cells(point, count, pool, log_radiance);
+    scale_to_white(point, count, log_radiance);
 }

@@ -1,14 +1,16 @@
 /* unseen_fit.h -- fits radiance of unobserved directions (unseen_light.h) to points of the surface.
  *
- * The unknown is the logarithm of a coarse map (sky_cells.h). A point's radiance is base colour times Lambert
- * radiance, by known light and by the map. Robust Gauss-Newton with a smoothness prior makes base colours similar
- * within a segment and plausible; a common factor then leaves nine tenths of them below that of white paint. */
+ * The unknown is the logarithm of a coarse map (sky_cells.h), whose cells are sources of a joint fit (joint_fit.h): of
+ * each no more is known than that the map was even (LIGHT_UNKNOWN_DEVIATION). Neighbouring cells are not tied: skies get
+ * brighter upwards by factors, and an even one needs more light of it to explain the same shade. How bright the whole
+ * is hardly shows, so a common factor then leaves nine tenths of the base colours below that of white paint. */
 #ifndef UNBAKE_LIGHT_UNSEEN_FIT_H
 #define UNBAKE_LIGHT_UNSEEN_FIT_H
 
 #include <stddef.h>
 #include <stdint.h>
 
+#include "common/parallel.h"
 #include "server/light/sky_cells.h"
 
 /* One point: its observed radiance; Lambert radiance at albedo 1 by known light, and by filled-in light; and the parts
@@ -33,7 +35,7 @@ double unseen_share(const struct unseen_point *point, size_t count);
 /* Quantile `below` of the points' base colour under a map, or, if it is NULL, under the filled-in light. */
 double unseen_base_color(const struct unseen_point *point, size_t count, double below, const double *log_radiance);
 
-/* Fills the map. Segments of the points are below segment_count. */
-void unseen_fit(const struct unseen_point *point, size_t count, size_t segment_count, double log_radiance[SKY_CELLS]);
+/* Fills the map, and sorts the points. The same for any number of threads. */
+void unseen_fit(struct unseen_point *point, size_t count, struct parallel *pool, double log_radiance[SKY_CELLS]);
 
 #endif

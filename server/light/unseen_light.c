@@ -7,10 +7,8 @@
 #include "server/light/light_sky.h"
 #include "server/light/survey.h"
 #include "server/light/unseen_fit.h"
-#include "server/render/sampler.h"
 
 #define POINTS 2048
-#define KEY_UNSEEN 23 /* keeps these random numbers apart from others of the texel */
 /* Least part of the light at a grey card that is unseen, as fitted: errors of the rest are taken for its scale. Between
  * a room whose light is all unseen and one where it is all seen (test_grey_card.c) it may be anything: .15 and .25 give
  * the same there. */
@@ -33,17 +31,12 @@ struct unseen {
 
 static void gather_point(const struct unseen *u, uint32_t texel, int thread, struct unseen_point *p) {
     const struct reconstruction *r = u->r;
-    const struct light_field *field = &u->survey->field;
-    struct incident *in = &u->survey->scratch[thread];
-    uint32_t key = sampler_key(KEY_UNSEEN, texel, 0);
+    const struct incident *in = &u->survey->scratch[thread];
     struct surface_point at;
+    struct irradiance light;
     *p = (struct unseen_point){.segment = reconstruction_segment(r, texel)};
-    if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at))
+    if (!survey_gather(u->survey, texel, SURVEY_RAYS, thread, &at, &light))
         return;
-    incident_cosine_rays(&at, key, SURVEY_RAYS, in->ray);
-    for (size_t i = 0; i < SURVEY_RAYS; i++)
-        in->direction[i] = in->ray[i].direction;
-    incident_trace(in, field, &at, key, 0, SURVEY_RAYS);
     for (size_t i = 0; i < SURVEY_RAYS; i++) {
         if (!in->escapes[i])
             continue;
@@ -52,10 +45,7 @@ static void gather_point(const struct unseen *u, uint32_t texel, int thread, str
             share *= 1.0f - light_sky_kept(&u->sky, environment_cell(&r->environment, in->direction[i]));
         unseen_add_ray(p, in->direction[i], share, rgb_mean(in->radiance[i]));
     }
-    struct irradiance light;
-    irradiance_gather(&light, in, field, &at, key, SURVEY_RAYS);
-    sun_add_light(&r->sun, r->world.accel, &at, &light);
-    p->known = fmaxf(rgb_mean(irradiance_diffuse(&light, at.shading, 1.0f, at.shading)) - p->filled, 0.0f);
+    p->known = fmaxf(rgb_mean(survey_lambert(&at, &light)) - p->filled, 0.0f);
     p->observed = rgb_mean(fused_radiance(&r->fused, texel));
 }
 
@@ -110,7 +100,7 @@ static void scale_by_card(struct unseen *u) {
 
 static void relight(struct unseen *u) {
     struct reconstruction *r = u->r;
-    unseen_fit(u->point, u->count, r->segments.count, u->log_radiance);
+    unseen_fit(u->point, u->count, r->pool, u->log_radiance);
     scale_by_card(u);
     if (!r->environment.map.pixel)
         environment_make_unseen(&r->environment);

@@ -126,9 +126,9 @@ static void test_reconstruction(struct scene *scene, struct scene *masked, struc
     CHECK(shell_run(masked, &s, 0, &shell, &r) == STATUS_OK);
     double without = wall_error(&r, &emitters);
     const cJSON *unseen = cJSON_GetObjectItem(r.report, "unseen_light");
-    /* .122 with robust weights within segments (unseen_fit.c), .137 without */
+    /* .084; .146 with neighbouring cells tied by .8 (unseen_fit.h) */
     printf("sky unseen: base colour off by %.4f, %d emitters, %.3f of the rays\n", without, emitters, r.unseen_share);
-    CHECK_THAT(without < 0.13 && emitters == 0, "base colour off by %g, %d emitters", without, emitters);
+    CHECK_THAT(without < 0.11 && emitters == 0, "base colour off by %g, %d emitters", without, emitters);
     CHECK(cJSON_IsTrue(cJSON_GetObjectItem(unseen, "estimated")) && r.unseen_share > 0.02);
     reconstruct_release(&r);
     shell_release(&shell);
