@@ -58,7 +58,7 @@ static const struct setting table[] = {
      "of a grey card); where all light is measured it is a check, in the report"},
     {"hold_out_every", SETTING_INT, "frames", 0, 1000000, NULL, "10", NULL,
      "where the capture holds out no frame, every how many-th is; 0: none"},
-    {"holes", SETTING_CHOICE, "", 0, 0, "auto|fill|keep", "keep", NULL,
+    {"holes", SETTING_CHOICE, "", 0, 0, "auto|fill|keep", "auto", NULL,
      "holes of the mesh that photographs look through: auto fills those where photographs show that a wall, floor or ceiling "
      "goes on; fill all that lie in one; keep none, so that they are windows. Where some are filled and no bright sky is seen "
      "through the rest, light that comes in there is given a place: surfaces outside the mesh, each named opening"},

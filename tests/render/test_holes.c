@@ -208,7 +208,7 @@ static void test_threads(void) {
     release(&one);
 }
 
-/* A whole reconstruction: with the hole filled there is no distant light; without holes=auto there is. */
+/* A whole reconstruction: with the hole filled there is no distant light; with holes=keep there is. */
 static void test_reconstruction(const char *json, bool fills) {
     struct holed room;
     struct settings s = shell_settings(json);
@@ -240,7 +240,7 @@ int main(void) {
     test_opening(NOTHING);
     test_cropped();
     test_threads();
-    test_reconstruction("{" LITTLE ",\"holes\":\"auto\"}", true);
-    test_reconstruction("{" LITTLE "}", false);
+    test_reconstruction("{" LITTLE "}", true);
+    test_reconstruction("{" LITTLE ",\"holes\":\"keep\"}", false);
     return check_result();
 }
