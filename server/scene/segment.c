@@ -5,8 +5,9 @@
  * two regions are joined over an edge no heavier than the heaviest edge inside either of them plus a bonus for small
  * regions. Noisy surfaces thus tolerate differences that would be borders on clean ones. Changes to the published
  * method: sizes are areas, since triangles of a modelled room differ by a factor of millions; normals are smoothed
- * first, but not across creases; and a region that stays small joins its most similar neighbour or, in a scan, where
- * small floating components are fusion debris, the nearest region. */
+ * first, but not across creases; a region that stays small joins its most similar neighbour or, in a scan, where
+ * small floating components are fusion debris, the nearest region; and in a scan, which rounds what folds there are,
+ * parts that stand off the plane of their region are split off (segment_relief.h). */
 #include "server/scene/segment.h"
 
 #include <math.h>
@@ -18,6 +19,7 @@
 #include "common/rng.h"
 #include "server/scene/adjacency.h"
 #include "server/scene/segment_names.h"
+#include "server/scene/segment_relief.h"
 
 #define CONVEX_FACTOR                                                                                                  \
     0.3f            /* of the weight of a convex fold: objects are convex, and borders between objects are
@@ -222,9 +224,6 @@ static void number_regions(struct segments *s, struct regions *r, size_t triangl
         s->of_triangle[t] = number[root];
     }
     mem_free(number);
-    s->id = mem_array(s->count, sizeof *s->id);
-    for (size_t i = 0; i < s->count; i++)
-        s->id[i] = (int64_t)i;
 }
 
 void segments_automatic(struct segments *s, const struct mesh *mesh) {
@@ -253,9 +252,15 @@ void segments_automatic(struct segments *s, const struct mesh *mesh) {
         if (a != b && fmin(r.area[a], r.area[b]) < total / SMALL_PARTS)
             join(&r, a, b, link[i].weight);
     }
-    if (is_scan(mesh, total))
+    bool scan = is_scan(mesh, total);
+    if (scan)
         merge_debris(&r, mesh, total / SMALL_PARTS);
     number_regions(s, &r, n);
+    if (scan)
+        s->count = segment_relief_split(s->of_triangle, s->count, mesh, &adjacency, total / SMALL_PARTS);
+    s->id = mem_array(s->count, sizeof *s->id);
+    for (size_t i = 0; i < s->count; i++)
+        s->id[i] = (int64_t)i;
     s->name = segment_names_make(s->of_triangle, s->count, mesh);
     s->name_count = s->name ? s->count : 0;
     mem_free(r.parent);
