@@ -197,9 +197,15 @@ static inline void multiply_pixel(const float m[3][3], const float in[3], float 
     *outside += fminf(r, fminf(g, b)) < OUTSIDE;
 }
 
-void color_multiply(const float matrix[3][3], float *pixel, size_t stride, size_t count, size_t *outside) {
-    for (size_t i = 0; i < count; i++, pixel += stride)
-        multiply_pixel(matrix, (const float[3]){pixel[0], pixel[1], pixel[2]}, pixel, outside);
+void color_multiply(const float matrix[3][3], float ceiling, float *pixel, size_t stride, size_t count,
+                    size_t *outside) {
+    for (size_t i = 0; i < count; i++, pixel += stride) {
+        int bounds = (pixel[0] >= ceiling) + (pixel[1] >= ceiling) + (pixel[2] >= ceiling);
+        if (bounds == 0)
+            multiply_pixel(matrix, (const float[3]){pixel[0], pixel[1], pixel[2]}, pixel, outside);
+        else if (bounds < 3)
+            pixel[0] = pixel[1] = pixel[2] = NAN;
+    }
 }
 
 static void convert_by_profile(const struct color *color, float *pixel, size_t stride, size_t count, size_t *outside) {

@@ -237,7 +237,7 @@ enum status exr_read_header(struct exr_reader *r, struct image *image, struct im
     info->encoding = IMAGE_LINEAR;
     info->bits = 16;
     for (int i = 0; i < r->list->num_channels; i++)
-        if (r->list->entries[i].pixel_type != EXR_PIXEL_HALF)
+        if (r->target[i] >= 0 && r->target[i] < 3 && r->list->entries[i].pixel_type != EXR_PIXEL_HALF)
             info->bits = 32;
     return check_plausible(r, err);
 }

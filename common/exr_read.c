@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "common/exr_reader.h"
+#include "common/image_ceiling.h"
 #include "common/mem.h"
 
 static void unpack_row(const uint8_t *from, uint16_t type, size_t width, size_t stride, float *to) {
@@ -101,8 +102,8 @@ static void convert(const struct exr_reader *r, struct image *image, struct imag
     if (is_same)
         return;
     snprintf(info->color_space, sizeof info->color_space, "primaries of its own, linear light");
-    color_multiply(matrix, image->pixel, image->channel_count, (size_t)image->width * image->height,
-                   &info->outside_count);
+    color_multiply(matrix, image_ceiling(info), image->pixel, image->channel_count,
+                   (size_t)image->width * image->height, &info->outside_count);
 }
 
 enum status image_read_exr(struct image_source *source, bool probe, struct image *image, struct image_info *info,

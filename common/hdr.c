@@ -9,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/image_ceiling.h"
 #include "common/image_codec.h"
 #include "common/mem.h"
 
@@ -209,7 +210,8 @@ enum status image_read_hdr(struct image_source *source, bool probe, struct image
     mem_free(row);
     if (status == STATUS_OK && header.is_other) {
         snprintf(info->color_space, sizeof info->color_space, "primaries of its own, linear light");
-        color_multiply(header.matrix, image->pixel, 3, width * image->height, &info->outside_count);
+        color_multiply(header.matrix, image_ceiling(info), image->pixel, 3, width * image->height,
+                       &info->outside_count);
     }
     return status;
 }

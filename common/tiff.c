@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "common/color_icc.h"
+#include "common/image_ceiling.h"
 #include "common/image_foreign.h"
 #include "common/mem.h"
 
@@ -238,8 +239,8 @@ static bool is_linear(const struct color *color) {
 /* Floats under a profile of linear light may exceed 1, which image_convert would cut. */
 static void convert_linear(struct image *image, struct image_info *info, struct color *color) {
     memcpy(info->color_space, color->name, sizeof info->color_space);
-    color_multiply(color->matrix, image->pixel, image->channel_count, (size_t)image->width * image->height,
-                   &info->outside_count);
+    color_multiply(color->matrix, image_ceiling(info), image->pixel, image->channel_count,
+                   (size_t)image->width * image->height, &info->outside_count);
     color_release(color);
 }
 

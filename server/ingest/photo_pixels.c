@@ -5,9 +5,10 @@
 #include <string.h>
 
 #include "common/file.h"
+#include "common/image_ceiling.h"
 #include "common/mem.h"
 
-#define HALF_LARGEST 65504.0f /* finite number in half precision */
+#define HALF_LARGEST 0x7bff /* finite number in half precision, as stored */
 
 /* --- pixels ------------------------------------------------------------------------------ */
 
@@ -28,21 +29,71 @@ void photo_pixels_from_srgb(const uint16_t *half_of_srgb, const struct image *im
         }
 }
 
-void photo_pixels_from_linear(const struct image *image, struct photograph *photo, struct photo_counts *counts) {
+/* Whether a file's channel says something. An infinite one is a lower bound where the file has halves, which overflow;
+ * floats become infinite by division by 0 only. */
+static bool is_number(float value, float ceiling) {
+    return isfinite(value) || (value > 0.0f && isfinite(ceiling) && !isnan(value));
+}
+
+static bool is_nan(const uint16_t pixel[3]) { return (pixel[0] & 0x7fff) > 0x7c00; }
+
+static bool is_bound(const uint16_t pixel[3]) {
+    return pixel[0] == HALF_LARGEST || pixel[1] == HALF_LARGEST || pixel[2] == HALF_LARGEST;
+}
+
+/* Whether one of the eight pixels around (x, y) is no number. */
+static bool touches_nan(const struct photograph *photo, size_t width, size_t height, size_t x, size_t y) {
+    for (size_t v = y > 0 ? y - 1 : 0; v <= y + 1 && v < height; v++)
+        for (size_t u = x > 0 ? x - 1 : 0; u <= x + 1 && u < width; u++)
+            if (is_nan(photo->pixel[v * width + u]))
+                return true;
+    return false;
+}
+
+/* Makes lower bounds that are connected with pixels that are no numbers such pixels; the number of them. */
+static size_t exclude_beside_nan(const struct photograph *photo, size_t width, size_t height) {
+    size_t count = width * height, excluded = 0, before;
+    bool is_forward = true;
+    do {
+        before = excluded;
+        photograph_use(photo, 0, count);
+        for (size_t i = 0; i < count; i++) {
+            size_t at = is_forward ? i : count - 1 - i;
+            uint16_t *pixel = photo->pixel[at];
+            if (!is_bound(pixel) || !touches_nan(photo, width, height, at % width, at / width))
+                continue;
+            pixel[0] = pixel[1] = pixel[2] = image_half_from_float(NAN);
+            excluded++;
+        }
+        is_forward = !is_forward;
+    } while (excluded > before);
+    return excluded;
+}
+
+void photo_pixels_from_linear(const struct image *image, const struct image_info *info, struct photograph *photo,
+                              struct photo_faults *faults) {
     size_t count = (size_t)image->width * image->height, stride = image->channel_count;
+    float ceiling = image_ceiling(info);
     photograph_use(photo, 0, count);
     for (size_t i = 0; i < count; i++) {
         const float *in = image->pixel + i * stride;
-        bool finite = isfinite(in[0]) && isfinite(in[1]) && isfinite(in[2]);
-        counts->not_finite += !finite;
-        counts->clamped += finite && fmaxf(in[0], fmaxf(in[1], in[2])) > HALF_LARGEST;
+        bool is_usable = is_number(in[0], ceiling) && is_number(in[1], ceiling) && is_number(in[2], ceiling);
         for (size_t c = 0; c < 3; c++) {
-            float value = finite ? clampf(in[c], 0.0f, HALF_LARGEST) : NAN;
+            float value = is_usable ? clampf(in[c], 0.0f, IMAGE_HALF_LARGEST) : NAN;
             photo->pixel[i][c] = image_half_from_float(value);
+            faults->light += is_usable ? (double)value : 0.0;
+            faults->negative += is_usable ? (double)fmaxf(-in[c], 0.0f) : 0.0;
         }
+        faults->not_finite += !is_usable;
+        faults->bounds += is_usable && is_bound(photo->pixel[i]);
     }
-    if (counts->clamped > 0 && photo->is_hdr)
-        photo->clip = HALF_LARGEST;
+    if (faults->bounds > 0 && photo->is_hdr)
+        photo->clip = IMAGE_HALF_LARGEST;
+    if (faults->bounds > 0 && faults->not_finite > faults->outside) {
+        size_t excluded = exclude_beside_nan(photo, image->width, image->height);
+        faults->bounds -= excluded;
+        faults->beside += excluded;
+    }
 }
 
 void photo_pixels_mask_by_alpha(const struct image *image, struct photograph *photo) {

@@ -6,20 +6,19 @@
 #include <stdbool.h>
 
 #include "common/image.h"
+#include "server/ingest/photo_faults.h"
 #include "server/scene/photograph.h"
-
-/* Of pixels that are not used as the file has them. */
-struct photo_counts {
-    size_t not_finite, clamped;
-};
 
 /* [65536] linear half value of a 16-bit sRGB code value; the caller's. */
 uint16_t *photo_pixels_table(void);
 
-/* Fill photo->pixel. Linear values above the range of half become lower bounds, as clipped ones; negative ones (from
- * filters or colours outside of Rec. 709) become 0. */
+/* Fill photo->pixel, and count in *faults. Linear values from the largest number of half precision on become lower
+ * bounds, as clipped ones, unless they are connected with pixels that are no numbers: light never makes these, so all of
+ * such a patch is a fault, and none of it is used. Negative values (from filters or colours outside of Rec. 709) become
+ * 0. */
 void photo_pixels_from_srgb(const uint16_t *half_of_srgb, const struct image *image, struct photograph *photo);
-void photo_pixels_from_linear(const struct image *image, struct photograph *photo, struct photo_counts *counts);
+void photo_pixels_from_linear(const struct image *image, const struct image_info *info, struct photograph *photo,
+                              struct photo_faults *faults);
 
 /* Transparent pixels of a PNG have no content. An EXR's alpha only marks whether a ray hit surface; the light behind
  * it is real. */

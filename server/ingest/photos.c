@@ -11,6 +11,7 @@
 #include "common/image.h"
 #include "common/mem.h"
 #include "server/ingest/photo_color.h"
+#include "server/ingest/photo_faults.h"
 #include "server/ingest/photo_fit.h"
 #include "server/ingest/photo_pixels.h"
 #include "server/scene/photograph_reduce.h"
@@ -27,7 +28,6 @@ struct photo_outcome {
     bool is_broken;   /* the picture, or its mask, could not be decoded */
     int orientation;
     enum exposure_source source;
-    struct photo_counts counts;
 };
 
 /* Memory that decoders use at the same time. */
@@ -52,6 +52,7 @@ struct loading {
     struct photo_outcome *outcome; /* [frame_count] */
     struct photo_color *color;     /* [frame_count] */
     struct photo_fit *fit;         /* [frame_count] */
+    struct photo_faults *faults;   /* [frame_count] */
     uint16_t *half_of_srgb;        /* [65536] linear half value of a 16-bit sRGB code value */
     float clip;
 };
@@ -104,14 +105,14 @@ static void set_clip(const struct loading *l, const struct image_info *info, str
 }
 
 /* The arrays of a decoded picture. Only now is known whether it has others than its pixels. */
-static enum status keep_pixels(const struct loading *l, const struct image *image, const struct image_info *info,
-                               bool has_mask, double crop_radius, struct photograph *photo,
-                               struct photo_outcome *outcome) {
+static enum status keep_pixels(const struct loading *l, size_t index, const struct image *image,
+                               const struct image_info *info, struct photograph *photo, struct error *err) {
     size_t count = (size_t)image->width * image->height;
-    bool is_masked = has_mask || crop_radius > 0.0 || image_channel(image, "A") >= 0;
+    double crop_radius = l->fit[index].lens.crop_radius;
+    bool is_masked = l->transforms->frame[index].mask || crop_radius > 0.0 || image_channel(image, "A") >= 0;
     size_t others = (size_t)(image->clipped != NULL) + (size_t)is_masked;
     enum status status =
-        spill_reserve(photo->spill, ALL, others, others * count, l->options->later_bytes * l->pixels, &outcome->err);
+        spill_reserve(photo->spill, ALL, others, others * count, l->options->later_bytes * l->pixels, err);
     if (status != STATUS_OK)
         return status;
     photo->pixel = spill_take(photo->spill, count, sizeof *photo->pixel);
@@ -122,12 +123,12 @@ static enum status keep_pixels(const struct loading *l, const struct image *imag
     if (info->encoding == IMAGE_SRGB)
         photo_pixels_from_srgb(l->half_of_srgb, image, photo);
     else
-        photo_pixels_from_linear(image, photo, &outcome->counts);
+        photo_pixels_from_linear(image, info, photo, &l->faults[index]);
     if (!photo->is_hdr)
         photo_pixels_mask_by_alpha(image, photo);
     if (crop_radius > 0.0)
         photo_pixels_mask_by_circle(crop_radius, photo);
-    return STATUS_OK;
+    return photo_faults_judge(&l->faults[index], err);
 }
 
 /* Puts means of its pixels, in the caller's memory, in place of a photograph that is in memory whole. A pixel that some
@@ -171,13 +172,16 @@ static enum status load_photograph(const struct loading *l, size_t index) {
     photo_fit_apply(&l->fit[index], &info, &image);
     set_clip(l, &info, photo);
     photo_color_note(&l->color[index], frame->file, &image, &info);
+    photo_faults_begin(&l->faults[index], frame->file, &image, &info);
     outcome->orientation = l->fit[index].turn > 1 ? 1 : info.orientation;
     set_exposure(frame, &info, photo, outcome);
     /* image_read puts R, G, B first */
     if (image_channel(&image, "B") != 2)
         status = error_set(&outcome->err, STATUS_INPUT, "the picture has no red, green and blue");
-    else
-        status = keep_pixels(l, &image, &info, frame->mask, l->fit[index].lens.crop_radius, photo, outcome);
+    else {
+        status = keep_pixels(l, index, &image, &info, photo, &outcome->err);
+        outcome->is_broken = status == STATUS_INPUT;
+    }
     image_release(&image);
     if (status == STATUS_OK && frame->mask) {
         status =
@@ -254,19 +258,14 @@ static void make_relative(struct error *err, const char *dir) {
     mem_free(prefix);
 }
 
-static void warn_about_pixels(const struct loading *l, struct findings *f) {
+static void warn_of_metadata(const struct loading *l, struct findings *f) {
     size_t rotated = 0, sources[EXPOSURE_HDR + 1] = {0};
     for (size_t i = 0; i < l->transforms->frame_count; i++) {
         const struct photo_outcome *o = &l->outcome[i];
-        const char *name = l->transforms->frame[i].file;
         if (!l->path[i])
             continue;
         sources[o->source]++;
         rotated += o->orientation > 1;
-        if (o->counts.not_finite > 0)
-            findings_warning(f, "%s: %zu pixels are not finite and are not used", name, o->counts.not_finite);
-        if (o->counts.clamped > 0)
-            findings_warning(f, "%s: %zu pixels are above 65504 and count as clipped there", name, o->counts.clamped);
     }
     if (rotated > 0)
         findings_warning(f,
@@ -371,6 +370,7 @@ enum status photos_load(const char *dir, const char *name, const struct frames *
         l.path[i] = file_is_in(dir, t->frame[i].file) ? t->frame[i].file : NULL;
     l.color = mem_calloc(t->frame_count, sizeof *l.color);
     l.fit = mem_calloc(t->frame_count, sizeof *l.fit);
+    l.faults = mem_calloc(t->frame_count, sizeof *l.faults);
     l.step = mem_calloc(t->frame_count, sizeof *l.step);
     photo_fit_all(dir, name, l.path, t, pool, l.fit, f);
     pthread_mutex_init(&l.gate.mutex, NULL);
@@ -380,13 +380,15 @@ enum status photos_load(const char *dir, const char *name, const struct frames *
         status = collect(&l, name, f, err);
     move_photographs(&l, scene);
     check_count(scene, name, t->named_count, f);
-    warn_about_pixels(&l, f);
+    warn_of_metadata(&l, f);
+    photo_faults_warn(l.faults, t->frame_count, f);
     photo_color_warn(l.color, t->frame_count, f);
     pthread_cond_destroy(&l.gate.freed);
     pthread_mutex_destroy(&l.gate.mutex);
     mem_free(l.path);
     mem_free(l.color);
     mem_free(l.fit);
+    mem_free(l.faults);
     mem_free(l.step);
     mem_free(l.outcome);
     mem_free(l.half_of_srgb);

@@ -105,7 +105,8 @@ static bool is_saturated(const struct divide_candidate *c) {
     return c->saturated[0] || c->saturated[1] || c->saturated[2];
 }
 
-/* Adds photograph `train` of the texel if it has a sample there and is among the best. */
+/* Adds photograph `train` of the texel if it has a sample there and is among the best. One at the end of half precision
+ * is none: no surface reflects that much. */
 static void add_candidate(const struct divide *d, uint32_t segment, const struct surface_point *at,
                           const struct irradiance *light, uint32_t train, struct divide_candidates *of) {
     const struct photograph *photo = photograph_of(d, train);
@@ -119,7 +120,8 @@ static void add_candidate(const struct divide *d, uint32_t segment, const struct
     /* An upper bound of the weight: edges and mixing only lower it. Saves the visibility ray. */
     if (!top_k_takes(&of->best, c.view.weight * noise_weight(d->noise, d->views, &c.view, typical, 0.0f), train) ||
         !views_unoccluded(d->views, train, at->position, at->normal) ||
-        photograph_has_firefly(photo, c.view.x, c.view.y) || !photograph_sample(photo, c.view.x, c.view.y, &s))
+        photograph_has_firefly(photo, c.view.x, c.view.y) || !photograph_sample(photo, c.view.x, c.view.y, &s) ||
+        (photo->is_hdr && photograph_sample_saturates(&s)))
         return;
     c.observed = s.radiance;
     memcpy(c.saturated, s.saturated, sizeof c.saturated);

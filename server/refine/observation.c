@@ -44,7 +44,9 @@ void observation_batch_release(struct observation_batch *b) {
 void observation_batch_clear(struct observation_batch *b) { b->observation_count = 0; }
 
 /* Sets up the paths of observation `at`, whose first sample has number `sample_number`. False when one cannot be used:
- * outside the picture, masked, a firefly, or a mixed pixel while that of the texel's centre is clean. */
+ * outside the picture, masked, a firefly, or a mixed pixel while that of the texel's centre is clean. Nor can one at the
+ * end of half precision: as a bound it would pull by 65504 where a renderer failed, and of a lamp that is so bright the
+ * fit of light has it already. */
 static bool connect(struct observation_batch *b, size_t at, const struct view *view, uint32_t texel, uint64_t iteration,
                     uint32_t sample_number) {
     const struct surface *s = &b->surface;
@@ -65,7 +67,8 @@ static bool connect(struct observation_batch *b, size_t at, const struct view *v
         size_t path = at * (size_t)b->samples + (size_t)i;
         if (!camera_project(&photo->camera, point, &place.x, &place.y, &depth_m) ||
             (clean && !views_clean(b->views, &place)) || photograph_has_firefly(photo, place.x, place.y) ||
-            !photograph_sample(photo, place.x, place.y, &b->reference[path]))
+            !photograph_sample(photo, place.x, place.y, &b->reference[path]) ||
+            (photo->is_hdr && photograph_sample_saturates(&b->reference[path])))
             return false;
         vec3 origin = camera_origin(&photo->camera);
         b->ray[path] = (struct ray){origin, vec3_normalize(vec3_sub(point, origin))};
