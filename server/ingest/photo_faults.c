@@ -10,8 +10,8 @@
 #define MOST 0.5
 /* Shares of one photograph and of all from which more is said: a renderer's few pixels that failed are below, the sun's
  * disc (1e-4 of a picture of 60 degrees) and a bare bulb are, too. They choose words only. */
-#define MANY_OF_ONE 0.01
-#define MANY_OF_ALL 1e-3
+#define MANY_OF_ONE 1e-3
+#define MANY_OF_ALL 3e-4
 /* Share of the light of all photographs that is below 0 from which it is told: filters leave less. */
 #define NEGATIVE_SHARE 0.01
 /* Mean of all photographs below which a surface of a twentieth of it is rounded by more than half a percent: halves
@@ -104,6 +104,17 @@ static void warn_of_bounds(const struct photo_faults *faults, size_t count, stru
                               : "");
 }
 
+static void warn_of_window(const struct photo_faults *faults, size_t count, struct findings *f) {
+    size_t pixels = 0, photographs = 0;
+    for (size_t i = 0; i < count; i++) {
+        pixels += faults[i].outside;
+        photographs += faults[i].outside > 0;
+    }
+    if (pixels > 0)
+        findings_warning(f, "%zu pixels of %zu photographs lie outside of the EXRs' data windows and are not used",
+                         pixels, photographs);
+}
+
 /* Of linear photographs. */
 static void warn_of_scale(const struct photo_faults *faults, size_t count, struct findings *f) {
     double light = 0.0, negative = 0.0, channels = 0.0;
@@ -127,6 +138,7 @@ static void warn_of_scale(const struct photo_faults *faults, size_t count, struc
 }
 
 void photo_faults_warn(const struct photo_faults *faults, size_t count, struct findings *f) {
+    warn_of_window(faults, count, f);
     warn_of_nan(faults, count, f);
     warn_of_bounds(faults, count, f);
     warn_of_scale(faults, count, f);
