@@ -1,6 +1,6 @@
 /* sun.h, sun_find.h: a sun that shines through a window onto the floor, and that no photograph shows, is found where
  * it is and as strong as it is, its patch is gone from the floor's base colour and it is in the environment's map;
- * a lamp, and a sky without a sun, are none. The same for any number of threads. */
+ * a lamp, a dim screen and a sky without a sun are none. The same for any number of threads. */
 #include "server/reconstruct/reconstruct.h"
 #include "server/scene/latlong.h"
 #include "tests/check.h"
@@ -163,6 +163,28 @@ static void test_no_sun(struct parallel *pool) {
     scene_release(&scene);
 }
 
+/* A screen, too dim to be a light before it is known what emits (emitters.h), hangs opposite the window: a sun through
+ * the window could light nothing but it. */
+static void test_dim_screen(struct parallel *pool) {
+    struct scene scene = {0};
+    struct image sky;
+    make_mesh_with_window(&scene.mesh);
+    for (size_t i = 4 * (size_t)(OBJECTS + 2); i < scene.mesh.vertex_count; i++) {
+        vec3 *p = &scene.mesh.position[i];
+        *p = (vec3){0.8f + 2.4f * (p->z - 1.0f), 0.2f + 2.6f * (p->x - 1.5f), 2.95f};
+    }
+    make_sky(&sky, 0.5f);
+    photograph_mesh(&scene, rgb_gray(0.15f), &sky, look_away, pool);
+    struct reconstruction r;
+    shell_solve(&scene, 0, &r);
+    CHECK(!r.sun.is_there);
+    for (size_t s = 0; s < r.segments.count; s++)
+        CHECK_THAT(r.is_emitter[s] == (r.segments.id[s] == LAMP), "segment %zu", s);
+    reconstruct_release(&r);
+    image_release(&sky);
+    scene_release(&scene);
+}
+
 int main(void) {
     photograph_samples = 64; /* noise matters to what is asked here */
     struct parallel *pool = parallel_new(0);
@@ -170,6 +192,7 @@ int main(void) {
     test_without_sky(pool);
     test_polished_floor(pool);
     test_no_sun(pool);
+    test_dim_screen(pool);
     parallel_free(pool);
     return check_result();
 }

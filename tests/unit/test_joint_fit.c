@@ -124,6 +124,40 @@ static void test_alike_is_one(struct parallel *pool) {
     joint_fit_release(&f);
 }
 
+/* Two equal saturated lamps side by side: what each of them sends cannot be told, 15 to 105 for 60. As one source
+ * (light_lamp.c) they are as bright as they are. */
+static void test_equal_lamps(struct parallel *pool) {
+    const float x[2] = {0.0f, 0.0f};
+    static float column[3][POINTS];
+    struct joint_fit f;
+    struct joint_source lamp = {log(15.0), 2.0, log(15.0), log(15.0), 0.0};
+    double most = 0.0;
+    for (uint64_t seed = 1; seed <= 8; seed++) {
+        make_floor(seed, 0.5f, x, 0.25f);
+        for (size_t i = 0; i < POINTS; i++) {
+            uint32_t patch = (uint32_t)(i / (PATCH * PATCH)), k = (uint32_t)(i % (PATCH * PATCH));
+            float px = 0.1f * (float)(patch % (SIDE / PATCH) * PATCH + k % PATCH),
+                  py = 0.1f * (float)(patch / (SIDE / PATCH) * PATCH + k / PATCH);
+            column[0][i] = sphere_light(1.9f, 2.0f, 1.5f, px, py);
+            column[1][i] = sphere_light(2.1f, 2.0f, 1.5f, px, py);
+            column[2][i] = column[0][i] + column[1][i];
+            point[i].observed = albedo[i] * (0.5f + 60.0f * column[2][i]);
+        }
+        start(&f, pool);
+        joint_fit_add(&f, &lamp, column[2]);
+        joint_fit_solve(&f);
+        double one = f.source[1].value;
+        joint_fit_remove_last(&f);
+        joint_fit_add(&f, &lamp, column[0]);
+        joint_fit_add(&f, &lamp, column[1]);
+        joint_fit_solve(&f);
+        most = fmax(most, fabs(f.source[1].value - f.source[2].value));
+        CHECK_NEAR(one, log(60.0), 0.3);
+        joint_fit_release(&f);
+    }
+    CHECK_THAT(most > log(2.0), "%g", most);
+}
+
 static void test_bound(struct parallel *pool) {
     const float x[2] = {60.0f, 0.0f};
     struct joint_fit f;
@@ -326,6 +360,7 @@ int main(void) {
     test_deviations(pool);
     test_alike(pool);
     test_alike_is_one(pool);
+    test_equal_lamps(pool);
     test_bound(pool);
     test_white();
     test_try(pool);
