@@ -31,8 +31,8 @@ static const char *word_of(const char *word, bool is_last) {
                                            {"color", "colour"},
                                            {"hdr", "HDR"},
                                            {"uv", "UV"}};
-    static const char *const units[][2] = {{"m", "metres"}, {"m2", "m²"},       {"px", "pixels"},
-                                           {"db", "dB"},    {"sec", "seconds"}, {"mib", "MiB"}};
+    static const char *const units[][2] = {{"m", "metres"},    {"m2", "m²"},   {"px", "pixels"},      {"db", "dB"},
+                                           {"sec", "seconds"}, {"mib", "MiB"}, {"degrees", "degrees"}};
     for (size_t i = 0; i < sizeof words / sizeof *words; i++)
         if (strcmp(words[i][0], word) == 0)
             return words[i][1];

@@ -195,6 +195,7 @@ static cJSON *report_registration(const struct pose_registration *registration) 
     json_add(report, "move_error_m", cJSON_CreateDoubleArray(registration->move_error, 3));
     json_add_number(report, "shift_px", registration->shift_px);
     json_add_number(report, "deviations", registration->deviations);
+    json_add_number(report, "response", registration->response);
     return report;
 }
 

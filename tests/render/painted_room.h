@@ -25,6 +25,7 @@
 
 /* What the next room has. */
 static float painted_contrast = 1.0f, painted_noise = PAINTED_NOISE;
+static float painted_mirror = 0.0f; /* share of what the surface mirrors that is added to its own radiance */
 
 struct painted {
     bool tiles;
@@ -53,6 +54,16 @@ static inline rgb painted_radiance(const struct painted *room, int64_t object, v
     return rgb_scale(wall_color[object], shade * (1.0f + painted_contrast * (paint - 1.0f)));
 }
 
+/* What a point mirrors towards a camera: it moves with the camera, as reflections do. */
+static inline rgb painted_mirrored(const struct painted *room, vec3 point, vec3 direction, uint32_t triangle) {
+    vec3 normal = vec3_normalize(mesh_cross(&room->scene.mesh, triangle));
+    vec3 mirrored = vec3_mad(direction, -2.0f * vec3_dot(direction, normal), normal);
+    struct accel_hit hit;
+    if (!accel_intersect(room->accel, vec3_mad(point, 1e-4f, mirrored), mirrored, 0.0f, INFINITY, &hit))
+        return (rgb){0, 0, 0};
+    return painted_radiance(room, room->scene.mesh.object_id[hit.triangle], vec3_mad(point, hit.distance_m, mirrored));
+}
+
 static inline void painted_take(struct painted *room, int frame) {
     struct photograph *photo = &room->scene.photograph[frame];
     vec3 origin = camera_origin(&photo->camera);
@@ -66,8 +77,10 @@ static inline void painted_take(struct painted *room, int frame) {
             if (!camera_direction(&photo->camera, x, y, &direction) ||
                 !accel_intersect(room->accel, origin, direction, 0.0f, INFINITY, &hit))
                 continue;
-            rgb value = painted_radiance(room, room->scene.mesh.object_id[hit.triangle],
-                                         vec3_mad(origin, hit.distance_m, direction));
+            vec3 point = vec3_mad(origin, hit.distance_m, direction);
+            rgb value = painted_radiance(room, room->scene.mesh.object_id[hit.triangle], point);
+            if (painted_mirror > 0.0f)
+                value = rgb_mad(value, painted_mirror, painted_mirrored(room, point, direction, hit.triangle));
             float gloss = 1.0f + PAINTED_GLOSS * direction.x;
             sum = rgb_mad(sum, gloss / (PAINTED_SIDE * PAINTED_SIDE), value);
         }

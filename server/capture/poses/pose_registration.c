@@ -7,6 +7,8 @@
 #include "server/capture/poses/pose_costs.h"
 #include "server/capture/poses/pose_solver.h"
 
+/* Of scales and offsets before the first step. */
+#define SETTLE_ROUNDS 4
 #define ROUNDS 30 /* Gauss-Newton steps, at most; a motion that takes more is not found */
 /* Pixels: a step that ends the rounds; steps become shorter by a fifth at least, so that .02 are left. */
 #define STEP_PX 0.005
@@ -14,11 +16,11 @@
  * only where the photographs leave a motion open, as along the only plane. */
 #define TURN_PRIOR 0.01 /* radians: half a degree */
 #define MOVE_PRIOR 0.01 /* of the mean depth: 3 cm at 3 m */
-/* Of the chi-square's root: the chance of six independent errors is 1e-9 (as of MIN_SIGNIFICANCE in pose_solver.c). */
-#define MIN_DEVIATIONS 7.4
-/* Pixels, rms: less is left as it is. On exact meshes something else is taken for a motion, reflections we suppose:
- * bathroom .14 px, staircase2 .23 px, by 9 of the stated deviations, which are too small. */
-#define MIN_SHIFT_PX 0.3
+/* Of the chi-square's root: the chance of six errors is one in a thousand. Held-out tracks judge once more. */
+#define MIN_DEVIATIONS 4.74
+/* Least response, by which steps shorten: with less, ROUNDS do not find a motion. Decides only where the motion is too
+ * near 0 to tell the response. */
+#define MIN_RESPONSE 0.1
 /* Places: cubes of a sixth of the tracks' extent, wider than the errors of a mesh are alike. */
 #define PLACES 6
 
@@ -29,6 +31,7 @@ struct motion_system {
     double *pull;                     /* [POSE_UNKNOWNS + 1][observations] likewise; owned */
     double (*cluster)[POSE_UNKNOWNS]; /* [frames + places] sums of scores; owned */
     double information[POSE_UNKNOWNS][POSE_UNKNOWNS], gradient[POSE_UNKNOWNS];
+    double first[POSE_UNKNOWNS]; /* the gradient where the bundle tells the cameras */
 };
 
 /* --- the motion -------------------------------------------------------------------------------- */
@@ -199,18 +202,33 @@ static void covariance_of(struct motion_system *system, double covariance[POSE_U
     }
 }
 
-/* Root of the chi-square of a motion; 0 where its errors are unknown. */
-static double deviations_of(double covariance[POSE_UNKNOWNS][POSE_UNKNOWNS], const double motion[POSE_UNKNOWNS]) {
-    double factor[POSE_UNKNOWNS][POSE_UNKNOWNS], scaled[POSE_UNKNOWNS];
+/* Root of the score test's chi-square; 0 where errors are unknown. `covariance`: covariance_of. The response drops out
+ * of it: the gradient's covariance is that of the motion between two factors of the information. */
+static double deviations_of(const struct motion_system *system, double covariance[POSE_UNKNOWNS][POSE_UNKNOWNS]) {
+    double factor[POSE_UNKNOWNS][POSE_UNKNOWNS], step[POSE_UNKNOWNS], scaled[POSE_UNKNOWNS], square = 0.0;
     memcpy(factor, covariance, sizeof factor);
-    memcpy(scaled, motion, sizeof scaled);
+    memcpy(step, system->first, sizeof step);
     if (!cholesky_factor(POSE_UNKNOWNS, POSE_UNKNOWNS, &factor[0][0]))
         return 0.0;
+    cholesky_solve(POSE_UNKNOWNS, POSE_UNKNOWNS, &system->information[0][0], step);
+    memcpy(scaled, step, sizeof scaled);
     cholesky_solve(POSE_UNKNOWNS, POSE_UNKNOWNS, &factor[0][0], scaled);
-    double square = 0.0;
     for (int k = 0; k < POSE_UNKNOWNS; k++)
-        square += scaled[k] * motion[k];
+        square += scaled[k] * step[k];
     return sqrt(square);
+}
+
+/* Share of the gradient's change that the equations foretell, along the motion, at the end of which it is 0. */
+static double response_of(const struct motion_system *system, const double motion[POSE_UNKNOWNS]) {
+    double changed = 0.0, foretold = 0.0;
+    for (int j = 0; j < POSE_UNKNOWNS; j++) {
+        double column = 0.0; /* of the factor, times the motion */
+        for (int i = j; i < POSE_UNKNOWNS; i++)
+            column += system->information[i][j] * motion[i];
+        foretold += column * column;
+        changed += system->first[j] * motion[j];
+    }
+    return foretold > 0.0 ? fmin(fmax(changed / foretold, MIN_RESPONSE), 1.0) : MIN_RESPONSE;
 }
 
 static double shift_of(const struct pose_solver *s) {
@@ -260,6 +278,17 @@ void pose_registration_add(struct pose_registration *registration, const struct 
     }
 }
 
+/* Scales of the frames where the bundle tells the cameras, and what pulls at the motion there by them: the first of a
+ * frame's is a guess. */
+static void settle(struct motion_system *system, vec3 centre) {
+    const double none[POSE_UNKNOWNS] = {0.0};
+    for (int round = 0; round < SETTLE_ROUNDS; round++) {
+        linearise(system, centre, none);
+        memcpy(system->first, system->gradient, sizeof system->first);
+        step_offsets(system, none);
+    }
+}
+
 /* One step of Gauss-Newton; the largest shift that it makes, pixels. */
 static double step(struct motion_system *system, struct pose_registration *registration, double motion[POSE_UNKNOWNS]) {
     struct pose_solver *s = system->solver;
@@ -286,15 +315,17 @@ static bool find(struct pose_solver *s, struct pose_registration *registration) 
     double motion[POSE_UNKNOWNS] = {0.0}, covariance[POSE_UNKNOWNS][POSE_UNKNOWNS], step_px = INFINITY;
     system_init(&system, s, &registration->centre);
     s->level = 0;
+    settle(&system, registration->centre);
     for (int round = 0; round < ROUNDS && step_px > STEP_PX && (round == 0 || isfinite(step_px)); round++)
         step_px = step(&system, registration, motion);
     if (isfinite(step_px)) {
         covariance_of(&system, covariance);
+        registration->response = response_of(&system, motion);
         for (int k = 0; k < 3; k++) {
-            registration->turn_error[k] = sqrt(covariance[k][k]);
-            registration->move_error[k] = sqrt(covariance[3 + k][3 + k]) * system.depth_m;
+            registration->turn_error[k] = sqrt(covariance[k][k]) / registration->response;
+            registration->move_error[k] = sqrt(covariance[3 + k][3 + k]) / registration->response * system.depth_m;
         }
-        registration->deviations = deviations_of(covariance, motion);
+        registration->deviations = deviations_of(&system, covariance);
         registration->shift_px = shift_of(s);
     }
     system_release(&system);
@@ -308,7 +339,7 @@ bool pose_registration_find(struct scene *scene, const struct tracks *tracks, bo
     pose_solver_init(&s, tracks, pool);
     registration->is_applied =
         find(&s, registration) &&
-        (is_rest || (registration->deviations > MIN_DEVIATIONS && registration->shift_px > MIN_SHIFT_PX));
+        (is_rest || (registration->deviations > MIN_DEVIATIONS && registration->shift_px > POSE_MIN_SHIFT_PX));
     for (size_t i = 0; i < scene->photograph_count && registration->is_applied; i++)
         pose_registration_move(registration, &scene->photograph[i].camera);
     pose_solver_release(&s);
@@ -317,17 +348,19 @@ bool pose_registration_find(struct scene *scene, const struct tracks *tracks, bo
 
 bool pose_registration_agrees(struct pose_registration *registration, const struct tracks *tracks,
                               const struct photograph *told, struct parallel *pool) {
-    struct pose_solver s;
-    pose_solver_init(&s, tracks, pool);
-    size_t count = pose_costs_count(&s);
-    double *before = mem_calloc(2 * count + 1, sizeof *before), *now = before + count;
-    pose_costs(&s, now);
-    for (size_t f = 0; f < s.frames; f++)
-        pose_place(&s.frame[f], &told[tracks->views->train[f]].camera);
-    pose_costs(&s, before);
-    struct validation v = pose_costs_compare(before, now, count);
-    registration->shift_px = shift_of(&s);
-    mem_free(before);
-    pose_solver_release(&s);
-    return registration->shift_px > MIN_SHIFT_PX && validation_is_significant(&v, POSE_COSTS_SIGNIFICANCE);
+    struct pose_solver now, before; /* each with offsets and scales from the start: rounds lower costs, too */
+    pose_solver_init(&now, tracks, pool);
+    pose_solver_init(&before, tracks, pool);
+    for (size_t f = 0; f < before.frames; f++)
+        pose_place(&before.frame[f], &told[tracks->views->train[f]].camera);
+    size_t count = pose_costs_count(&now);
+    double *cost = mem_calloc(2 * count + 1, sizeof *cost);
+    pose_costs(&before, cost);
+    pose_costs(&now, cost + count);
+    struct validation v = pose_costs_compare(cost, cost + count, count);
+    registration->shift_px = shift_of(&before);
+    mem_free(cost);
+    pose_solver_release(&before);
+    pose_solver_release(&now);
+    return registration->shift_px > POSE_MIN_SHIFT_PX && validation_is_significant(&v, POSE_COSTS_SIGNIFICANCE);
 }

@@ -7,8 +7,14 @@
  *
  * Solved by robust Gauss-Newton with the equations of pose_solver.h, from which offsets and consensus are eliminated
  * exactly. Errors of neighbouring observations go together, by what is wrong with a photograph's pose and with the mesh
- * at a place: the covariance is the sum of those clustered by photographs and by places (Cameron, Gelbach & Miller
- * 2011, without what they subtract, so that it is an upper bound), four times the deviations of independent errors. */
+ * at a place: the gradient's covariance is the sum of those clustered by photographs and by places (Cameron, Gelbach &
+ * Miller 2011, without what they subtract, so that it is an upper bound).
+ *
+ * Photographs answer a motion by less than the equations foretell, .24 to .34 of it: those with a flatter slope than
+ * the track's mean, as from farther away, change by less along what all share, and robust weights let go of what
+ * disagrees. Steps shorten slowly for it, and the motion's errors are larger by as much (the bread of the sandwich,
+ * Huber 1967). Whether the motion is surely not 0 needs no response: the score test (Rao 1948) asks for the gradient
+ * where the bundle tells the cameras. */
 #ifndef UNBAKE_CAPTURE_POSE_REGISTRATION_H
 #define UNBAKE_CAPTURE_POSE_REGISTRATION_H
 
@@ -23,7 +29,8 @@ struct pose_registration {
     vec3 centre;                   /* mean position of the training cameras, metres */
     double turn[3], turn_error[3]; /* of the cameras about it, radians, world axes; standard errors */
     double move[3], move_error[3]; /* of the centre, metres */
-    double deviations;             /* root of the motion's chi-square */
+    double deviations;             /* root of the score test's chi-square; six independent errors have 2.4 */
+    double response;               /* share of what the equations foretell by which photographs answer the motion */
     double shift_px;               /* of the tracks in their photographs, rms */
 };
 
@@ -34,7 +41,8 @@ struct pose_registration {
 bool pose_registration_find(struct scene *scene, const struct tracks *tracks, bool is_rest, struct parallel *pool,
                             struct pose_registration *registration);
 
-/* Adds the rest that was found from where the registration had moved the cameras. */
+/* Adds the rest that was found from where the registration had moved the cameras. Errors stay those of the whole, whose
+ * response is told best. */
 void pose_registration_add(struct pose_registration *registration, const struct pose_registration *rest);
 
 /* Whether photographs agree significantly better at held-out tracks of the present cameras than they do there with the
