@@ -22,7 +22,7 @@ import rooms_boxes  # noqa: E402
 import rooms_choice  # noqa: E402
 import rooms_report  # noqa: E402
 from furniture import join  # noqa: E402
-from photographs import write_exposures, write_hdr  # noqa: E402
+from photographs import checked, write_exposures, write_hdr  # noqa: E402
 from rendering import choose_poses, render, scene_of, spectrum, texture_of  # noqa: E402
 
 DEPTH = 16
@@ -79,7 +79,7 @@ def write_bundle(room, out, spp, train, test):
     poses = choose_poses(room, scene, train + test)
     write_mesh(room, out + "/mesh.ply")
     path = {"type": "path", "max_depth": DEPTH, "rr_depth": 8}
-    images = [render(scene, pose, spp, path, k) for k, pose in enumerate(poses)]
+    images = [checked(render(scene, pose, spp, path, k), k) for k, pose in enumerate(poses)]
     write_hdr(images, poses, train, out)
     write_exposures(images, poses, train, out, room.single_exposure)
     light_truth.write(room, scene, poses[:train], out, max(16, spp // 4))

@@ -12,6 +12,8 @@ import numpy as np
 
 CATALOGUES = "/usr/share/sweethome3d/furniture/*.sh3f"
 DARKEST, BRIGHTEST = 0.02, 0.92  # base colours stay between
+# Repeats of a texture. Two models have places 3.4e9 repeats away, where Mitsuba reads outside of the picture.
+FARTHEST_UV = 1000.0
 
 
 @dataclass
@@ -44,8 +46,13 @@ class Part:
 
 
 def make_part(name, positions, normals, uv, faces, of):
-    return Part(name, np.array(positions, float), np.array(normals, float), np.array(uv, float),
+    part = Part(name, np.array(positions, float), np.array(normals, float), np.array(uv, float),
                 np.array(faces, int), of)
+    lengths = np.linalg.norm(part.normals, axis=1)
+    if not np.isfinite(part.positions).all() or not (np.abs(lengths - 1) < 1e-3).all() or \
+            not (np.abs(part.uv) <= FARTHEST_UV).all():
+        raise ValueError(f"{name}: positions, normals or texture coordinates that cannot be rendered")
+    return part
 
 
 # --- shapes --------------------------------------------------------------------------------------
@@ -226,10 +233,10 @@ class Catalogue:
         """A vertex for every different corner; facets of their own where there is no normal."""
         number, vertices, normals, uv, faces = {}, [], [], [], []
         for triangle in triangles:
-            p = [positions[corner[0]] for corner in triangle]
+            p = np.float32([positions[corner[0]] for corner in triangle]).astype(float)  # as they are rendered
             facet = np.cross(p[1] - p[0], p[2] - p[0])
             length = np.linalg.norm(facet)
-            if length < 1e-12:
+            if not length > 1e-12:
                 continue
             face = []
             for corner in triangle:
@@ -240,7 +247,8 @@ class Catalogue:
                     number[key] = len(vertices)
                     vertices.append(positions[corner[0]])
                     normals.append(normal / size if size > 1e-6 else facet / length)
-                    uv.append(arrays["vt"][corner[1]][:2] if corner[1] >= 0 else (0.0, 0.0))
+                    place = arrays["vt"][corner[1]][:2] if corner[1] >= 0 else (0.0, 0.0)
+                    uv.append(place if np.abs(place).max() <= FARTHEST_UV else (0.0, 0.0))
                 face.append(number[key])
             faces.append(face)
         return make_part(name, vertices, normals, uv, faces, of) if faces else None

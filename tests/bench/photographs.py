@@ -9,6 +9,7 @@ from rendering import FOCAL, HEIGHT, WIDTH
 
 CYCLE = (1.0, 1 / 16.66, 1 / 166.66)
 CYCLE_MEDIAN = 0.7  # what the median of all photographs becomes at the first of the cycling exposures
+HALF_LARGEST = 65504.0
 NOISE = 0.01        # of a pixel at 1; of less light as its root
 
 
@@ -23,10 +24,20 @@ def write_transforms(path, poses, train, folder, kind, **more):
                    "cy": HEIGHT / 2, **more, "frames": frames}, out)
 
 
+def checked(image, name):
+    """Refuses a photograph that no room can look like: nothing in them is brighter than 40,000."""
+    bad = ~np.isfinite(image).all(-1) | (np.max(image, -1) >= HALF_LARGEST)
+    if bad.any():
+        y, x = np.argwhere(bad)[0]
+        raise ValueError(f"photograph {name}: {bad.sum()} pixels are no numbers or brighter than half precision holds, "
+                         f"one at ({x}, {y}): does a part have a fault?")
+    return image
+
+
 def write_hdr(images, poses, train, out):
     os.makedirs(f"{out}/images", exist_ok=True)
     for k, image in enumerate(images):
-        mi.Bitmap(np.minimum(image, 65504.0).astype(np.float16)).write(f"{out}/images/{k:03d}.exr")
+        mi.Bitmap(image.astype(np.float16)).write(f"{out}/images/{k:03d}.exr")
     write_transforms(out + "/transforms.json", poses, train, "images", "exr")
 
 
