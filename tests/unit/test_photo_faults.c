@@ -3,7 +3,6 @@
 #include "server/ingest/photo_faults.h"
 
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include "common/color.h"
 #include "common/file.h"
@@ -240,8 +239,7 @@ static void test_scale(void) {
 }
 
 int main(void) {
-    const char *base = access("/dev/shm", W_OK) == 0 ? "/dev/shm" : "/tmp"; /* unsynced where possible */
-    snprintf(work, sizeof work, "%s/unbake-test-photo-faults-XXXXXX", base);
+    snprintf(work, sizeof work, "%s/unbake-test-photo-faults-XXXXXX", check_fast_dir());
     CHECK(mkdtemp(work) != NULL);
     pool = parallel_new(2);
     test_kinds();
