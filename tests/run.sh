@@ -42,7 +42,8 @@ without_own_threads() {
 # The thread sanitizer has nothing to find in one thread either, nor in the engine's loops and whole reconstructions what
 # the reconstruction of a small room in api/test_webhooks does not tell.
 slow_tsan="$slow_asan render/test_relight_forms render/test_sun_caustics
-unit/test_checkpoint_faults unit/test_checkpoint_parts unit/test_export unit/test_store_faults
+unit/test_checkpoint_faults unit/test_checkpoint_parts unit/test_checkpoint_damage unit/test_export unit/test_export_objects
+unit/test_export_pictures unit/test_store_faults render/test_relight_runs unit/test_bundle_bad unit/test_bundle_rooms
 api/test_one_job render/test_gather unit/test_checkpoint unit/test_captures api/test_client_check unit/test_bundle unit/test_segment
 unit/test_evaluate api/test_metrics api/test_usd
 api/test_http_durable api/test_http_threads render/test_inserts unit/test_demo

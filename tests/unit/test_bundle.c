@@ -1,80 +1,9 @@
-/* Bundles: a small good one in several shapes, a table of bad ones that must each name the file
- * and the place, and the real rooms. */
-#include "server/ingest/bundle.h"
-#include "server/ingest/facts.h"
-
-#include <sys/stat.h>
+/* test_bundle.c -- bundles: a small good one in several shapes. test_bundle_bad.c has bad ones, test_bundle_rooms.c real
+ * ones. */
 #include <zlib.h>
 
-#include "common/file.h"
-#include "common/image.h"
-#include "common/mem.h"
-#include "tests/check.h"
-
-static char work[64]; /* in memory where possible: unpacking syncs the file system */
-static struct parallel *pool;
-
-#define POSE "\"transform_matrix\":[[1,0,0,0.5],[0,1,0,0.5],[0,0,1,2],[0,0,0,1]]"
-#define LENS "\"w\":8,\"h\":6,\"fl_x\":7,\"fl_y\":7.5,\"cx\":4,\"cy\":3"
-#define FRAME(name) "{\"file_path\":\"" name "\"," POSE "}"
-#define OTHER_POSE "\"transform_matrix\":[[1,0,0,0.5],[0,1,0,0.5],[0,0,1,2.001],[0,0,0,1]]"
-#define FRAME_ELSEWHERE(name) "{\"file_path\":\"" name "\"," OTHER_POSE "}"
-#define THREE FRAME("a.exr") "," FRAME("./b.png") "," FRAME("c.exr")
-#define MESH                                                                                                           \
-    "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"                  \
-    "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
-#define TURNED                                                                                                         \
-    "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"                  \
-    "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 2 1\n"
-#define OBJ "v 0 0 0\nv 1 0 0\nv 0 1 0\no a\nf 1 2 3\no b\nf 1 3 2\n"
-#define CLOUD                                                                                                          \
-    "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"                  \
-    "end_header\n0 0 0\n"
-
-static void put(const char *name, const char *text) {
-    char *path = file_join(work, name);
-    CHECK(file_replace(path, text, strlen(text), NULL) == STATUS_OK);
-    mem_free(path);
-}
-
-static bool make_folder(const char *name) {
-    char *path = file_join(work, name);
-    bool made = mkdir(path, 0700) == 0;
-    mem_free(path);
-    return made;
-}
-
-static void put_picture(const char *name, uint32_t width, uint32_t height, float value, bool exr) {
-    struct image image;
-    image_init_rgb(&image, width, height);
-    for (size_t i = 0; i < (size_t)width * height * 3; i++)
-        image.pixel[i] = value;
-    char *path = file_join(work, name);
-    CHECK((exr ? image_write_exr(path, &image, IMAGE_FLOAT, false, NULL) : image_write_png(path, &image, 1.0f, NULL)) ==
-          STATUS_OK);
-    mem_free(path);
-    image_release(&image);
-}
-
-static void put_good(void) {
-    CHECK(file_remove_tree(work, NULL) == STATUS_OK && mkdir(work, 0700) == 0);
-    put("mesh.ply", MESH);
-    put_picture("a.exr", 8, 6, 2.5f, true);
-    put_picture("b.png", 8, 6, 0.5f, false);
-    put_picture("c.exr", 8, 6, 2.5f, true);
-    put("transforms.json", "{" LENS ",\"frames\":[" THREE "]}");
-}
-
-static enum status load(struct scene *scene, cJSON **problems, struct error *err) {
-    struct bundle_limits limits = bundle_default_limits();
-    limits.photograph_pixels = 1000000;
-    *problems = cJSON_CreateArray();
-    *err = (struct error){.message = ""};
-    enum status status = bundle_load(work, NULL, &limits, pool, scene, *problems, err);
-    if (status != STATUS_OK)
-        scene_release(scene);
-    return status;
-}
+#include "server/ingest/facts.h"
+#include "tests/unit/bundle_rig.h"
 
 static bool has_warning(const struct scene *scene, const char *part) {
     for (size_t i = 0; i < scene->warning_count; i++)
@@ -216,106 +145,6 @@ static void test_doubled(void) {
     cJSON_Delete(problems);
 }
 
-#define TOP(extra) "{" LENS "," extra "\"frames\":[" THREE "]}"
-#define ONE_OF_THREE(frame) "{" LENS ",\"frames\":[" frame "," FRAME("b.png") "," FRAME("c.exr") "," FRAME("a.exr") "]}"
-#define MATRIX(rows) ONE_OF_THREE("{\"file_path\":\"d.exr\",\"transform_matrix\":" rows "}")
-
-struct bad {
-    const char *transforms;        /* NULL: the good one */
-    const char *file, *content;    /* another file to replace; content NULL: remove it */
-    const char *blamed, *sentence; /* what a problem must say */
-};
-
-static const struct bad bad_bundles[] = {
-    {NULL, "transforms.json", NULL, "a.exr", "no cameras: there are photographs and a mesh, but no poses"},
-    {"{\"frames\": [}", NULL, NULL, "transforms.json", "line 1"},
-    {"[]", NULL, NULL, "transforms.json", "array \"frames\""},
-    {"{\"frames\": 3}", NULL, NULL, "transforms.json", "array \"frames\""},
-    {"{" LENS ",\"frames\":[]}", NULL, NULL, "transforms.json", "holds no poses"},
-    {"{" LENS ",\"frames\":[" FRAME("a.exr") "," FRAME("b.png") "," FRAME("x.png") "]}", NULL, NULL, "transforms.json",
-     "only 2 of its 3 frames"},
-    {NULL, "mesh.ply", NULL, "mesh.ply", "no mesh"},
-    {NULL, "mesh.ply", CLOUD, "mesh.ply", "point clouds"},
-    {NULL, "second.ply", TURNED, "second.ply", "two meshes: mesh.ply and second.ply, and neither is finer"},
-    {NULL, "mesh.ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n", "mesh.ply", "line 4"},
-    {NULL, "mesh.ply", "", "mesh.ply", "empty"},
-    {TOP("\"mesh\":\"nowhere.ply\","), NULL, NULL, "transforms.json", "nowhere.ply"},
-    {TOP("\"mesh\":\"../mesh.ply\","), NULL, NULL, "transforms.json", "\"..\""},
-    {TOP("\"mesh\":\"/etc/mesh.ply\","), NULL, NULL, "transforms.json", "absolute"},
-    {TOP("\"camera_model\":\"EQUIRECTANGULAR\","), NULL, NULL, "transforms.json", "unknown camera_model \"EQUI"},
-    {"{" LENS ",\"fl_x\":1,\"frames\":[]}", NULL, NULL, "transforms.json", "\"fl_x\" twice"},
-    {"{\"w\":8,\"h\":6,\"fl_x\":0,\"frames\":[" THREE "]}", NULL, NULL, "transforms.json", "fl_x is 0"},
-    {"{\"w\":8,\"h\":6,\"fl_x\":-5,\"frames\":[" THREE "]}", NULL, NULL, "transforms.json", "fl_x is -5"},
-    {"{\"w\":8,\"h\":6,\"fl_x\":1e9,\"frames\":[" THREE "]}", NULL, NULL, "a.exr", "focal length of 1e+09"},
-    {"{\"w\":8,\"h\":6,\"frames\":[" THREE "]}", NULL, NULL, "transforms.json", "frames[0] (a.exr): no focal length"},
-    {"{\"w\":8.5,\"fl_x\":7,\"frames\":[" THREE "]}", NULL, NULL, "transforms.json", "w is 8.5"},
-    {"{\"w\":\"8px\",\"fl_x\":7,\"frames\":[" THREE "]}", NULL, NULL, "transforms.json", "\"w\" must be a number"},
-    {"{\"fl_x\":7,\"camera_angle_x\":60,\"frames\":[" THREE "]}", NULL, NULL, "transforms.json", "radians"},
-    {"{\"fl_x\":7,\"cx\":5000,\"frames\":[" THREE "]}", NULL, NULL, "a.exr", "principal point"},
-    {"{\"w\":9,\"h\":6,\"fl_x\":7,\"frames\":[" THREE "]}", NULL, NULL, "b.png",
-     "8 x 6 pixels, but frames[1] says 9 x 6"},
-    {MATRIX("[[1,0,0,0],[0,1,0,0],[1,1,0,0],[0,0,0,1]]"), NULL, NULL, "transforms.json",
-     "frames[0] (d.exr): transform_matrix is singular"},
-    {MATRIX("[[0,0,0,0],[0,0,0,0],[0,0,0,0],[0,0,0,1]]"), NULL, NULL, "transforms.json", "singular"},
-    {MATRIX("[[-1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]"), NULL, NULL, "transforms.json", "mirrors"},
-    {MATRIX("[[1,0,0,0],[0,2,0,0],[0,0,1,0],[0,0,0,1]]"), NULL, NULL, "transforms.json", "not a rotation"},
-    {MATRIX("[[1,0.2,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]"), NULL, NULL, "transforms.json", "not a rotation"},
-    {MATRIX("[[1,0,0,1e999],[0,1,0,0],[0,0,1,0],[0,0,0,1]]"), NULL, NULL, "transforms.json", "row 1, column 4"},
-    {MATRIX("[[1,0,0,0],[0,1,\"zero\",0],[0,0,1,0],[0,0,0,1]]"), NULL, NULL, "transforms.json", "row 2, column 3"},
-    {MATRIX("[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,2]]"), NULL, NULL, "transforms.json", "last row"},
-    {MATRIX("[[1,0,0],[0,1,0],[0,0,1]]"), NULL, NULL, "transforms.json", "4 (or 3) rows of 4"},
-    {MATRIX("7"), NULL, NULL, "transforms.json", "4 (or 3) rows of 4"},
-    {ONE_OF_THREE("{" POSE "}"), NULL, NULL, "transforms.json", "frames[0]: no file_path"},
-    {ONE_OF_THREE("7"), NULL, NULL, "transforms.json", "frames[0]: must be an object"},
-    {ONE_OF_THREE("{\"file_path\":\"../../a.exr\"," OTHER_POSE "}"), NULL, NULL, "transforms.json",
-     "frames[0] and frames[3] both name a.exr"},
-    {ONE_OF_THREE("{\"file_path\":\"\"," POSE "}"), NULL, NULL, "transforms.json", "file_path is empty"},
-    {ONE_OF_THREE(FRAME_ELSEWHERE("./a.exr")), NULL, NULL, "transforms.json",
-     "frames[0] and frames[3] both name a.exr"},
-    {ONE_OF_THREE(FRAME_ELSEWHERE("c")), NULL, NULL, "transforms.json", "frames[0] and frames[2] both name c.exr"},
-    {ONE_OF_THREE("{\"file_path\":\"d\"," POSE ",\"split\":\"dev\"}"), NULL, NULL, "transforms.json", "split must be"},
-    {ONE_OF_THREE("{\"file_path\":\"d\"," POSE ",\"exposure\":-1}"), NULL, NULL, "transforms.json", "exposure is -1"},
-    {"{" LENS ",\"frames\":[{\"file_path\":\"a.exr\"," POSE
-     ",\"mask_path\":\"m.png\"}," FRAME("b.png") "," FRAME("c.exr") "]}",
-     NULL, NULL, "m.png", "the mask is not in the bundle"},
-    {"{" LENS ",\"test_filenames\":[\"a.exr\",\"b.png\",\"c.exr\"],\"frames\":[" THREE "]}", NULL, NULL,
-     "transforms.json", "held out"},
-    {NULL, "b.png", "\x89PNG\r\n\x1a\n and then nothing", "b.png", "PNG"},
-    {NULL, "a.exr", "v/1\x01 and then nothing", "a.exr", "EXR"},
-    {NULL, "c.exr", "text", "c.exr", "not a picture"},
-};
-
-static void test_bad(void) {
-    for (size_t i = 0; i < sizeof bad_bundles / sizeof *bad_bundles; i++) {
-        const struct bad *bad = &bad_bundles[i];
-        put_good();
-        if (bad->transforms)
-            put("transforms.json", bad->transforms);
-        char *path = file_join(work, bad->file ? bad->file : "");
-        if (bad->file && bad->content)
-            put(bad->file, bad->content);
-        else if (bad->file)
-            CHECK(remove(path) == 0);
-        mem_free(path);
-        struct scene scene;
-        struct error err;
-        cJSON *problems, *problem;
-        CHECK_THAT(load(&scene, &problems, &err) == STATUS_INPUT, "case %zu: %s", i, err.message);
-        CHECK(scene.photograph == NULL && scene.mesh.index == NULL && err.message[0] != '\0');
-        bool found = false;
-        cJSON_ArrayForEach(problem, problems) {
-            const char *file = cJSON_GetStringValue(cJSON_GetObjectItem(problem, "file"));
-            const char *reason = cJSON_GetStringValue(cJSON_GetObjectItem(problem, "reason"));
-            found = found || (strcmp(file, bad->blamed) == 0 && strstr(reason, bad->sentence));
-            CHECK_THAT(!strstr(reason, work), "case %zu tells where the server keeps it: %s", i, reason);
-        }
-        char *text = json_text(problems);
-        CHECK_THAT(found, "case %zu wants %s \"%s\": %s", i, bad->blamed, bad->sentence, text);
-        mem_free(text);
-        cJSON_Delete(problems);
-    }
-}
-
 static size_t triangles_of(const char **file, struct error *err) {
     struct scene scene;
     cJSON *problems;
@@ -411,33 +240,6 @@ static void test_colmap(void) {
     mem_free(transforms);
 }
 
-/* Everything at once, and more problems than are kept. */
-static void test_many(void) {
-    put_good();
-    put("mesh.ply", "ply\nrubbish");
-    put("b.png", "text");
-    put("transforms.json", ONE_OF_THREE("{\"file_path\":\"d\",\"transform_matrix\":3}"));
-    struct scene scene;
-    struct error err;
-    cJSON *problems;
-    CHECK(load(&scene, &problems, &err) == STATUS_INPUT);
-    CHECK(cJSON_GetArraySize(problems) == 4); /* that 2 of 4 frames are left is one, too */
-    CHECK(strstr(err.message, "4 problems"));
-    cJSON_Delete(problems);
-
-    struct buf text;
-    buf_init(&text, 1 << 20);
-    buf_puts(&text, "{" LENS ",\"frames\":[");
-    for (int i = 0; i < 300; i++)
-        buf_printf(&text, "%s{\"file_path\":\"%d.png\"}", i ? "," : "", i);
-    buf_puts(&text, "]}");
-    put("transforms.json", buf_text(&text));
-    buf_release(&text);
-    CHECK(load(&scene, &problems, &err) == STATUS_INPUT);
-    CHECK(cJSON_GetArraySize(problems) == 51 && strstr(err.message, "301 problems"));
-    cJSON_Delete(problems);
-}
-
 /* A bundle in a folder of its own, unpacked beside what a Mac adds. */
 static void test_single_folder(void) {
     put_good();
@@ -490,109 +292,17 @@ static void test_archive(void) {
     mem_free(dir);
 }
 
-static const float *truth_pixel(const struct image *truth, float x, float y) {
-    return truth->pixel + ((size_t)y * truth->width + (size_t)x) * truth->channel_count;
-}
-
-/* Whether the pixel and its eight neighbours show one object. */
-static bool is_inside(const struct image *truth, float x, float y, size_t id) {
-    if (x < 1.0f || y < 1.0f || x >= (float)truth->width - 1.0f || y >= (float)truth->height - 1.0f)
-        return false;
-    for (int k = 0; k < 9; k++)
-        if (truth_pixel(truth, x + (float)(k % 3 - 1), y + (float)(k / 3 - 1))[id] != truth_pixel(truth, x, y)[id])
-            return false;
-    return true;
-}
-
-/* Poses, axes, pixel places and object_id against a renderer's pictures of the same room: where
- * a triangle's centre has the depth that the renderer saw, its object must be the one it saw. */
-static void check_truth(const char *dir, const struct scene *scene) {
-    size_t seen = 0, agreeing = 0;
-    for (size_t i = 0; i < scene->photograph_count; i++) {
-        const struct photograph *photo = &scene->photograph[i];
-        if (!photo->is_test)
-            continue;
-        char *path = mem_printf("%s/truth/%.3s.exr", dir, strrchr(photo->name, '/') + 1);
-        struct image truth;
-        enum status status = image_read(path, &truth, NULL, NULL);
-        mem_free(path);
-        CHECK(status == STATUS_OK);
-        if (status != STATUS_OK)
-            continue;
-        size_t depth = (size_t)image_channel(&truth, "depth"), id = (size_t)image_channel(&truth, "object_id");
-        for (size_t t = 0; t < scene->mesh.triangle_count; t++) {
-            const uint32_t *v = scene->mesh.index[t];
-            const vec3 *p = scene->mesh.position;
-            vec3 centre = vec3_scale(vec3_add(p[v[0]], vec3_add(p[v[1]], p[v[2]])), 1.0f / 3.0f);
-            float x, y, depth_m;
-            if (!camera_project(&photo->camera, centre, &x, &y, &depth_m))
-                continue;
-            const float *pixel = truth_pixel(&truth, x, y);
-            float distance_m = vec3_length(vec3_sub(centre, camera_origin(&photo->camera)));
-            if (fabsf(pixel[depth] - distance_m) > 0.002f * distance_m || !is_inside(&truth, x, y, id))
-                continue;
-            seen++;
-            agreeing += (int64_t)pixel[id] == scene->mesh.object_id[t];
-        }
-        image_release(&truth);
-    }
-    printf("%zu triangle centres seen, %zu with the right object\n", seen, agreeing);
-    /* Towels and the like have layers closer than the 0.2 % of depth that is told apart. */
-    CHECK(seen > 500 && (double)agreeing > 0.9 * (double)seen);
-}
-
-static void test_real(const char *root, const char *room, const char *transforms, size_t frames, size_t triangles) {
-    char *dir = mem_printf("%s/%s", root, room);
-    if (access(dir, R_OK) != 0) {
-        printf("%s is not here\n", dir);
-        mem_free(dir);
-        return;
-    }
-    struct scene scene;
-    struct error err = {.message = ""};
-    struct bundle_limits limits = bundle_default_limits();
-    cJSON *problems = cJSON_CreateArray();
-    struct reading reading = reading_default();
-    reading.transforms = (char *)transforms;
-    enum status status = bundle_load(dir, &reading, &limits, pool, &scene, problems, &err);
-    CHECK_THAT(status == STATUS_OK, "%s: %s", room, err.message);
-    if (status == STATUS_OK) {
-        cJSON *facts = facts_of(&scene);
-        char *text = json_text(facts);
-        printf("%s %s: %s\n", room, transforms ? transforms : "", text);
-        CHECK(scene.photograph_count >= frames && scene.mesh.triangle_count >= triangles);
-        mem_free(text);
-        cJSON_Delete(facts);
-        if (strncmp(room, "rooms/", 6) == 0)
-            check_truth(dir, &scene);
-    }
-    scene_release(&scene);
-    cJSON_Delete(problems);
-    mem_free(dir);
-}
-
 int main(void) {
-    snprintf(work, sizeof work, "%s/unbake-test-bundle-XXXXXX", check_fast_dir());
-    CHECK(mkdtemp(work) != NULL);
-    pool = parallel_new(2);
+    bundle_rig_begin();
     test_good();
     test_exif();
     test_variants();
     test_doubled();
-    test_bad();
     test_root();
     test_formats();
     test_colmap();
-    test_many();
     test_single_folder();
     test_archive();
-    const char *root = getenv("UNBAKE_TEST_DATA");
-    root = root ? root : "../shared/data";
-    test_real(root, "rooms/staircase2", NULL, 80, 28000);
-    test_real(root, "rooms/staircase2", "transforms_sdr.json", 80, 28000);
-    test_real(root, "rooms/bathroom", NULL, 80, 360000);
-    test_real(root, "redkitchen", NULL, 125, 290000);
-    parallel_free(pool);
-    file_remove_tree(work, NULL);
+    bundle_rig_end();
     return check_result();
 }

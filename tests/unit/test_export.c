@@ -1,41 +1,14 @@
-/* outputs.c and its pictures: a job's files, written and read back. */
-#include <sys/stat.h>
-
+/* outputs.c: a job's files, written and read back. */
 #include "common/buf.h"
-#include "common/file.h"
 #include "common/image.h"
 #include "common/json.h"
-#include "common/mem.h"
-#include "common/protocol.h"
 #include "common/settings.h"
 #include "server/demo/room.h"
-#include "server/export/outputs.h"
 #include "server/export/pictures.h"
 #include "server/ingest/findings.h"
 #include "server/ingest/mesh/mesh_file.h"
 #include "server/ingest/transforms.h"
-#include "tests/check.h"
-
-struct announced {
-    const char *dir;
-    int previews, outputs;
-    char last[64];
-    bool refuse;
-};
-
-/* The file is there, whole and under its final name, when it is announced. */
-static enum status hear(void *user, const char *type, const char *name, const char *content_type, struct error *err) {
-    struct announced *a = user;
-    struct stat info;
-    char *path = file_join(a->dir, name);
-    CHECK_THAT(stat(path, &info) == 0 && info.st_size > 0, "%s", name);
-    CHECK(strchr(content_type, '/') != NULL);
-    mem_free(path);
-    a->previews += strcmp(type, EVENT_PREVIEW) == 0;
-    a->outputs += strcmp(type, EVENT_OUTPUT) == 0;
-    snprintf(a->last, sizeof a->last, "%s", name);
-    return a->refuse ? error_set(err, STATUS_CANCELLED, "enough") : STATUS_OK;
-}
+#include "tests/unit/export_rig.h"
 
 static void read_back(const char *dir, const char *name, struct image *image) {
     struct error err;
@@ -105,114 +78,6 @@ static void test_textures(const char *dir, const struct export_input *in) {
     image_release(&roughness);
     image_release(&emission);
     image_release(&confidence);
-}
-
-/* Each texel within reach of a valid one shows one that is nearly the nearest. */
-static void test_margin(void) {
-    enum { SIZE = 64 };
-    static uint32_t triangle[SIZE * SIZE];
-    struct inverse_uv inverse = {.width = SIZE, .height = SIZE, .triangle = triangle};
-    const uint32_t at[2] = {20 * SIZE + 20, 24 * SIZE + 50};
-    for (size_t i = 0; i < SIZE * SIZE; i++)
-        triangle[i] = INVERSE_UV_NONE;
-    triangle[at[0]] = triangle[at[1]] = 0;
-    uint32_t *source = picture_margin(&inverse);
-    for (int y = 0; y < SIZE; y++) {
-        for (int x = 0; x < SIZE; x++) {
-            int a = (x - 20) * (x - 20) + (y - 20) * (y - 20);
-            int b = (x - 50) * (x - 50) + (y - 24) * (y - 24);
-            int nearest = a < b ? a : b, reach = EXPORT_MARGIN * EXPORT_MARGIN;
-            uint32_t wanted = nearest > reach ? INVERSE_UV_NONE : a <= b ? at[0] : at[1];
-            uint32_t found = source[y * SIZE + x];
-            CHECK_THAT(found == wanted || (a == b && found == at[1]), "at %d %d", x, y);
-        }
-    }
-    mem_free(source);
-}
-
-/* Texels of a mip level that cover a chart and have a value of another one. */
-static size_t mixed_texels(const struct atlas *atlas, const struct inverse_uv *inverse, const uint32_t *source,
-                           int level) {
-    uint32_t side = atlas->width >> level;
-    size_t mixed = 0;
-    for (uint32_t i = 0; i < side * side; i++) {
-        uint32_t first = UINT32_MAX;
-        bool covers = false, mixes = false;
-        for (uint32_t k = 0; k < 1u << (2 * level); k++) {
-            size_t texel = (size_t)((i / side << level) + (k >> level)) * atlas->width + (i % side << level) +
-                           (k & ((1u << level) - 1));
-            if (source[texel] == INVERSE_UV_NONE)
-                continue;
-            uint32_t chart = atlas->chart_of_triangle[inverse->triangle[source[texel]]];
-            covers |= source[texel] == texel;
-            mixes |= first != UINT32_MAX && chart != first;
-            first = chart;
-        }
-        mixed += covers && mixes;
-    }
-    return mixed;
-}
-
-/* The gutter between charts keeps the mip levels clean that the files name. */
-static void test_clean_levels(struct parallel *pool) {
-    static const struct {
-        uint32_t padding;
-        int level;
-    } table[] = {{1, 0}, {ATLAS_PADDING, 1}, {ATLAS_AUTOMATIC_PADDING, 2}, {16, 3}};
-    struct room room;
-    struct error err;
-    struct settings defaults;
-    settings_init(&defaults);
-    CHECK(settings_number(&defaults, "padding") == ATLAS_AUTOMATIC_PADDING);
-    settings_release(&defaults);
-    CHECK(room_init(&room, &(struct room_look){64, 0.0f, 0.0f, ROOM_LAMPS_FRAMED}, pool, &err) == STATUS_OK);
-    for (size_t i = 0; i < sizeof table / sizeof *table; i++) {
-        struct atlas atlas;
-        struct inverse_uv inverse;
-        CHECK(atlas_make(&atlas, &room.mesh, &room.segments, 1024, 0.0f, table[i].padding, &err) == STATUS_OK);
-        CHECK_THAT(atlas_clean_level(atlas.padding) == table[i].level, "%u", atlas.padding);
-        inverse_uv_make(&inverse, &atlas, room.mesh.triangle_count, pool);
-        uint32_t *source = picture_margin(&inverse);
-        printf("padding %u: utilisation %.3f, mixed at levels 1 to 3:", atlas.padding, atlas.utilisation);
-        for (int level = 1; level <= 3; level++) {
-            size_t mixed = mixed_texels(&atlas, &inverse, source, level);
-            printf(" %zu", mixed);
-            CHECK_THAT(mixed == 0 || level > table[i].level, "%zu texels of level %d mix charts", mixed, level);
-        }
-        printf("\n");
-        mem_free(source);
-        inverse_uv_release(&inverse);
-        atlas_release(&atlas);
-    }
-    room_release(&room);
-}
-
-/* One exposure for both; equal pictures differ nowhere; signs by colour. */
-static void test_comparison(void) {
-    struct image photograph, render, picture;
-    image_init_rgb(&photograph, 10, 1);
-    image_init_rgb(&render, 10, 1);
-    for (int i = 0; i < 30; i++)
-        photograph.pixel[i] = render.pixel[i] = 2.0f;
-    for (int c = 0; c < 3; c++) {
-        render.pixel[c] = 4.0f;     /* first pixel too bright */
-        render.pixel[3 + c] = 1.0f; /* second too dark */
-        photograph.pixel[6 + c] = NAN;
-    }
-    struct export_comparison comparison = {"a", &photograph, &render, NULL};
-    picture_comparison(&comparison, &picture);
-    CHECK(picture.width == 38 && picture.height == 1);
-    const float *p = picture.pixel, *r = p + 3 * 14, *d = p + 3 * 28;
-    CHECK_NEAR(p[0], 0.6, 1e-6); /* the 80th percentile */
-    CHECK_NEAR(r[0], 1.2, 1e-6);
-    CHECK_NEAR(r[3], 0.3, 1e-6);
-    CHECK(d[0] > d[1] && d[1] == d[2]);
-    CHECK(d[5] > d[3] && d[3] == d[4]);
-    CHECK(isnan(d[6]));
-    CHECK(d[9] == d[10] && d[10] == d[11]);
-    image_release(&photograph);
-    image_release(&render);
-    image_release(&picture);
 }
 
 static size_t occurrences(const char *text, const char *part) {
@@ -339,77 +204,6 @@ static void test_environment(const char *dir, struct export_input *in, struct an
     image_release(&known);
 }
 
-/* Triangles side by side, each an object of its own. */
-static struct mesh make_pieces(uint32_t count) {
-    enum { PER_ROW = 128 };
-    struct mesh mesh = {.vertex_count = 3 * (size_t)count, .triangle_count = count, .face_count = count};
-    mesh.position = mem_array(mesh.vertex_count, sizeof *mesh.position);
-    mesh.index = mem_array(count, sizeof *mesh.index);
-    mesh.face = mem_array(count, sizeof *mesh.face);
-    mesh.object_id = mem_array(count, sizeof *mesh.object_id);
-    for (uint32_t t = 0; t < count; t++) {
-        vec3 corner = {(float)(t % PER_ROW), (float)(t / PER_ROW), 0.0f};
-        mesh.position[3 * t] = corner;
-        mesh.position[3 * t + 1] = vec3_add(corner, (vec3){0.9f, 0.0f, 0.0f});
-        mesh.position[3 * t + 2] = vec3_add(corner, (vec3){0.0f, 0.9f, 0.0f});
-        for (uint32_t k = 0; k < 3; k++)
-            mesh.index[t][k] = 3 * t + k;
-        mesh.face[t] = t;
-        mesh.object_id[t] = t;
-    }
-    return mesh;
-}
-
-/* More segments than a file of objects may have. */
-static void test_left_out(const char *dir, struct parallel *pool) {
-    enum { COUNT = 16385 };
-    struct mesh mesh = make_pieces(COUNT);
-    struct segments segments;
-    struct atlas atlas;
-    struct inverse_uv inverse;
-    struct materials materials;
-    struct error err;
-    segments_from_object_id(&segments, &mesh);
-    CHECK(atlas_make(&atlas, &mesh, &segments, 512, 0.0f, ATLAS_PADDING, &err) == STATUS_OK);
-    inverse_uv_make(&inverse, &atlas, mesh.triangle_count, pool);
-    materials_init(&materials, &inverse, segments.count, rgb_gray(0.5f), 0.5f, 0.5f);
-    float *zero = mem_calloc((size_t)atlas.width * atlas.height, sizeof *zero);
-    bool *is_emitter = mem_calloc(COUNT, sizeof *is_emitter);
-    cJSON *report = cJSON_CreateObject(), *written = NULL;
-    struct announced heard = {.dir = dir};
-    char *path = file_join(dir, "report.json"), *old = file_join(dir, "scene.glb");
-    CHECK(access(old, F_OK) == 0); /* of an earlier export into this folder */
-    struct export_input in = {.title = "strips",
-                              .has_materials = true,
-                              .mesh = &mesh,
-                              .segments = &segments,
-                              .atlas = &atlas,
-                              .inverse = &inverse,
-                              .materials = &materials,
-                              .observation_count = zero,
-                              .is_emitter = is_emitter,
-                              .report = report};
-    CHECK_THAT(export_outputs(dir, &in, hear, &heard, &err) == STATUS_OK, "%s", err.message);
-    CHECK(access(old, F_OK) != 0);
-    CHECK(json_read(path, 1 << 24, &written, &err) == STATUS_OK);
-    const cJSON *left_out = cJSON_GetObjectItem(written, "left_out"), *first = cJSON_GetArrayItem(left_out, 0);
-    CHECK(cJSON_GetArraySize(left_out) == 7);
-    CHECK_STRING(cJSON_GetStringValue(cJSON_GetObjectItem(first, "name")), "scene.glb");
-    CHECK(strstr(cJSON_GetStringValue(cJSON_GetObjectItem(first, "reason")), "16385 segments"));
-    CHECK_STRING(heard.last, "report.html");
-    cJSON_Delete(written);
-    cJSON_Delete(report);
-    mem_free(old);
-    mem_free(path);
-    mem_free(is_emitter);
-    mem_free(zero);
-    materials_release(&materials);
-    inverse_uv_release(&inverse);
-    atlas_release(&atlas);
-    segments_release(&segments);
-    mesh_release(&mesh);
-}
-
 /* Off the axes, with a lens. */
 static struct camera make_camera(void) {
     struct camera camera = {.width = 16,
@@ -456,9 +250,6 @@ int main(void) {
     struct room room;
     struct error err;
     CHECK(mkdtemp(dir) != NULL);
-    test_margin();
-    test_clean_levels(pool);
-    test_comparison();
     CHECK(room_init(&room, &(struct room_look){256, 15.0f, 15.0f, ROOM_LAMPS_FRAMED}, pool, &err) == STATUS_OK);
     memcpy(room.mesh.offset, (double[3]){500000.0, -4100000.0, 0.0}, sizeof room.mesh.offset);
     size_t texels = (size_t)room.atlas.width * room.atlas.height;
@@ -500,7 +291,6 @@ int main(void) {
     test_views(dir, room.mesh.offset, &camera);
     test_report(dir, &in);
     test_environment(dir, &in, &heard);
-    test_left_out(dir, pool);
     heard.refuse = true;
     CHECK(export_outputs(dir, &in, hear, &heard, &err) == STATUS_CANCELLED);
 
