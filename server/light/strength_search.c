@@ -21,7 +21,9 @@ double strength_search(double known, double response, strength_losses *losses, v
         if (loss[i] < least)
             least = loss[i], *best = strength[i];
     }
-    for (int i = 0; i<NEARER && * best> 0.0; i++) {
+    if (!(*best > 0.0))
+        return 0.0;
+    for (int i = 0; i < NEARER; i++) {
         step = sqrt(step);
         const double beside[2] = {*best / step, *best * step};
         losses(user, beside, 2, loss);
