@@ -17,8 +17,8 @@ slow_asan="gradient/test_path render/test_conformance render/test_rooms render/t
 render/test_calibrate_poses render/test_emission_pattern render/test_environment render/test_specular
 render/test_held_out_light render/test_large_held_out render/test_saturated_light render/test_short_time_limit render/test_sky_room
 render/test_fireflies_left_out render/test_grey_card render/test_sun render/test_split api/test_resume api/test_readme
-render/test_emitters render/test_hidden_lamp render/test_openings render/test_changing_light render/test_sky_doubt render/test_reflection
-render/test_holes
+render/test_emitters render/test_hidden_lamp render/test_openings render/test_changing_light render/test_sky_doubt
+render/test_reflection render/test_holes render/test_panel render/test_pose_registration
 unit/test_outputs_read_back unit/test_fit unit/test_check_pictures api/test_http_faults chaos/test_clock
 api/test_backup api/test_axe api/test_page api/test_page_check api/test_webhook_library unit/test_many_photographs
 chaos/test_start_faults chaos/test_worker_calls chaos/test_worker_kill chaos/test_node api/test_node_site api/test_node_disk chaos/test_slurm
