@@ -73,19 +73,28 @@ static double likelihood(const struct specular_points *e, struct specular_candid
 
 /* --- segments ----------------------------------------------------------------------------------- */
 
-/* Mean over the observed texels of a segment. */
-static rgb mean_base_color(const struct specular_observer *l, const struct texture *base_color, size_t segment) {
-    double sum[3] = {0.0}, count = 0.0;
+/* Over the observed texels of a segment: the mean, and the deviation of the cube root. */
+static void measure_color(const struct specular_observer *l, const struct texture *base_color, size_t segment,
+                          rgb *mean, rgb *spread) {
+    double sum[3] = {0.0}, roots[3] = {0.0}, squares[3] = {0.0}, count = 0.0;
     for (uint32_t i = l->texels.first[segment]; i < l->texels.first[segment + 1]; i++) {
         uint32_t texel = l->texels.texel[i];
         if (!(l->in.fused->count[texel] > 0.0f))
             continue;
-        for (size_t c = 0; c < 3; c++)
-            sum[c] += (double)base_color->texel[texel][c];
+        for (size_t c = 0; c < 3; c++) {
+            double value = (double)base_color->texel[texel][c], root = cbrt(value);
+            sum[c] += value;
+            roots[c] += root;
+            squares[c] += root * root;
+        }
         count += 1.0;
     }
     double scale = 1.0 / fmax(count, 1.0);
-    return rgb_make((float)(scale * sum[0]), (float)(scale * sum[1]), (float)(scale * sum[2]));
+    for (size_t c = 0; c < 3; c++) {
+        double root = scale * roots[c];
+        (&mean->r)[c] = (float)(scale * sum[c]);
+        (&spread->r)[c] = (float)sqrt(fmax(0.0, scale * squares[c] - root * root));
+    }
 }
 
 /* Offset in [-0.5, 0.5] of the minimum of a parabola through three values of which the middle one is least. */
@@ -113,7 +122,7 @@ static void set_evidence(const struct specular_job *job, size_t segment, const s
     struct specular_candidate_levels best = best_of(e);
     evidence->is_observed = true;
     evidence->part = (double)by_segment_count(&l->texels, segment) / (double)l->in.surface.inverse->valid_count;
-    evidence->base_color = mean_base_color(l, &job->materials->base_color, segment);
+    measure_color(l, &job->materials->base_color, segment, &evidence->base_color, &evidence->color_spread);
     evidence->best = best.m == 0 ? SPECULAR_DIFFUSE : specular_candidate(best.k, best.m - 1);
     evidence->best_roughness = roughness_about(e, best);
     evidence->likelihood[SPECULAR_DIFFUSE] = likelihood(e, diffuse_candidate, best);

@@ -54,15 +54,18 @@ static double multiply(const double a[SPECULAR_CANDIDATES], const double b[SPECU
     return sum;
 }
 
-/* Probability that two segments share a material, given their colours. */
+/* Probability that two segments share a material, given their colours: by the distance of both distributions, were they
+ * normal (the second Wasserstein distance). */
 static double shared_probability(const struct specular_evidence *a, const struct specular_evidence *b) {
     const float *p = &a->base_color.r, *q = &b->base_color.r;
+    const float *spread_p = &a->color_spread.r, *spread_q = &b->color_spread.r;
     double squares = 0.0;
     if (a->part > LARGE_PART || b->part > LARGE_PART)
         return 0.0;
     for (size_t i = 0; i < 3; i++) {
         double d = cbrt((double)p[i]) - cbrt((double)q[i]);
-        squares += d * d / 3.0;
+        double spread = (double)spread_p[i] - (double)spread_q[i];
+        squares += (d * d + spread * spread) / 3.0;
     }
     double chance = COMMON * exp(-0.5 * squares / (COLOR_SPREAD * COLOR_SPREAD));
     return chance > COMMON_MIN ? chance : 0.0;

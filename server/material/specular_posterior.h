@@ -3,8 +3,9 @@
  *
  * Observations seldom determine the lobe of small objects, but parts of one colour are often of one material: a door
  * and its frame, the legs of a table. Segments of similar base colour are modelled as sharing one common material, each
- * with a probability that falls with the difference of the colours; otherwise a segment's material is independent.
- * Segments whose observations disagree hardly influence each other. Large segments do not take part: most are painted
+ * with a probability that falls with the difference of the colours, of their means and of how they vary over a segment:
+ * a picture is not of the paint that its mean happens to have. Otherwise a segment's material is independent. Segments
+ * whose observations disagree hardly influence each other. Large segments do not take part: most are painted
  * walls, and many unrelated objects are white too. */
 #ifndef UNBAKE_MATERIAL_SPECULAR_POSTERIOR_H
 #define UNBAKE_MATERIAL_SPECULAR_POSTERIOR_H
@@ -35,6 +36,7 @@ struct specular_evidence {
     bool is_observed; /* the segment has enough observations; else the other fields are undefined */
     double part;      /* of the room's texels */
     rgb base_color;
+    rgb color_spread;                       /* standard deviation of its cube root over the texels */
     double likelihood[SPECULAR_CANDIDATES]; /* of the observations under each candidate, at most 1 */
     size_t best;                            /* the likeliest candidate */
     double best_roughness;                  /* refined between the levels */

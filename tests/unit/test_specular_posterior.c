@@ -83,6 +83,11 @@ static void test_influence(void) {
     pair[1] = other, pair[1].base_color = rgb_gray(0.95f); /* nearly the same colour moves it nearly as far */
     struct specular_posterior near = specular_posterior(pair, 2, 0);
     CHECK(near.roughness > with.roughness && near.roughness < alone.roughness - 0.05);
+    pair[1] = other,
+    pair[1].color_spread = rgb_gray(0.15f); /* a picture of the same mean, of which paint tells nothing */
+    CHECK_NEAR(specular_posterior(pair, 2, 0).roughness, alone.roughness, 1e-12);
+    pair[0].color_spread = rgb_gray(0.15f); /* but another such picture does */
+    CHECK_NEAR(specular_posterior(pair, 2, 0).roughness, with.roughness, 1e-12);
 }
 
 /* Two of one colour with contradicting evidence both keep their own. */
