@@ -1,7 +1,7 @@
 /* changing_light.h: of many photographs that show a place lit, a few are asked whether it may be a highlight. They are
  * drawn from all: where the first ones of a film mirror a light and the later ones do not, the place is found to
  * change. */
-#include "server/light/changing_light.h"
+#include "server/light/decision/changing_light.h"
 #include "server/scene/latlong.h"
 #include "tests/unit/plane_rig.h"
 

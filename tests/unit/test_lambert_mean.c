@@ -1,6 +1,6 @@
 /* lambert_mean.h: a white sill, half of it deep in the shade, is no lamp: its light end is compared with the light
  * there. */
-#include "server/light/lambert_mean.h"
+#include "server/light/decision/lambert_mean.h"
 
 #include "tests/check.h"
 

@@ -1,6 +1,6 @@
 /* missing_light.h: a lamp is as bright as what it mainly lights tells, though far walls, each place of which it lights
  * a little, would be more alike if it were brighter. */
-#include "server/light/missing_light.h"
+#include "server/light/sun/missing_light.h"
 
 #include <math.h>
 

@@ -11,6 +11,7 @@
 #include "server/ingest/bundle.h"
 #include "server/ingest/photo_pixels.h"
 #include "tests/check.h"
+#include "tests/unit/told.h"
 
 #define WIDTH 60
 #define HEIGHT 50
@@ -68,20 +69,7 @@ static void put_all(void) {
 
 static bool load(void) {
     struct bundle_limits limits = bundle_default_limits();
-    cJSON *problems = cJSON_CreateArray(), *problem;
-    struct error err = {.message = ""};
-    size_t used = 0;
-    scene_release(&scene);
-    enum status status = bundle_load(work, NULL, &limits, pool, &scene, problems, &err);
-    told[0] = '\0';
-    cJSON_ArrayForEach(problem, problems) {
-        for (const cJSON *part = problem->child; part && used < sizeof told; part = part->next)
-            used += (size_t)snprintf(told + used, sizeof told - used, "%s: %s\n", part->string, part->valuestring);
-    }
-    for (size_t i = 0; i < scene.warning_count && used < sizeof told; i++)
-        used += (size_t)snprintf(told + used, sizeof told - used, "%s\n", scene.warning[i]);
-    cJSON_Delete(problems);
-    return status == STATUS_OK;
+    return load_told(work, &limits, pool, &scene, told, sizeof told) == STATUS_OK;
 }
 
 #define TOLD(text) CHECK_THAT(strstr(told, text), "%s: in %s", text, told)

@@ -9,6 +9,7 @@
 #include "server/ingest/facts.h"
 #include "server/ingest/photos.h"
 #include "tests/check.h"
+#include "tests/unit/told.h"
 
 static char work[64];
 static struct parallel *pool;
@@ -21,21 +22,7 @@ static bool load(const char *dir) {
     struct bundle_limits limits = bundle_default_limits();
     limits.kept_pixels = kept_pixels;
     limits.spill = spill;
-    cJSON *problems = cJSON_CreateArray(), *problem;
-    struct error err = {.message = ""};
-    scene_release(&scene);
-    enum status status = bundle_load(dir, NULL, &limits, pool, &scene, problems, &err);
-    size_t used = 0;
-    told[0] = '\0';
-    cJSON_ArrayForEach(problem, problems) {
-        for (const cJSON *part = problem->child; part && used < sizeof told; part = part->next)
-            used += (size_t)snprintf(told + used, sizeof told - used, "%s: %s\n", part->string, part->valuestring);
-    }
-    for (size_t i = 0; i < scene.warning_count && used < sizeof told; i++)
-        used += (size_t)snprintf(told + used, sizeof told - used, "%s\n", scene.warning[i]);
-    cJSON_Delete(problems);
-    CHECK_THAT(status == STATUS_OK || status == STATUS_INPUT, "%s: %s", dir, err.message);
-    return status == STATUS_OK;
+    return load_told(dir, &limits, pool, &scene, told, sizeof told) == STATUS_OK;
 }
 
 /* --- a bundle made here ----------------------------------------------------------------------- */

@@ -138,7 +138,8 @@ static void test_names(void) {
             CHECK_THAT(wanted ? name && strcmp(name, wanted) == 0 : !name, "row %zu, segment %zu: %s", i, k,
                        name ? name : "no name");
         }
-        s.id = mem_realloc_array(s.id, 4, sizeof *s.id); /* a part is split off the last one, as light/split.c does */
+        s.id = mem_realloc_array(s.id, 4,
+                                 sizeof *s.id); /* a part is split off the last one, as light/decision/split.c does */
         s.id[s.count++] = s.id[2];
         CHECK(segments_name(&s, &mesh, 3) == segments_name(&s, &mesh, 2));
         segments_release(&s);

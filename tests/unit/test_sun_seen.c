@@ -2,7 +2,7 @@
  * it was, also blurred as photographs blur it, and the sky about it is what it was; at a pole, around the seam. What is
  * cut by unseen or saturated directions, wide or weak stays. */
 #include "common/mem.h"
-#include "server/light/sun_seen.h"
+#include "server/light/sun/sun_seen.h"
 #include "server/scene/latlong.h"
 #include "tests/check.h"
 

@@ -1,6 +1,6 @@
 /* unseen_fit.h: points under a sky that is bright above, with light from below that is known. The map is
  * found again from what they show, emitters among them or not; and the corners of directions. */
-#include "server/light/unseen_fit.h"
+#include "server/light/sky/unseen_fit.h"
 
 #include <string.h>
 
