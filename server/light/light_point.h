@@ -3,7 +3,7 @@
 #ifndef UNBAKE_LIGHT_LIGHT_POINT_H
 #define UNBAKE_LIGHT_LIGHT_POINT_H
 
-#include "server/light/light_sky.h"
+#include "server/light/sky/light_sky.h"
 #include "server/light/survey.h"
 #include "server/scene/surface.h"
 

@@ -7,7 +7,7 @@
 #include "common/mem.h"
 #include "server/light/emitters.h"
 #include "server/light/light_model.h"
-#include "server/light/unseen_light.h"
+#include "server/light/sky/unseen_light.h"
 
 /* Standard deviations by which an opening is brighter than the mean of its prior. */
 #define SURE 2.0

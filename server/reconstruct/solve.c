@@ -10,7 +10,7 @@
 #include "server/gather/sun_caustics.h"
 #include "server/light/emitters.h"
 #include "server/light/light_estimate.h"
-#include "server/light/sun_refit.h"
+#include "server/light/sun/sun_refit.h"
 #include "server/material/detail.h"
 #include "server/material/divide_outgoing.h"
 #include "server/material/specular_fit.h"

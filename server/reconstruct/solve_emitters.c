@@ -6,9 +6,9 @@
 
 #include "common/mem.h"
 #include "common/ordered.h"
-#include "server/light/changing_light.h"
-#include "server/light/lambert_mean.h"
-#include "server/light/reflection.h"
+#include "server/light/decision/changing_light.h"
+#include "server/light/decision/lambert_mean.h"
+#include "server/light/decision/reflection.h"
 #include "server/material/emission_pattern.h"
 #include "server/reconstruct/inputs.h"
 #include "server/scene/by_segment.h"

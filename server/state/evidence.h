@@ -34,9 +34,9 @@ static inline void evidence_set_lambert(struct emitter_evidence *e, rgb lambert)
     e->emitted_share = radiance > 0.0f ? clampf(1.0f - rgb_mean(lambert) / radiance, 0.0f, 1.0f) : 0.0f;
 }
 
+#define EVIDENCE_AS_BRIGHT 0.7f /* least part of the segment's radiance: half a stop below */
+
 /* Whether a radiance is about that of the segment. */
-/* Least part of the segment's radiance: half a stop below. */
-#define EVIDENCE_AS_BRIGHT 0.7f
 static inline bool evidence_is_as_bright(const struct emitter_evidence *e, rgb radiance) {
     return rgb_mean(radiance) > EVIDENCE_AS_BRIGHT * rgb_mean(e->radiance);
 }

@@ -80,9 +80,4 @@ static inline uint32_t reconstruction_segment(const struct reconstruction *r, ui
     return r->segments.of_triangle[r->inverse.triangle[texel]];
 }
 
-/* Whether a texel is about as bright as its segment. */
-static inline bool evidence_is_bright(const struct reconstruction *r, uint32_t texel) {
-    return evidence_is_as_bright(&r->evidence[reconstruction_segment(r, texel)], fused_radiance(&r->fused, texel));
-}
-
 #endif

@@ -2,7 +2,7 @@
  * the sky and of a box around the room; nothing behind a wall; and the joint fit finds the sky's radiance from these
  * responses, which noise would make too small. sky_doubt.h: half of that sky, of bright texels alone. */
 #include "server/light/joint_fit.h"
-#include "server/light/sky_doubt.h"
+#include "server/light/decision/sky_doubt.h"
 #include "server/scene/rgb_half.h"
 #include "tests/render/light_response_rig.h"
 
@@ -141,7 +141,8 @@ static double doubt_between(const struct rig *g, float from, float to, double *w
             at.position.x < from || at.position.x > to)
             continue;
         texel[count++] = t;
-        if (!evidence_is_bright(&g->r, t))
+        const struct emitter_evidence *evidence = &g->r.evidence[reconstruction_segment(&g->r, t)];
+        if (!evidence_is_as_bright(evidence, fused_radiance(&g->r.fused, t)))
             continue;
         double area = (double)(HOLE * HOLE) / (PARTS * PARTS);
         for (int k = 0; k < PARTS * PARTS; k++) {

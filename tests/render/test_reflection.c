@@ -1,6 +1,6 @@
 /* reflection.h: a white glossy board under a window shows more than white paint would, by the window's highlight, and
  * is no lamp; a dim lamp in its place is one. */
-#include "server/light/reflection.h"
+#include "server/light/decision/reflection.h"
 #include "server/state/evidence.h"
 #include "tests/check.h"
 #include "tests/render/shell.h"

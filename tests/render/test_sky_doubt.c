@@ -1,6 +1,6 @@
 /* sky_doubt.h: a white sill under a sky that is brighter above than any photograph shows is no lamp, however white it
  * would have to be by what they show. */
-#include "server/light/sky_doubt.h"
+#include "server/light/decision/sky_doubt.h"
 #include "server/state/evidence.h"
 #include "tests/check.h"
 #include "tests/render/shell.h"

@@ -1,0 +1,38 @@
+/* reflection.h -- whether white paint, glossy perhaps, may show what a segment shows.
+ *
+ * L observed radiance, W what a white Lambertian surface of albedo 1 would send. A segment that reflects has, with the
+ * lobe c,
+ *
+ *   log L <= log(W (a + h_c)) + e,   a = ALBEDO_WHITE,   e ~ N(0, s),   s^2 = ALBEDO_WHITE_DEVIATION^2 + (f u)^2.
+ *
+ * h_c is the albedo that the lobe's highlight feigns: what it would reflect towards the photographs over W, their
+ * median, since L is one. Each lobe is as likely as the prior of gloss says (specular_posterior.h). u is the share of W
+ * that comes from unobserved sky, f the deviation of that. */
+#ifndef UNBAKE_LIGHT_DECISION_REFLECTION_H
+#define UNBAKE_LIGHT_DECISION_REFLECTION_H
+
+#include <math.h>
+
+#include "server/light/light_priors.h"
+#include "server/material/divide.h"
+#include "server/state/reconstruction.h"
+
+/* A segment emits if reflection shows as much more seldom than a normal deviate exceeds so many deviations. A false
+ * lamp takes the place of others' light, a missed one stays as base colour. */
+#define REFLECTION_DEVIATIONS 3.0f
+
+/* Least radiance, in W, of what surely emits, where nothing is glossy and this share of light is of a fitted sky. */
+static inline float reflection_limit(float fitted_share) {
+    float sky = (float)FIT_DEVIATION * fitted_share, white = (float)ALBEDO_WHITE_DEVIATION;
+    return (float)ALBEDO_WHITE * expf(REFLECTION_DEVIATIONS * sqrtf(white * white + sky * sky));
+}
+
+/* Sets `sky_lambert` and `reflection` of r->evidence[segment], with texel[count], by its `radiance` and `lambert`.
+ * `thread` picks of d->scratch. */
+void reflection_find(struct reconstruction *r, const struct divide *d, uint32_t segment, const uint32_t *texel,
+                     size_t count, int thread);
+
+/* Whether the segment emits by that. */
+bool reflection_is_unlikely(const struct emitter_evidence *evidence);
+
+#endif
