@@ -18,7 +18,7 @@
 #define BRIGHTER_SHARE 0.7f /* +25 %: no change */
 #define KEY_POINTS 29       /* separates these random numbers from others of the triangle */
 
-struct disk_usage_enter_job {
+struct triangle_light_job {
     const struct views *views;
     struct triangle_light *light;
 };
@@ -69,7 +69,7 @@ static float mean_of(const struct triangle_observations *observations, bool *is_
 
 static void measure(void *user, size_t index, int thread) {
     (void)thread;
-    const struct disk_usage_enter_job *job = user;
+    const struct triangle_light_job *job = user;
     const struct mesh *mesh = &job->views->scene->mesh;
     uint32_t triangle = (uint32_t)index, points = 1;
     vec3 cross = mesh_cross(mesh, triangle);
@@ -98,7 +98,7 @@ void triangle_light_measure(struct triangle_light *light, const struct views *vi
     light->mean = mem_array(count, sizeof *light->mean);
     light->pixels = mem_array(count, sizeof *light->pixels);
     light->is_bound = mem_calloc(count, sizeof *light->is_bound);
-    struct disk_usage_enter_job job = {views, light};
+    struct triangle_light_job job = {views, light};
     parallel_for(pool, count, measure, &job);
 }
 

@@ -39,7 +39,6 @@ struct prepare {
     const struct pace *pace;
     size_t flipped;      /* flipped triangles */
     const char *normals; /* their source: given, estimated, none */
-    float mesh_noise_m;  /* standard deviation of the vertices' noise; 0: not denoised */
     float roughness;     /* of a mesh whose normals are estimated */
     bool has_filled;     /* holes of the scan */
 };
@@ -81,7 +80,7 @@ static void report_capture(const struct prepare *p) {
     json_add_int(figures, "duplicate_triangles_dropped", (int64_t)mesh->duplicate_count);
     json_add_int(figures, "triangles_turned", (int64_t)p->flipped);
     json_add_string(figures, "normals", p->normals);
-    json_add_number(figures, "mesh_noise_m", (double)p->mesh_noise_m);
+    json_add_number(figures, "mesh_noise_m", (double)p->r->mesh_noise_m);
     json_add_number(figures, "mesh_roughness", (double)p->roughness);
     json_add_int(figures, "training_photographs", (int64_t)p->views->train_count);
     json_add_number(figures, "median_radiance", (double)p->views->median_radiance);
@@ -196,11 +195,11 @@ static enum status remap_surface(struct prepare *p, bool has_split, size_t coars
 static void denoise_mesh(struct prepare *p) {
     char line[128];
     if (settings_bool(p->r->settings, "denoise_mesh"))
-        p->mesh_noise_m = mesh_denoise(&p->r->scene->mesh, p->r->pool);
-    if (p->mesh_noise_m == 0.0f)
+        p->r->mesh_noise_m = mesh_denoise(&p->r->scene->mesh, p->r->pool);
+    if (p->r->mesh_noise_m == 0.0f)
         return;
     snprintf(line, sizeof line, "mesh: its vertices are off by %.2g mm; they were put back",
-             1e3 * (double)p->mesh_noise_m);
+             1e3 * (double)p->r->mesh_noise_m);
     p->pace->hooks->log(p->pace->hooks->user, line);
 }
 

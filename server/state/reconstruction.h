@@ -44,6 +44,7 @@ struct reconstruction {
     char left_out[512];              /* what a time limit left out, as a sentence; "": nothing */
     bool has_materials;              /* materials are not the initial ones */
     struct parallel *pool;           /* borrowed */
+    float mesh_noise_m; /* standard deviation of a scan's vertices (mesh_denoise.h); 0: modelled, or not denoised */
     struct segments segments;
     struct atlas atlas;
     struct inverse_uv inverse;

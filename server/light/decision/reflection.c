@@ -5,6 +5,7 @@
 #include "common/quantile.h"
 #include "server/gather/highlight.h"
 #include "server/light/decision/bright_texels.h"
+#include "server/light/decision/edge_light.h"
 #include "server/light/decision/sky_doubt.h"
 #include "server/material/specular_posterior.h"
 #include "server/render/sampler.h"
@@ -82,10 +83,11 @@ void reflection_find(struct reconstruction *r, const struct divide *d, uint32_t 
     e->reflection = (float)sum;
     if (!reflection_is_unlikely(e))
         return;
+    shown /= (double)edge_light(r, d, texel, count, thread);
     struct feigned *f = mem_alloc(sizeof *f);
     find_highlights(r, d, texel, count, thread, f);
     specular_prior((double)count / (double)r->inverse.valid_count, prior);
-    sum *= prior[SPECULAR_DIFFUSE];
+    sum = prior[SPECULAR_DIFFUSE] * tail(log(shown / ALBEDO_WHITE) / deviation);
     for (size_t c = 0; c < LOBES; c++) {
         float median = quantile(f->albedo[c], f->count, 0.5);
         sum += prior[c + 1] * tail(log(shown / (ALBEDO_WHITE + (double)median)) / deviation);
