@@ -10,8 +10,8 @@
 #include "server/state/reconstruction.h"
 
 /* How much more a surface of albedo 1 may send around the edges within reach of texel[count], all of one segment, than
- * there, by the median of the brighter of these; 1 where none is within reach, and for meshes that are no scans. `thread`
- * picks of d->scratch. */
+ * there, by the median of the brighter of these; 1 where none is within reach, and on meshes whose noise is not known
+ * (r->mesh_noise_m). `thread` picks of d->scratch. */
 float edge_light(const struct reconstruction *r, const struct divide *d, const uint32_t *texel, size_t count,
                  int thread);
 
