@@ -6,14 +6,15 @@
 #include "common/quantile.h"
 #include "server/gather/sun.h"
 #include "server/light/decision/bright_texels.h"
+#include "server/light/survey.h"
 #include "server/render/bsdf.h"
 #include "server/render/sampler.h"
 #include "server/scene/surface.h"
 
-/* How far edges may be off, over the noise of the vertices: fused depth frames have noise of a tenth of a voxel, and
- * round edges over three. */
+/* How far edges may be off, over the noise of the vertices: on a scan fused at 1.5 cm noise is a tenth of a voxel, and
+ * bars are rounded over three to four. */
 #define REACH 30.0f
-#define PLACES 32
+#define PLACES 32        /* texels of a segment, of which the median is taken */
 #define SIDES 8          /* directions in which an edge is looked for */
 #define RAYS 128         /* by which light is gathered */
 #define KEY_EDGE 0x3ed6u /* keeps these random numbers apart from others of the texel */
@@ -22,7 +23,7 @@ static float lambert_at(const struct divide *d, const struct surface_point *at, 
     struct irradiance light;
     irradiance_gather(&light, &d->scratch[thread], d->field, at, key, RAYS);
     sun_add_light(d->sun, d->accel, at, &light);
-    return rgb_mean(irradiance_diffuse(&light, at->shading, 1.0f, at->shading));
+    return rgb_mean(survey_lambert(at, &light));
 }
 
 /* Whether the surface ends within reach of a place in a direction along it; *beyond is a place there that faces that
