@@ -1,6 +1,8 @@
 /* environment.c -- see environment.h. */
 #include "server/capture/environment.h"
 
+#include <string.h>
+
 #include "common/mem.h"
 #include "common/quantile.h"
 #include "server/capture/fill.h"
@@ -39,6 +41,39 @@ vec3 environment_direction(const struct environment *e, size_t column, size_t ro
     return latlong_pixel(e->map.width, e->map.height, (double)column, (double)row);
 }
 
+/* --- what is not seen ------------------------------------------------------------------------ */
+
+bool *environment_known(const struct environment *e) {
+    size_t cells = environment_pixel_count(e), known_count = 0;
+    bool *is_unseen = mem_array(cells, sizeof *is_unseen), *is_known = mem_array(cells, sizeof *is_known);
+    float *to_unseen = mem_array(cells, sizeof *to_unseen);
+    for (size_t i = 0; i < cells; i++)
+        is_unseen[i] = !environment_pixel_is_seen(e, i);
+    fill_angles(e->map.width, e->map.height, is_unseen, to_unseen);
+    for (size_t i = 0; i < cells; i++) {
+        is_known[i] = !is_unseen[i] && to_unseen[i] > e->rim_angle;
+        known_count += is_known[i];
+    }
+    for (size_t i = 0; i < cells && known_count == 0; i++)
+        is_known[i] = !is_unseen[i];
+    mem_free(is_unseen);
+    mem_free(to_unseen);
+    return is_known;
+}
+
+void environment_fill(struct environment *e) {
+    size_t cells = environment_pixel_count(e);
+    bool *is_known = environment_known(e);
+    float *seen = mem_array(3 * cells, sizeof *seen);
+    memcpy(seen, e->map.pixel, 3 * cells * sizeof *seen);
+    fill_sphere(&e->map, is_known);
+    for (size_t i = 0; i < cells; i++)
+        if (environment_pixel_is_seen(e, i))
+            memcpy(e->map.pixel + 3 * i, seen + 3 * i, 3 * sizeof *seen);
+    mem_free(seen);
+    mem_free(is_known);
+}
+
 void environment_update_figures(struct environment *e) {
     size_t cells = environment_pixel_count(e), spread_count = 0;
     double all = 0.0, seen = 0.0, luminance = 0.0, seen_luminance = 0.0;
@@ -69,7 +104,7 @@ void environment_brighten(struct environment *e, const rgb factor[ENVIRONMENT_HA
     }
     for (size_t half = 0; half < ENVIRONMENT_HALVES; half++)
         e->brightened[half] = rgb_mul(e->brightened[half], factor[half]);
-    fill_sphere(&e->map, &e->confidence);
+    environment_fill(e);
     environment_update_figures(e);
 }
 

@@ -8,7 +8,8 @@
  * of the mesh), photographs from different places disagree about a direction; the map holds their median, and `spread`
  * is their disagreement. A direction seen only by frames that saturate below the radiance measured elsewhere counts as
  * unseen. Unseen directions are filled in smoothly from their surroundings (fill.h), which is a guess; a sun among them
- * is searched for by what it lights (sun_find.h). */
+ * is searched for by what it lights (sun_find.h). Through the gaps of a scan and beside its rounded edges photographs
+ * show the room itself: that lights what it lights, but nothing is filled in from it. */
 #ifndef UNBAKE_CAPTURE_ENVIRONMENT_H
 #define UNBAKE_CAPTURE_ENVIRONMENT_H
 
@@ -32,6 +33,7 @@ struct environment {
                               * in, and `spread`, the standard deviation of log radiance among them; owned */
     bool *is_bound;          /* [height][width] all of them saturate there: the map holds a lower bound; NULL after
                               * sun_draw; owned */
+    float rim_angle;         /* radians: how far the rims of openings may be off */
     rgb brightened[ENVIRONMENT_HALVES]; /* factors by which lower bounds were since (light_estimate.h) */
     size_t photograph_count;            /* with open pixels */
     double seen_share;                  /* of the sphere */
@@ -75,6 +77,13 @@ static inline rgb environment_pixel_radiance(const struct environment *e, size_t
 static inline bool environment_pixel_is_seen(const struct environment *e, size_t pixel) {
     return e->confidence.pixel[2 * pixel] > 0.0f;
 }
+
+/* [height][width] which pixels tell what is around them: those that are seen, farther from all that is not than
+ * rim_angle; all that are seen where none is. The caller's. */
+bool *environment_known(const struct environment *e);
+
+/* Fills in the pixels that are not seen. */
+void environment_fill(struct environment *e);
 
 /* The half of a unit direction. */
 static inline size_t environment_half(vec3 direction) { return direction.y < 0.0f; }

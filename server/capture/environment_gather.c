@@ -11,7 +11,6 @@
 #include "common/mem.h"
 #include "common/quantile.h"
 #include "server/capture/censored.h"
-#include "server/capture/fill.h"
 #include "server/scene/latlong.h"
 
 /* Metres: distance of a point that every camera of a room sees in the same direction; +25 %: no change. */
@@ -34,6 +33,8 @@ struct window {
     size_t pixel_count; /* open pixels */
     vec3 axis;          /* a cone around their directions */
     float cosine;
+    size_t rim_count; /* pixels beside open ones in a row that show surface, and the sum of 1 / their distance */
+    double nearness;
     int grid; /* sample points along each side of a pixel of the map */
 };
 
@@ -47,6 +48,22 @@ struct environment_windows {
 
 /* --- photographs with open pixels ------------------------------------------------------------ */
 
+/* Whether it lies beside an open pixel of its row. */
+static bool is_rim(const struct views *v, size_t train, uint32_t x, uint32_t y, uint32_t width) {
+    const uint8_t *row = v->shows[train] + (size_t)y * width;
+    return row[x] != VIEWS_OPEN && ((x > 0 && row[x - 1] == VIEWS_OPEN) || (x + 1 < width && row[x + 1] == VIEWS_OPEN));
+}
+
+static void add_rim(struct window *w, const struct views *v, const struct camera *camera, uint32_t x, uint32_t y) {
+    struct accel_hit hit;
+    vec3 direction;
+    if (!camera_direction(camera, (float)x + 0.5f, (float)y + 0.5f, &direction) ||
+        !accel_intersect(v->accel, camera_origin(camera), direction, 0.0f, INFINITY, &hit))
+        return;
+    w->nearness += 1.0 / (double)hit.distance_m;
+    w->rim_count++;
+}
+
 static void find_window(void *user, size_t train, int thread) {
     (void)thread;
     struct environment_windows *g = user;
@@ -59,6 +76,8 @@ static void find_window(void *user, size_t train, int thread) {
         for (uint32_t y = 0; y < camera->height; y++) {
             views_use(v, (uint32_t)train, (size_t)y * camera->width, camera->width);
             for (uint32_t x = 0; x < camera->width; x++) {
+                if (pass == 0 && is_rim(v, train, x, y, camera->width))
+                    add_rim(w, v, camera, x, y);
                 if (v->shows[train][(size_t)y * camera->width + x] != VIEWS_OPEN ||
                     !camera_direction(camera, (float)x + 0.5f, (float)y + 0.5f, &direction))
                     continue;
@@ -78,6 +97,16 @@ static void find_window(void *user, size_t train, int thread) {
 
 static const struct camera *camera_of(const struct environment_windows *g, const struct window *w) {
     return &g->views->scene->photograph[g->views->train[w->train]].camera;
+}
+
+/* Angle under which a length at the rims of openings appears. */
+static float angle_at_rims(const struct environment_windows *g, float length_m) {
+    double nearness = 0.0, count = 0.0;
+    for (size_t i = 0; i < g->window_count; i++) {
+        nearness += g->window[i].nearness;
+        count += (double)g->window[i].rim_count;
+    }
+    return count > 0.0 ? length_m * (float)(nearness / count) : 0.0f;
 }
 
 /* Keeps the photographs with open pixels and returns the width of the map; 0: there are none. */
@@ -297,13 +326,14 @@ static double saturated_share(const struct environment *e) {
 
 /* --- the whole ---------------------------------------------------------------------------------- */
 
-bool environment_gather(struct environment *e, const struct views *views, struct parallel *pool) {
+bool environment_gather(struct environment *e, const struct views *views, float edge_m, struct parallel *pool) {
     struct environment_windows g = {.views = views, .e = e};
     double saturated = -1.0;
     *e = (struct environment){0};
     uint32_t width = find_windows(&g, pool);
     if (width > 0) {
         environment_make_empty(e, width);
+        e->rim_angle = angle_at_rims(&g, edge_m);
         g.scratch = mem_array((size_t)parallel_thread_count(pool) * 3 * g.window_count, sizeof *g.scratch);
         parallel_for(pool, e->map.height, gather_row, &g);
         join_pole(e, 0);
@@ -313,7 +343,7 @@ bool environment_gather(struct environment *e, const struct views *views, struct
     }
     bool any = saturated >= 0.0; /* open pixels may all be masked */
     if (any) {
-        fill_sphere(&e->map, &e->confidence);
+        environment_fill(e);
         environment_update_figures(e);
         e->saturated_share = saturated;
         e->photograph_count = g.window_count;

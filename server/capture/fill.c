@@ -25,11 +25,11 @@ static double angle_of(const struct image *map, size_t pixel) {
 }
 
 /* Squared mean of square roots: robust to a sun. */
-static double typical_luminance(const struct image *map, const struct image *known) {
+static double typical_luminance(const struct image *map, const bool *is_known) {
     double sum = 0.0, weight = 0.0;
     for (size_t i = 0; i < (size_t)map->width * map->height; i++) {
         const float *p = map->pixel + 3 * i;
-        if (!(known->pixel[i * known->channel_count] > 0.0f))
+        if (!is_known[i])
             continue;
         double angle = angle_of(map, i);
         sum += angle * sqrt((double)rgb_luminance(rgb_make(p[0], p[1], p[2])));
@@ -77,28 +77,28 @@ static void pull_to_each_other(struct profile *p, size_t row, double weight, con
     }
 }
 
-static void add_pixel(struct profile *p, const struct image *map, const struct image *known, size_t i, double limit) {
-    size_t row = i / map->width, below = i + map->width, channels = known->channel_count;
+static void add_pixel(struct profile *p, const struct image *map, const bool *is_known, size_t i, double limit) {
+    size_t row = i / map->width, below = i + map->width;
     double anchor = 1.0 / ((double)p->height * (double)p->height);
-    if (!(known->pixel[i * channels] > 0.0f))
+    if (!is_known[i])
         return;
     rgb color = log_color(map, i, limit);
     p->matrix[row][1] += anchor;
     for (size_t c = 0; c < 3; c++)
         p->right[c * p->height + row] += anchor * (double)(&color.r)[c];
-    if (row + 1 < p->height && known->pixel[below * channels] > 0.0f) {
+    if (row + 1 < p->height && is_known[below]) {
         rgb differs = rgb_sub(log_color(map, below, limit), color);
         pull_to_each_other(p, row, 1.0, &differs.r);
     }
 }
 
 /* [height]; the caller's. */
-static rgb *row_colors(const struct image *map, const struct image *known, double limit) {
+static rgb *row_colors(const struct image *map, const bool *is_known, double limit) {
     struct profile p = {map->height, mem_calloc(map->height, sizeof *p.matrix),
                         mem_calloc(3 * (size_t)map->height, sizeof *p.right)};
     rgb *color = mem_array(map->height, sizeof *color);
     for (size_t i = 0; i < (size_t)map->width * map->height; i++)
-        add_pixel(&p, map, known, i, limit);
+        add_pixel(&p, map, is_known, i, limit);
     for (size_t y = 0; y + 1 < p.height; y++)
         pull_to_each_other(&p, y, ROWS_ALIKE / ((double)p.height * (double)p.height), (const float[3]){0});
     cholesky_band_factor(p.height, 1, &p.matrix[0][0]);
@@ -121,7 +121,7 @@ struct fill_level {
     float *angle;      /* [height] solid angle of a cell of each row; owned */
 };
 
-static void start_finest(struct fill_level *l, const struct image *map, const struct image *known, const rgb *row_color,
+static void start_finest(struct fill_level *l, const struct image *map, const bool *is_known, const rgb *row_color,
                          double limit) {
     *l = (struct fill_level){.width = map->width, .height = map->height};
     l->value = mem_calloc((size_t)l->width * l->height, sizeof *l->value);
@@ -129,7 +129,7 @@ static void start_finest(struct fill_level *l, const struct image *map, const st
     for (uint32_t y = 0; y < l->height; y++)
         l->angle[y] = (float)latlong_pixel_angle(l->width, l->height, y);
     for (size_t i = 0; i < (size_t)l->width * l->height; i++) {
-        if (!(known->pixel[i * known->channel_count] > 0.0f))
+        if (!is_known[i])
             continue;
         rgb differs = rgb_sub(log_color(map, i, limit), row_color[i / l->width]);
         for (int c = 0; c < 3; c++)
@@ -241,12 +241,12 @@ static void fill_pixel(struct image *map, size_t i, const float difference[4], r
     memcpy(map->pixel + 3 * i, &color, 3 * sizeof(float));
 }
 
-void fill_sphere(struct image *map, const struct image *known) {
+void fill_sphere(struct image *map, const bool *is_known) {
     struct fill_level level[32];
     int count = 1;
-    double limit = LUMINANCE_LIMIT * typical_luminance(map, known);
-    rgb *row_color = row_colors(map, known, limit);
-    start_finest(&level[0], map, known, row_color, limit);
+    double limit = LUMINANCE_LIMIT * typical_luminance(map, is_known);
+    rgb *row_color = row_colors(map, is_known, limit);
+    start_finest(&level[0], map, is_known, row_color, limit);
     for (; level[count - 1].height > 1; count++)
         pull(&level[count - 1], &level[count]);
     fill_coarsest(&level[count - 1]);
@@ -314,10 +314,10 @@ static float angle_at(const struct nearest_known *n, uint32_t pixel) {
     return known == pixel ? 0.0f : acosf(clampf(cosine_between(n, known, pixel), -1.0f, 1.0f));
 }
 
-static void nearest_init(struct nearest_known *n, const struct image *known) {
-    size_t pixels = (size_t)known->width * known->height;
-    *n = (struct nearest_known){known->width, known->height, mem_array(pixels, sizeof *n->of),
-                                mem_array(known->height, sizeof *n->row), mem_array(known->width, sizeof *n->column)};
+static void nearest_init(struct nearest_known *n, uint32_t width, uint32_t height, const bool *is_known) {
+    size_t pixels = (size_t)width * height;
+    *n = (struct nearest_known){width, height, mem_array(pixels, sizeof *n->of), mem_array(height, sizeof *n->row),
+                                mem_array(width, sizeof *n->column)};
     for (uint32_t y = 0; y < n->height; y++) {
         double theta = latlong_polar(n->height, y);
         n->row[y] = (vec2){(float)sin(theta), (float)cos(theta)};
@@ -327,12 +327,12 @@ static void nearest_init(struct nearest_known *n, const struct image *known) {
         n->column[x] = (vec2){(float)sin(phi), (float)cos(phi)};
     }
     for (size_t i = 0; i < pixels; i++)
-        n->of[i] = known->pixel[i * known->channel_count] > 0.0f ? (uint32_t)i : UNKNOWN;
+        n->of[i] = is_known[i] ? (uint32_t)i : UNKNOWN;
 }
 
-void fill_angles(const struct image *known, float *angle) {
+void fill_angles(uint32_t width, uint32_t height, const bool *is_known, float *angle) {
     struct nearest_known n;
-    nearest_init(&n, known);
+    nearest_init(&n, width, height, is_known);
     for (uint32_t y = 0; y < n.height; y++)
         propagate_row(&n, y, y > 0 ? y - 1 : y);
     for (uint32_t y = n.height; y-- > 0;)

@@ -9,15 +9,16 @@
 #ifndef UNBAKE_CAPTURE_FILL_H
 #define UNBAKE_CAPTURE_FILL_H
 
+#include <stdbool.h>
+
 #include "common/image.h"
 
-/* map: three channels, finite, not negative; width = 2 height, a power of two. Pixels whose first channel in `known`,
- * of the same size, is above 0 stay as they are; there must be one. The first and the last row of the fill have one
- * value each. */
-void fill_sphere(struct image *map, const struct image *known);
+/* map: three channels, finite, not negative; width = 2 height, a power of two. Pixels that are known stay as they are;
+ * there must be one. The first and the last row of the fill have one value each. is_known: [height][width]. */
+void fill_sphere(struct image *map, const bool *is_known);
 
-/* Angle in radians from each pixel of such a map to the nearest known one; slightly too large for some. angle:
+/* Angle in radians from each pixel of such a map to the nearest known one; slightly too large for some. is_known, angle:
  * [height][width]; INFINITY where nothing is known. */
-void fill_angles(const struct image *known, float *angle);
+void fill_angles(uint32_t width, uint32_t height, const bool *is_known, float *angle);
 
 #endif

@@ -340,7 +340,7 @@ static enum status measure_photographs(struct prepare *p, struct error *err) {
     noise_set_black(&r->noise, r->scene);
     clip_mark(r->scene, p->views, &r->noise, r->pool);
     fireflies_mark(r->scene, p->views, &r->noise, r->pool);
-    environment_gather(&r->environment, p->views, r->pool);
+    environment_gather(&r->environment, p->views, reconstruction_edge_m(r), r->pool);
     r->is_surrounded = p->has_filled && !shows_sky(p);
     sun_seen_take(&r->environment, &r->sun);
     prepare_environment(r);

@@ -71,7 +71,7 @@ static void test_recovers_sky(struct scene *scene) {
     for (int i = 0; i < 3; i++) {
         struct rig rig;
         rig_init(&rig, scene, threads[i]);
-        CHECK(environment_gather(&e, &rig.views, rig.pool));
+        CHECK(environment_gather(&e, &rig.views, 0.0f, rig.pool));
         digest(&e, i == 0 ? first : hex);
         if (i > 0)
             CHECK_STRING(hex, first);
@@ -125,7 +125,7 @@ static void test_exposures(const struct scene *scene, enum exposures how) {
         }
     }
     rig_init(&rig, &sdr, 2);
-    CHECK(environment_gather(&e, &rig.views, rig.pool));
+    CHECK(environment_gather(&e, &rig.views, 0.0f, rig.pool));
     double median, mean;
     compare_with_sky(&e, &median, &mean);
     printf("%s exposures: median error %.4f, mean %+.4f, saturated %.3f of it, %.3f of the sphere seen\n", name[how],
@@ -176,7 +176,7 @@ static void test_night(const struct scene *scene) {
         }
     }
     rig_init(&rig, &other, 2);
-    CHECK(environment_gather(&e, &rig.views, rig.pool));
+    CHECK(environment_gather(&e, &rig.views, 0.0f, rig.pool));
     for (size_t i = 0; i < 3 * (size_t)e.map.width * e.map.height; i++)
         CHECK(e.map.pixel[i] >= 0.0f);
     CHECK_THAT(e.seen_luminance < 0.6 * stored / count, "%g of %g", e.seen_luminance, stored / count);
@@ -195,7 +195,7 @@ static void test_outliers(const struct scene *scene) {
     for (size_t f = 0; f < scene->photograph_count; f += 6)
         other.photograph[f].gain = rgb_gray(f % 12 == 0 ? 0.1f : 5.0f);
     rig_init(&rig, &other, 2);
-    CHECK(environment_gather(&e, &rig.views, rig.pool));
+    CHECK(environment_gather(&e, &rig.views, 0.0f, rig.pool));
     double median, mean;
     compare_with_sky(&e, &median, &mean);
     printf("with outliers: median error %.4f, spread %.3f\n", median, e.median_spread);
@@ -217,7 +217,7 @@ static void test_wrong_poses(const struct scene *scene) {
         c->cy += 2.0f * fmodf((float)f * 0.755f, 1.0f) - 1.0f;
     }
     rig_init(&rig, &other, 2);
-    CHECK(environment_gather(&e, &rig.views, rig.pool));
+    CHECK(environment_gather(&e, &rig.views, 0.0f, rig.pool));
     double median, mean;
     compare_with_sky(&e, &median, &mean);
     printf("with wrong poses: median error %.4f, mean %+.4f\n", median, mean);
@@ -235,11 +235,11 @@ static void test_nothing(struct scene *masked, struct parallel *pool) {
     struct rig rig;
     make_scene(&closed, pool);
     rig_init(&rig, &closed, 1);
-    CHECK(!environment_gather(&e, &rig.views, rig.pool) && e.map.pixel == NULL);
+    CHECK(!environment_gather(&e, &rig.views, 0.0f, rig.pool) && e.map.pixel == NULL);
     rig_release(&rig);
     scene_release(&closed);
     rig_init(&rig, masked, 1);
-    CHECK(!environment_gather(&e, &rig.views, rig.pool));
+    CHECK(!environment_gather(&e, &rig.views, 0.0f, rig.pool));
     environment_release(&e);
     rig_release(&rig);
 }

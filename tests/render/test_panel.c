@@ -1,6 +1,7 @@
 /* test_panel.c -- a glossy panel of the wall's white, 2 cm before a matt wall, on a mesh as scans have it: even
  * triangles, steps rounded, no objects told. The photographs show the true room. */
 #include "server/reconstruct/reconstruct.h"
+#include "tests/render/scanned_mesh.h"
 #include "tests/render/shell.h"
 #include "tests/render/small_room.h"
 
@@ -34,26 +35,6 @@ static float wall_height(float x, float y) {
     float off = fminf(fminf(x - panel_low.x, panel_high.x - x), fminf(y - panel_low.y, panel_high.y - y));
     float t = clampf(off / STEP_M + 0.5f, 0.0f, 1.0f), turn = 6.2831853f / 0.4f;
     return panel_high.z * t * t * (3.0f - 2.0f * t) + 0.001f * sinf(turn * x) * sinf(turn * y + 1.0f);
-}
-
-/* A quad in even pieces. */
-static void add_scanned(struct mesh *m, float side_m, vec3 corner, vec3 u, vec3 v) {
-    uint32_t columns = (uint32_t)lrintf(vec3_length(u) / side_m), rows = (uint32_t)lrintf(vec3_length(v) / side_m);
-    uint32_t first = (uint32_t)m->vertex_count;
-    for (uint32_t k = 0; k < (columns + 1) * (rows + 1); k++) {
-        vec3 along = vec3_mad(corner, (float)(k % (columns + 1)) / (float)columns, u);
-        m->position[m->vertex_count++] = vec3_mad(along, (float)(k / (columns + 1)) / (float)rows, v);
-    }
-    for (uint32_t k = 0; k < columns * rows; k++) {
-        uint32_t a = first + k / columns * (columns + 1) + k % columns, up = a + columns + 1;
-        const uint32_t two[2][3] = {{a, a + 1, up + 1}, {a, up + 1, up}};
-        for (int t = 0; t < 2; t++) {
-            size_t i = m->triangle_count++;
-            memcpy(m->index[i], two[t], sizeof two[t]);
-            m->face[i] = (uint32_t)i;
-        }
-    }
-    m->face_count = m->triangle_count;
 }
 
 /* The wall with the panel first. */

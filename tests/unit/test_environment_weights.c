@@ -44,7 +44,7 @@ static void check_map(float short_clip, float wanted) {
     struct plane_rig rig;
     struct environment e;
     photograph_sky(&rig, short_clip);
-    CHECK(environment_gather(&e, &rig.views, rig.pool));
+    CHECK(environment_gather(&e, &rig.views, 0.0f, rig.pool));
     for (int k = 0; k < 4; k++) {
         vec3 d = {k & 1 ? 0.4f : -0.4f, k & 2 ? 0.4f : -0.4f, 1.0f};
         CHECK(environment_is_measured(&e, vec3_normalize(d)));

@@ -11,9 +11,6 @@
 #include "server/render/sampler.h"
 #include "server/scene/surface.h"
 
-/* How far edges may be off, over the noise of the vertices: on a scan fused at 1.5 cm noise is a tenth of a voxel, and
- * bars are rounded over three to four. */
-#define REACH 30.0f
 #define PLACES 32        /* texels of a segment, of which the median is taken */
 #define SIDES 8          /* directions in which an edge is looked for */
 #define RAYS 128         /* by which light is gathered */
@@ -52,7 +49,7 @@ static float ratio_at(const struct reconstruction *r, const struct divide *d, ui
     for (int i = 0; i < SIDES; i++) {
         float around = 2.0f * BSDF_PI * (float)i / SIDES;
         vec3 aside = vec3_add(vec3_scale(tangent, cosf(around)), vec3_scale(bitangent, sinf(around)));
-        if (find_edge(d->accel, &at, aside, REACH * r->mesh_noise_m, &beyond))
+        if (find_edge(d->accel, &at, aside, reconstruction_edge_m(r), &beyond))
             most = fmaxf(most, lambert_at(d, &beyond, key, thread));
     }
     return own > 0.0f ? most / own : 0.0f;

@@ -69,7 +69,9 @@ void light_sky_init(struct light_sky *s, const struct environment *environment) 
     if (!environment->map.pixel)
         return;
     s->angle = mem_array(environment_pixel_count(environment), sizeof *s->angle);
-    fill_angles(&environment->confidence, s->angle);
+    bool *is_known = environment_known(environment);
+    fill_angles(environment->map.width, environment->map.height, is_known, s->angle);
+    mem_free(is_known);
     average_fill(s);
     measure_bounds(s);
 }
