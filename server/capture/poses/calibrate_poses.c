@@ -37,8 +37,17 @@ static double shift_of(const struct pose_solver *s, size_t f, const struct camer
     return count ? sqrt(squares / (double)count) : 0.0;
 }
 
+static size_t free_count(const struct pose_solver *s) {
+    size_t count = 0;
+    for (size_t f = 0; f < s->frames; f++)
+        count += !s->frame[f].is_fixed;
+    return count;
+}
+
 static void run_rounds(struct pose_solver *s, int level, int rounds) {
     s->level = level;
+    if (free_count(s) == 0)
+        return;
     for (int round = 0; round < rounds; round++) {
         pose_linearise(s);
         pose_reweight(s);
@@ -171,10 +180,7 @@ static double shift_along_walk(const struct pose_solver *s, size_t f) {
 
 /* Where photographs were surely moved the tracker may drift: then those that are not sure follow their neighbours. */
 static void add_drift(struct pose_solver *s, size_t held_out_count, int coarsest) {
-    size_t sure_count = 0;
-    for (size_t f = 0; f < s->frames; f++)
-        sure_count += !s->frame[f].is_fixed;
-    if (sure_count < MIN_SURE)
+    if (free_count(s) < MIN_SURE)
         return;
     double *before = mem_calloc(2 * held_out_count + 1, sizeof *before), *now = before + held_out_count;
     double *x = mem_array(s->unknowns + 1, sizeof *x);

@@ -10,7 +10,7 @@
 /* Of scales and offsets before the first step. */
 #define SETTLE_ROUNDS 4
 #define ROUNDS 30 /* Gauss-Newton steps, at most; a motion that takes more is not found */
-/* Pixels: a step that ends the rounds; steps become shorter by a fifth at least, so that .02 are left. */
+/* Pixels: a step that ends the rounds; about twice as much is left. */
 #define STEP_PX 0.005
 /* Standard deviations of the prior: what depth cameras' calibrations (.1 degree) and trackers leave, and more. It decides
  * only where the photographs leave a motion open, as along the only plane. */
@@ -32,6 +32,8 @@ struct motion_system {
     double (*cluster)[POSE_UNKNOWNS]; /* [frames + places] sums of scores; owned */
     double information[POSE_UNKNOWNS][POSE_UNKNOWNS], gradient[POSE_UNKNOWNS];
     double first[POSE_UNKNOWNS]; /* the gradient where the bundle tells the cameras */
+    double last[POSE_UNKNOWNS];  /* the step before, as the equations have it, and the factor by which it was taken */
+    double factor;
 };
 
 /* --- the motion -------------------------------------------------------------------------------- */
@@ -289,6 +291,23 @@ static void settle(struct motion_system *system, vec3 centre) {
     }
 }
 
+/* Factor of a step: the gradient changes by a part of what the equations foretell, so that steps fall short; two of them
+ * tell by how much (Irons & Tuck 1969, A version of the Aitken accelerator for computer iteration). */
+static double factor_of(struct motion_system *system, const double right[POSE_UNKNOWNS]) {
+    double change = 0.0, square = 0.0;
+    for (int k = 0; k < POSE_UNKNOWNS; k++) {
+        double differs = system->last[k] - right[k];
+        change += system->last[k] * differs;
+        square += differs * differs;
+    }
+    if (system->factor > 0.0 && square > 0.0)
+        system->factor = fmin(fmax(system->factor * change / square, 1.0), 1.0 / MIN_RESPONSE);
+    else
+        system->factor = 1.0;
+    memcpy(system->last, right, sizeof system->last);
+    return system->factor;
+}
+
 /* One step of Gauss-Newton; the largest shift that it makes, pixels. */
 static double step(struct motion_system *system, struct pose_registration *registration, double motion[POSE_UNKNOWNS]) {
     struct pose_solver *s = system->solver;
@@ -297,9 +316,11 @@ static double step(struct motion_system *system, struct pose_registration *regis
     if (!cholesky_factor(POSE_UNKNOWNS, POSE_UNKNOWNS, &system->information[0][0]))
         return INFINITY;
     cholesky_solve(POSE_UNKNOWNS, POSE_UNKNOWNS, &system->information[0][0], right);
+    double factor = factor_of(system, right);
     for (int k = 0; k < POSE_UNKNOWNS; k++) {
-        motion[k] += right[k];
         squares += right[k] * right[k];
+        right[k] *= factor;
+        motion[k] += right[k];
     }
     step_offsets(system, right);
     set_motion(registration, motion, system->depth_m);
