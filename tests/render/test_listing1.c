@@ -72,7 +72,7 @@ static double refine_figure(const struct reconstruction *r, const char *name) {
 }
 
 static const char few_looks[] = "{\"texture_size\":64,\"refine_looks\":%d,\"time_limit_sec\":%d,\"report_samples\":2,"
-                                "\"gather_samples\":64,\"texels_per_iteration\":512}";
+                                "\"calibrate\":false,\"gather_samples\":64,\"texels_per_iteration\":512}";
 
 /* Goes on from the checkpoint, if there is one, to so many looks, or to the limit: the iterations by then. */
 static double run_looks(struct scene *scene, struct shell *shell, int wanted, int limit_sec, double *looks) {
@@ -168,8 +168,8 @@ int main(void) {
     struct parallel *pool = parallel_new(0);
     make_scene(&scene, pool);
     parallel_free(pool);
-    test_same_bytes(&scene, true, 4,
-                    "{\"texture_size\":64,\"iterations\":4,\"report_samples\":2,"
+    test_same_bytes(&scene, true, 2,
+                    "{\"texture_size\":64,\"iterations\":2,\"report_samples\":2,"
                     "\"gather_samples\":64,\"texels_per_iteration\":256}");
     /* One iteration at each of the coarse levels, the first of which decides on emitters, and two at the finest. What
      * goes before is that of the run above, but for the calibration, which takes a third of the time. */
