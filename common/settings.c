@@ -59,8 +59,9 @@ static const struct setting table[] = {
     {"hold_out_every", SETTING_INT, "frames", 0, 1000000, NULL, "10", NULL,
      "where the capture holds out no frame, every how many-th is; 0: none"},
     {"holes", SETTING_CHOICE, "", 0, 0, "auto|fill|keep", "auto", NULL,
-     "holes of the mesh that photographs look through: auto fills those where photographs show that a wall, floor or ceiling "
-     "goes on; fill all that lie in one; keep none, so that they are windows. Where some are filled and no bright sky is seen "
+     "holes of the mesh: auto fills those where photographs show that a wall, floor or ceiling "
+     "goes on, and where no objects are told apart, as on a scan, those that no photograph shows and a plane's surface is all "
+     "around; fill all that lie in one; keep none, so that they are windows. Where some are filled and no bright sky is seen "
      "through the rest, light that comes in there is given a place: surfaces outside the mesh, each named opening"},
     {"iterations", SETTING_INT, "", 0, 1e9, NULL, "0", NULL,
      "optimiser steps; 0: as many as refine_looks or listing1_looks take"},

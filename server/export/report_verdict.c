@@ -89,7 +89,8 @@ static void put_holes(struct buf *out, const cJSON *report) {
     double filled = number_at(report, "holes", "filled"), kept = number_at(report, "holes", "openings_kept");
     if (filled > 0.0)
         buf_printf(
-            out, "<p>%.0f hole%s of the mesh %s filled, %.2g m², where photographs show that a surface goes on.</p>",
+            out,
+            "<p>%.0f hole%s of the mesh %s filled, %.2g m², where photographs, or the surface all around, show that it goes on.</p>",
             filled, filled == 1.0 ? "" : "s", filled == 1.0 ? "was" : "were", number_at(report, "holes", "filled_m2"));
     if (kept > 0.0)
         buf_printf(out,

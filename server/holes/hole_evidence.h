@@ -27,7 +27,7 @@ struct hole_region {
     struct hole_scatter here, away; /* by cell; by direction */
     double beside;                  /* variance of the plane's covered cells */
     double step, usual_step;        /* medians of the change of log radiance across the rim, and beside it */
-    bool is_hole;
+    bool is_hole, is_hidden;        /* hidden: no photograph shows it (hidden_holes.h), and nothing above */
 };
 
 struct hole_regions {

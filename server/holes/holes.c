@@ -1,6 +1,7 @@
 /* holes.c -- see holes.h. */
 #include "server/holes/holes.h"
 
+#include "server/holes/hidden_holes.h"
 #include "server/holes/hole_surface.h"
 
 #define LEAST_LISTED 4 /* cells of a region that the report has */
@@ -27,6 +28,7 @@ static void list_region(struct holes_found *found, const struct hole_grid *grid,
     vec3 at = hole_plane_corner(grid, plane, number % plane->columns, number / plane->columns);
     cJSON *entry = cJSON_CreateObject();
     json_add_bool(entry, "filled", is_filled);
+    json_add_bool(entry, "hidden", region->is_hidden);
     json_add(entry, "place", cJSON_CreateDoubleArray((double[]){(double)at.x, (double)at.y, (double)at.z}, 3));
     json_add_number(entry, "m2", region->cells * (double)grid->side_m * (double)grid->side_m);
     json_add_int(entry, "pixels", (int64_t)region->observations);
@@ -54,17 +56,19 @@ static void report(struct holes_found *found, const struct hole_grid *grid, cons
     }
 }
 
-void holes_fill(struct scene *scene, struct segments *segments, const struct views *views, bool fills_all,
-                const vec3 within[2], struct parallel *pool, struct holes_found *found) {
+void holes_fill(struct scene *scene, struct segments *segments, const struct views *views,
+                const struct holes_wanted *wanted, struct parallel *pool, struct holes_found *found) {
     struct hole_grid grid;
     struct hole_observations observations;
     struct hole_regions holes, kept;
     *found = (struct holes_found){0};
     if (!any_open(views))
         return;
-    hole_grid_init(&grid, &scene->mesh, views->accel, within, pool);
+    hole_grid_init(&grid, &scene->mesh, views->accel, wanted->within, pool);
     hole_observations_take(&observations, &grid, views, pool);
-    hole_regions_find(&holes, &kept, &grid, &observations, fills_all);
+    hole_regions_find(&holes, &kept, &grid, &observations, wanted->fills_all);
+    if (wanted->fills_hidden)
+        hidden_holes_add(&holes, &grid, &scene->mesh, views->accel);
     report(found, &grid, &holes, &kept);
     found->triangles = hole_surface_add(&scene->mesh, segments, &grid, &holes);
     hole_regions_release(&kept);

@@ -4,18 +4,24 @@
  * taken for distant light, and light the room. Where the room's own planes go on through it (room_planes.h), each cell
  * of them (hole_grid.h) is looked at by all photographs (hole_observations.h); connected cells become surface where the
  * photographs agree that there is one, and stay open where they show a window, a door or another room (hole_regions.h,
- * hole_evidence.h).
+ * hole_evidence.h). So do, on a scan, those that no photograph shows but that lie within a plane (hidden_holes.h).
  *
- * Limits. Holes that no photograph shows, that are narrower than a cell, or that lie off the widest planes stay open:
- * what comes in through them is found by server/light/openings.h. Where photographs cannot tell a plain wall from
- * distant light, it is closed only if radiance goes on across its rim: an opening that is closed by mistake takes away
- * light that is then looked for elsewhere, a hole that stays open adds light that is measured, if at the wrong
- * distance. */
+ * Limits. Holes that are narrower than a cell, or that lie off the widest planes, stay open: what comes in through them
+ * is found by server/light/openings.h. Where photographs cannot tell a plain wall from distant light, it is closed only
+ * if radiance goes on across its rim: an opening that is closed by mistake takes away light that is then looked for
+ * elsewhere, a hole that stays open adds light that is measured, if at the wrong distance. */
 #ifndef UNBAKE_HOLES_HOLES_H
 #define UNBAKE_HOLES_HOLES_H
 
 #include "common/json.h"
 #include "server/capture/views.h"
+
+struct holes_wanted {
+    bool fills_all;    /* also what is an opening by the evidence */
+    bool fills_hidden; /* also what no photograph shows */
+    const vec3
+        *within; /* [2] lower and upper corner of a box that nothing is filled outside of; NULL: none; borrowed */
+};
 
 struct holes_found {
     size_t filled, kept; /* regions */
@@ -25,10 +31,9 @@ struct holes_found {
 };
 
 /* Fills holes of scene->mesh, whose triangles `segments` divides and `views` see: the mesh, whose arrays may be moved,
- * and the segments grow. `fills_all`: also what is an opening by the evidence. `within`: lower and upper corner of a
- * box that nothing is filled outside of; NULL: none. Poses and exposures must be known. When triangles were added, what
- * was made of the mesh must be made again. The same for any number of threads. */
-void holes_fill(struct scene *scene, struct segments *segments, const struct views *views, bool fills_all,
-                const vec3 within[2], struct parallel *pool, struct holes_found *found);
+ * and the segments grow. Poses and exposures must be known. When triangles were added, what was made of the mesh must
+ * be made again. The same for any number of threads. */
+void holes_fill(struct scene *scene, struct segments *segments, const struct views *views,
+                const struct holes_wanted *wanted, struct parallel *pool, struct holes_found *found);
 
 #endif

@@ -307,8 +307,10 @@ static enum status fill_holes(struct prepare *p, struct error *err) {
         const double *c = k == 0 ? lower : upper, *offset = r->scene->mesh.offset;
         box[k] = vec3_make((float)(c[0] - offset[0]), (float)(c[1] - offset[1]), (float)(c[2] - offset[2]));
     }
-    holes_fill(r->scene, &r->segments, p->views, settings_is(r->settings, "holes", "fill"), is_cropped ? box : NULL,
-               r->pool, &found);
+    struct holes_wanted wanted = {.fills_all = settings_is(r->settings, "holes", "fill"),
+                                  .fills_hidden = !r->scene->mesh.object_id, /* what is modelled is meant */
+                                  .within = is_cropped ? box : NULL};
+    holes_fill(r->scene, &r->segments, p->views, &wanted, r->pool, &found);
     report_holes(p, &found);
     p->has_filled = found.triangles > 0;
     return found.triangles > 0 ? remake_surface(p, NULL, err) : STATUS_OK;

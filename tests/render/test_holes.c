@@ -1,5 +1,6 @@
 /* test_holes.c -- a room of 4 x 3 x 3 m whose mesh lacks 2 x 1.5 m of a wall, photographed with what may be there: the
- * wall, painted or plain; sky, clouded or plain; a room beyond; nothing. Photographs are closed forms. */
+ * wall, painted or plain; sky, clouded or plain; a room beyond; nothing. Photographs are closed forms. Or it lacks what
+ * none of them shows: a part of the wall behind a panel, the floor within a block that reaches the ceiling. */
 #include "server/holes/holes.h"
 
 #include "common/image.h"
@@ -76,11 +77,42 @@ static void take(struct holed *room, size_t frame) {
     }
 }
 
-static void make(struct holed *room, enum shown shown, int threads) {
+/* A wall with a window, a panel 10 cm before it, and no wall behind the panel; a block at the opposite wall, within
+ * which there is no floor, ceiling or wall. */
+static void make_hidden_mesh(struct mesh *m) {
+    const vec3 x = {4, 0, 0};
+    const float low[2] = {1.5f, 2.65f}, high[2] = {2.5f, 3.0f}; /* of the block, along x and z */
+    start_room(m, OBJECTS + 18);
+    m->vertex_count = m->triangle_count = 0;
+    add_quad(m, FLOOR, (vec3){0, 0, 0}, (vec3){0, 0, low[1]}, x);
+    add_quad(m, FLOOR, (vec3){0, 0, low[1]}, (vec3){0, 0, high[1] - low[1]}, (vec3){low[0], 0, 0});
+    add_quad(m, FLOOR, (vec3){high[0], 0, low[1]}, (vec3){0, 0, high[1] - low[1]}, (vec3){4.0f - high[0], 0, 0});
+    add_quad(m, 1, (vec3){0, 3, 0}, x, (vec3){0, 0, low[1]});
+    add_quad(m, 1, (vec3){0, 3, low[1]}, (vec3){low[0], 0, 0}, (vec3){0, 0, high[1] - low[1]});
+    add_quad(m, 1, (vec3){high[0], 3, low[1]}, (vec3){4.0f - high[0], 0, 0}, (vec3){0, 0, high[1] - low[1]});
+    add_quad(m, 2, (vec3){0, 0, 0}, (vec3){0, 3, 0}, (vec3){0, 0, 3});
+    add_quad(m, 3, (vec3){4, 0, 0}, (vec3){0, 0, 3}, (vec3){0, 3, 0});
+    add_quad(m, 5, (vec3){0, 0, 3}, (vec3){0, 3, 0}, (vec3){low[0], 0, 0});
+    add_quad(m, 5, (vec3){high[0], 0, 3}, (vec3){0, 3, 0}, (vec3){4.0f - high[0], 0, 0});
+    add_quad(m, LAMP, (vec3){low[0], 0, low[1]}, (vec3){0, 3, 0}, (vec3){high[0] - low[0], 0, 0});
+    add_quad(m, LAMP, (vec3){low[0], 0, low[1]}, (vec3){0, 0, high[1] - low[1]}, (vec3){0, 3, 0});
+    add_quad(m, LAMP, (vec3){high[0], 0, low[1]}, (vec3){0, 3, 0}, (vec3){0, 0, high[1] - low[1]});
+    add_quad(m, WALL, (vec3){0, 2.75f, 0}, x, (vec3){0, 0.25f, 0});
+    add_quad(m, WALL, (vec3){0, 1.25f, 0}, (vec3){1, 0, 0}, (vec3){0, 1.5f, 0});
+    add_quad(m, WALL, (vec3){3, 1.25f, 0}, (vec3){1, 0, 0}, (vec3){0, 1.5f, 0});
+    add_quad(m, WALL, (vec3){0, 0.7f, 0}, x, (vec3){0, 0.55f, 0});
+    add_quad(m, WALL, (vec3){0, 0, 0}, (vec3){1.3f, 0, 0}, (vec3){0, 0.7f, 0});
+    add_quad(m, WALL, (vec3){2.7f, 0, 0}, (vec3){1.3f, 0, 0}, (vec3){0, 0.7f, 0});
+    add_quad(m, LAMP, (vec3){1, 0, 0.1f}, (vec3){2, 0, 0}, (vec3){0, 1.2f, 0});
+}
+
+#define HIDDEN_M2 0.98 /* behind the panel, down to the floor */
+
+static void make_of(struct holed *room, void make_mesh_of(struct mesh *m), enum shown shown, int threads) {
     struct error err = {0};
     *room = (struct holed){.shown = shown, .pool = parallel_new(threads)};
     struct mesh *mesh = &room->scene.mesh;
-    make_mesh_with_window(mesh);
+    make_mesh_of(mesh);
     mesh->uv = mem_calloc(mesh->triangle_count, sizeof *mesh->uv);
     segments_from_object_id(&room->segments, &room->scene.mesh);
     CHECK(accel_new(&room->accel, &room->scene.mesh, room->pool, &err) == STATUS_OK);
@@ -104,6 +136,10 @@ static void make(struct holed *room, enum shown shown, int threads) {
     views_init(&room->views, &room->scene, &room->segments, room->accel, room->pool);
 }
 
+static void make(struct holed *room, enum shown shown, int threads) {
+    make_of(room, make_mesh_with_window, shown, threads);
+}
+
 static void release(struct holed *room) {
     views_release(&room->views);
     accel_free(room->accel);
@@ -115,7 +151,8 @@ static void release(struct holed *room) {
 /* Fills; returns the number of triangles there were before. */
 static size_t fill(struct holed *room, bool fills_all, struct holes_found *found) {
     size_t before = room->scene.mesh.triangle_count;
-    holes_fill(&room->scene, &room->segments, &room->views, fills_all, NULL, room->pool, found);
+    struct holes_wanted wanted = {.fills_all = fills_all, .fills_hidden = true};
+    holes_fill(&room->scene, &room->segments, &room->views, &wanted, room->pool, found);
     CHECK(room->scene.mesh.triangle_count == before + found->triangles);
     cJSON_Delete(found->list);
     return before;
@@ -176,6 +213,27 @@ static void test_opening(enum shown shown) {
     release(&room);
 }
 
+/* The wall goes on behind the panel; the window stays open, and nothing is filled in within the block. */
+static void test_hidden(void) {
+    struct holed room;
+    struct holes_found found;
+    double area_m2 = 0.0;
+    make_of(&room, make_hidden_mesh, PLAIN_SKY, 2);
+    size_t before = fill(&room, false, &found);
+    const struct mesh *mesh = &room.scene.mesh;
+    size_t elsewhere = 0;
+    for (size_t t = before; t < mesh->triangle_count; t++) {
+        elsewhere += room.segments.id[room.segments.of_triangle[t]] != WALL ||
+                     fabsf(mesh->position[mesh->index[t][0]].z) > 0.01f;
+        area_m2 += 0.5 * (double)vec3_length(mesh_cross(mesh, t));
+    }
+    CHECK_THAT(elsewhere == 0, "%zu triangles elsewhere", elsewhere);
+    CHECK_THAT(found.filled == 1 && found.kept == 1, "%zu filled, %zu kept", found.filled, found.kept);
+    CHECK_NEAR(found.filled_m2, HIDDEN_M2, 0.1);
+    CHECK_NEAR(area_m2, HIDDEN_M2, 0.3); /* it goes on behind the rim */
+    release(&room);
+}
+
 /* What was cropped stays away: here all beyond x = 2 m. */
 static void test_cropped(void) {
     const vec3 within[2] = {{-10.0f, -10.0f, -10.0f}, {2.0f, 10.0f, 10.0f}};
@@ -184,7 +242,8 @@ static void test_cropped(void) {
     float farthest_m = 0.0f;
     make(&room, PAINTED_WALL, 2);
     size_t before = room.scene.mesh.vertex_count;
-    holes_fill(&room.scene, &room.segments, &room.views, false, within, room.pool, &found);
+    struct holes_wanted wanted = {.within = within};
+    holes_fill(&room.scene, &room.segments, &room.views, &wanted, room.pool, &found);
     cJSON_Delete(found.list);
     for (size_t v = before; v < room.scene.mesh.vertex_count; v++)
         farthest_m = fmaxf(farthest_m, room.scene.mesh.position[v].x);
@@ -228,11 +287,34 @@ static void test_reconstruction(const char *json, bool fills) {
     release(&room);
 }
 
+/* What no photograph shows is filled in on a scan, but not where objects are told apart. */
+static void test_hidden_of(bool is_scan, const char *json) {
+    struct holed room;
+    struct settings s = shell_settings(json);
+    struct shell shell = {.polls_until_stop = -1};
+    struct reconstruction r;
+    make_of(&room, make_hidden_mesh, PLAIN_SKY, 2);
+    if (is_scan) {
+        mem_free(room.scene.mesh.object_id);
+        room.scene.mesh.object_id = NULL;
+    }
+    CHECK(shell_run(&room.scene, &s, 2, &shell, &r) == STATUS_OK);
+    const cJSON *report = cJSON_GetObjectItem(r.report, "holes");
+    CHECK_NEAR(cJSON_GetNumberValue(cJSON_GetObjectItem(report, "filled_m2")), is_scan ? HIDDEN_M2 : 0.0, 0.1);
+    const cJSON *first = cJSON_GetArrayItem(cJSON_GetObjectItem(report, "regions"), 0);
+    CHECK(cJSON_IsTrue(cJSON_GetObjectItem(first, "hidden")) == is_scan);
+    reconstruct_release(&r);
+    shell_release(&shell);
+    settings_release(&s);
+    release(&room);
+}
+
 #define LITTLE "\"texture_size\":64,\"report_samples\":1,\"gather_samples\":16,\"iterations\":2,\"calibrate\":false"
 
 int main(void) {
     test_hole(PAINTED_WALL);
     test_hole(PLAIN_WALL);
+    test_hidden();
     test_opening(FAINT_CLOUDS);
     test_opening(CLOUDED_SKY);
     test_opening(PLAIN_SKY);
@@ -242,5 +324,7 @@ int main(void) {
     test_threads();
     test_reconstruction("{" LITTLE "}", true);
     test_reconstruction("{" LITTLE ",\"holes\":\"keep\"}", false);
+    test_hidden_of(true, "{" LITTLE "}");
+    test_hidden_of(false, "{" LITTLE "}");
     return check_result();
 }
