@@ -33,8 +33,8 @@ struct window {
     size_t pixel_count; /* open pixels */
     vec3 axis;          /* a cone around their directions */
     float cosine;
-    size_t rim_count; /* pixels beside open ones in a row that show surface, and the sum of 1 / their distance */
-    double nearness;
+    size_t rim_count; /* pixels beside open ones in a row that show surface, and the sum of their distances */
+    double rim_m;
     int grid; /* sample points along each side of a pixel of the map */
 };
 
@@ -60,7 +60,7 @@ static void add_rim(struct window *w, const struct views *v, const struct camera
     if (!camera_direction(camera, (float)x + 0.5f, (float)y + 0.5f, &direction) ||
         !accel_intersect(v->accel, camera_origin(camera), direction, 0.0f, INFINITY, &hit))
         return;
-    w->nearness += 1.0 / (double)hit.distance_m;
+    w->rim_m += (double)hit.distance_m;
     w->rim_count++;
 }
 
@@ -99,14 +99,14 @@ static const struct camera *camera_of(const struct environment_windows *g, const
     return &g->views->scene->photograph[g->views->train[w->train]].camera;
 }
 
-/* Angle under which a length at the rims of openings appears. */
+/* Angle under which a length at the rims of openings appears, at their mean distance. */
 static float angle_at_rims(const struct environment_windows *g, float length_m) {
-    double nearness = 0.0, count = 0.0;
+    double distance_m = 0.0, count = 0.0;
     for (size_t i = 0; i < g->window_count; i++) {
-        nearness += g->window[i].nearness;
+        distance_m += g->window[i].rim_m;
         count += (double)g->window[i].rim_count;
     }
-    return count > 0.0 ? length_m * (float)(nearness / count) : 0.0f;
+    return distance_m > 0.0 ? length_m * (float)(count / distance_m) : 0.0f;
 }
 
 /* Keeps the photographs with open pixels and returns the width of the map; 0: there are none. */

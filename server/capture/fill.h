@@ -17,8 +17,8 @@
  * there must be one. The first and the last row of the fill have one value each. is_known: [height][width]. */
 void fill_sphere(struct image *map, const bool *is_known);
 
-/* Angle in radians from each pixel of such a map to the nearest known one; slightly too large for some. is_known, angle:
- * [height][width]; INFINITY where nothing is known. */
+/* Angle in radians from each pixel of such a map to the nearest known one; slightly too large for some. is_known,
+ * angle: [height][width]; INFINITY where nothing is known. */
 void fill_angles(uint32_t width, uint32_t height, const bool *is_known, float *angle);
 
 #endif

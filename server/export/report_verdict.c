@@ -90,7 +90,7 @@ static void put_holes(struct buf *out, const cJSON *report) {
     if (filled > 0.0)
         buf_printf(
             out,
-            "<p>%.0f hole%s of the mesh %s filled, %.2g m², where photographs, or the surface all around, show that it goes on.</p>",
+            "<p>%.0f hole%s of the mesh %s filled, %.2g m², where photographs or what is all around show a surface.</p>",
             filled, filled == 1.0 ? "" : "s", filled == 1.0 ? "was" : "were", number_at(report, "holes", "filled_m2"));
     if (kept > 0.0)
         buf_printf(out,

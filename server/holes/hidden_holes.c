@@ -2,10 +2,8 @@
 #include "server/holes/hidden_holes.h"
 
 #include <math.h>
-#include <string.h>
 
 #include "common/mem.h"
-#include "common/rng.h"
 
 #define LEAST_CONTACT 2 /* cells of a region that are beside covered ones */
 /* Planes behind which so little of the mesh's vertices lies, by more than a cell, end the room: window reveals are

@@ -71,11 +71,11 @@ struct reconstruction {
     cJSON *report;             /* object, filled by the stages; owned */
 };
 
-/* The surface, for functions that need nothing else of the state; valid as long as r. */
-/* How far edges of the mesh may be off; 0 where its noise is not known. On a scan fused at 1.5 cm the noise of vertices is
- * a tenth of a voxel, and edges are rounded over three to four. */
+/* How far edges of the mesh may be off; 0 where its noise is not known. On a scan fused at 1.5 cm the noise of vertices
+ * is a tenth of a voxel, and edges are rounded over three to four. */
 static inline float reconstruction_edge_m(const struct reconstruction *r) { return 30.0f * r->mesh_noise_m; }
 
+/* The surface, for functions that need nothing else of the state; valid as long as r. */
 static inline struct surface reconstruction_surface(const struct reconstruction *r) {
     return (struct surface){&r->scene->mesh, &r->segments, &r->atlas, &r->inverse};
 }

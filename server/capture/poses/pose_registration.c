@@ -291,8 +291,8 @@ static void settle(struct motion_system *system, vec3 centre) {
     }
 }
 
-/* Factor of a step: the gradient changes by a part of what the equations foretell, so that steps fall short; two of them
- * tell by how much (Irons & Tuck 1969, A version of the Aitken accelerator for computer iteration). */
+/* Factor of a step: the gradient changes by a part of what the equations foretell, so that steps fall short; two of
+ * them tell by how much (Irons & Tuck 1969, A version of the Aitken accelerator for computer iteration). */
 static double factor_of(struct motion_system *system, const double right[POSE_UNKNOWNS]) {
     double change = 0.0, square = 0.0;
     for (int k = 0; k < POSE_UNKNOWNS; k++) {
