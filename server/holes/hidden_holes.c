@@ -163,8 +163,8 @@ static void take_region(struct hidden_search *s, struct hole_regions *holes, uin
     }
 }
 
-size_t hidden_holes_add(struct hole_regions *holes, struct hole_grid *grid, const struct mesh *mesh,
-                        const struct accel *accel) {
+void hidden_holes_add(struct hole_regions *holes, struct hole_grid *grid, const struct mesh *mesh,
+                      const struct accel *accel) {
     struct hidden_search s = {.grid = grid,
                               .shown_count = holes->count,
                               .kind = mem_array(grid->cell_count + 1, sizeof *s.kind),
@@ -182,5 +182,4 @@ size_t hidden_holes_add(struct hole_regions *holes, struct hole_grid *grid, cons
     mem_free(list);
     mem_free(s.is_closed);
     mem_free(s.kind);
-    return holes->count - s.shown_count;
 }

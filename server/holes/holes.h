@@ -17,10 +17,9 @@
 #include "server/capture/views.h"
 
 struct holes_wanted {
-    bool fills_all;    /* also what is an opening by the evidence */
-    bool fills_hidden; /* also what no photograph shows */
-    const vec3
-        *within; /* [2] lower and upper corner of a box that nothing is filled outside of; NULL: none; borrowed */
+    bool fills_all;     /* also what is an opening by the evidence */
+    bool fills_hidden;  /* also what no photograph shows */
+    const vec3 *within; /* [2] corners, the lower first, of a box outside of which nothing is filled; NULL: none */
 };
 
 struct holes_found {
