@@ -90,11 +90,11 @@ static void put_holes(struct buf *out, const cJSON *report) {
     if (filled > 0.0)
         buf_printf(
             out,
-            "<p>%.0f hole%s of the mesh %s filled, %.2g m², where photographs or what is all around show a surface.</p>",
+            "<p>%.0f hole%s of the mesh %s filled, %.3g m², where photographs or what is all around show a surface.</p>",
             filled, filled == 1.0 ? "" : "s", filled == 1.0 ? "was" : "were", number_at(report, "holes", "filled_m2"));
     if (kept > 0.0)
         buf_printf(out,
-                   "<p>%.0f opening%s of the mesh, %.2g m², %s taken for a way out of the room: a window, a door.</p>",
+                   "<p>%.0f opening%s of the mesh, %.3g m², %s taken for a way out of the room: a window, a door.</p>",
                    kept, kept == 1.0 ? "" : "s", number_at(report, "holes", "openings_m2"), kept == 1.0 ? "is" : "are");
     put_light_of_openings(out, report);
 }

@@ -41,8 +41,9 @@ int main(void) {
     CHECK(says(bad, "2 sources of light in no photograph"));
     CHECK(says(bad, "brightness of 1 source of light is uncertain: the standard deviation is up to 50 %"));
     CHECK(!says(bad, "No weakness is known"));
-    const char *holes = "{\"holes\": {\"filled\": 2, \"filled_m2\": 3.25, \"openings_kept\": 1, \"openings_m2\": 0.5}}";
-    CHECK(says(holes, "2 holes of the mesh were filled, 3.2 m²"));
+    const char *holes =
+        "{\"holes\": {\"filled\": 2, \"filled_m2\": 145.2, \"openings_kept\": 1, \"openings_m2\": 0.5}}";
+    CHECK(says(holes, "2 holes of the mesh were filled, 145 m²"));
     CHECK(says(holes, "1 opening of the mesh, 0.5 m², is taken for a way out"));
     CHECK(!says(good, "of the mesh"));
     CHECK(!says(holes, "nothing was scanned"));
