@@ -16,7 +16,7 @@ static const struct setting table[] = {
     {"base_color_rate", SETTING_REAL, "", 1e-5, 1, NULL, "0.03", "listing1",
      "listing1: first step size of base colour; it falls over the run"},
     {"calibrate", SETTING_BOOL, "", 0, 0, NULL, "true", NULL,
-     "look for faults of the capture (exposure, colour, vignette, poses, blur) and put them right"},
+     "look for faults of the capture (exposure, colour, vignette, tones, poses, blur) and put them right"},
     {"cameras_per_texel", SETTING_INT, "", 1, 64, NULL, "2", NULL,
      "photographs that one visit of a texel is compared with"},
     {"choose", SETTING_CHOICE, "", 0, 0, "texels|pixels", "texels", NULL,

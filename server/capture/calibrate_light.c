@@ -24,11 +24,13 @@
 #define MIN_GAIN 0.04        /* +25 %: no change */
 #define MIN_SIGNIFICANCE 3.0 /* +25 %: no change */
 #define MIN_DRIFT 0.025      /* +25 %: no change */
+/* Of a tone curve, rms over encoded values: gloss imitates .004. */
+#define MIN_BEND 0.02
 
 /* --- model selection --------------------------------------------------------------------------- */
 
 /* Robust cost of each held-out point, with residuals in units of `scale`. Returns their number. */
-static size_t held_out_costs(const struct light_fit *f, const double *x, double scale, double *cost) {
+static size_t held_out_costs(const struct light_fit *f, int model, const double *x, double scale, double *cost) {
     size_t used = 0;
     for (size_t p = 0; p < f->o->point_count; p++) {
         if (!light_fit_is_held_out(f, p))
@@ -37,7 +39,7 @@ static size_t held_out_costs(const struct light_fit *f, const double *x, double 
         double weight[OVERLAP_OBSERVATIONS_MAX], square[OVERLAP_OBSERVATIONS_MAX];
         memcpy(weight, f->prior_weight + first, count * sizeof *weight);
         for (int round = 0; round < COST_ROUNDS; round++) {
-            light_fit_residuals(f, x, p, weight, square);
+            light_fit_residuals(f, model, x, p, weight, square);
             for (size_t i = 0; i < count; i++)
                 weight[i] = f->prior_weight[first + i] / (1.0 + LIGHT_CAUCHY * square[i] / (scale * scale));
         }
@@ -67,9 +69,18 @@ static double drift_of(const struct light_fit *f, const double *x) {
     return sqrt(squares / fmax(1.0, (double)(f->frames - f->unknown_exposure_count)));
 }
 
-/* Forward selection: accepts faults one by one, the one with the largest gain first. Returns the model; x is its
- * solution. */
-static int choose_model(struct light_fit *f, double *x) {
+/* Whether a fault is large enough to be one. */
+static bool is_sizeable(const struct light_fit *f, int fault, const double *x) {
+    const double *term = x + light_fit_parameter_count(f) - TONE_TERMS;
+    double squares = 0.0;
+    for (size_t k = 0; k < TONE_TERMS; k++)
+        squares += term[k] * term[k];
+    return fault == LIGHT_DRIFT ? drift_of(f, x) > MIN_DRIFT : fault != LIGHT_TONES || squares > MIN_BEND * MIN_BEND;
+}
+
+/* Forward selection: accepts those faults one by one, a tone curve before all others, since free exposures imitate it with
+ * many numbers, then the one with the largest gain. Returns the model; x is its solution. */
+static int choose_model(struct light_fit *f, int faults, double *x) {
     size_t n = light_fit_parameter_count(f), points = f->o->point_count / LIGHT_HELD_OUT_EVERY + 1, used;
     double *base = mem_array(points, sizeof *base), *cost = mem_array(points, sizeof *cost);
     double *trial = mem_array(n, sizeof *trial), *best = mem_array(n, sizeof *best);
@@ -79,15 +90,17 @@ static int choose_model(struct light_fit *f, double *x) {
         double most = MIN_GAIN, scale;
         light_fit_solve(f, model, x);
         scale = f->scale;
-        held_out_costs(f, x, scale, base);
-        for (int fault = LIGHT_DRIFT; fault < LIGHT_FAULTS; fault *= 2) {
-            if ((model & fault) || (fault == LIGHT_DRIFT && f->unknown_exposure_count == f->frames))
+        held_out_costs(f, model, x, scale, base);
+        for (int fault = LIGHT_TONES; fault <= LIGHT_ALL && chosen != LIGHT_TONES; fault *= 2) {
+            if ((model & fault) || !(faults & fault) ||
+                (fault == LIGHT_DRIFT && f->unknown_exposure_count == f->frames) ||
+                (fault == LIGHT_TONES && !f->may_bend))
                 continue;
             memcpy(trial, x, n * sizeof *trial);
             light_fit_solve(f, model | fault, trial);
-            used = held_out_costs(f, trial, scale, cost);
+            used = held_out_costs(f, model | fault, trial, scale, cost);
             double gain = gain_of(base, cost, used);
-            if (gain > most && (fault != LIGHT_DRIFT || drift_of(f, trial) > MIN_DRIFT)) {
+            if (gain > most && is_sizeable(f, fault, trial)) {
                 most = gain;
                 chosen = fault;
                 memcpy(best, trial, n * sizeof *best);
@@ -115,7 +128,7 @@ static double spread(const struct light_fit *f, const double *x) {
         for (int c = 0; c < 3; c++) {
             double sum = 0.0, square = 0.0;
             for (size_t i = first; i < first + count; i++) {
-                double y = (double)f->o->observation[i].value[c] - light_fit_predict(f, x, i, c);
+                double y = light_fit_value(f, i, c) - light_fit_predict(f, x, i, c);
                 sum += y;
                 square += y * y;
             }
@@ -155,10 +168,12 @@ static void apply(const struct light_fit *f, int model, const double *x, struct 
         for (size_t k = 0; k < 3; k++)
             scene->photograph[i].vignette[k] += (float)x[3 * f->frames + k];
     }
+    if (model & LIGHT_TONES)
+        tone_straighten(&f->tones, scene);
 }
 
 void calibrate_light(struct scene *scene, const struct views *views, const struct atlas *atlas,
-                     const struct inverse_uv *inverse, bool faults, struct parallel *pool, struct light_found *found) {
+                     const struct inverse_uv *inverse, int faults, struct parallel *pool, struct light_found *found) {
     struct overlaps overlaps;
     struct light_fit fit;
     size_t points = POINTS_PER_FRAME * views->train_count;
@@ -167,16 +182,20 @@ void calibrate_light(struct scene *scene, const struct views *views, const struc
     light_fit_init(&fit, views, &overlaps);
     double *x = mem_calloc(light_fit_parameter_count(&fit), sizeof *x);
     *found = (struct light_found){.exposures_solved = fit.unknown_exposure_count, .spread_before = spread(&fit, x)};
-    int model = faults ? choose_model(&fit, x) : 0;
+    int model = faults != 0 ? choose_model(&fit, faults, x) : 0;
     if (model != 0 || fit.unknown_exposure_count > 0) {
         fit.all_points = true;
         light_fit_solve(&fit, model, x);
+    } else {
+        light_fit_bend(&fit, x); /* not the one that was tried last */
     }
     fix_gauge(&fit, model, x);
     found->spread_after = spread(&fit, x);
     found->drift = (model & LIGHT_DRIFT) != 0;
     found->white_balance = (model & LIGHT_COLOR) != 0;
     found->vignette = (model & LIGHT_VIGNETTE) != 0;
+    found->tones = (model & LIGHT_TONES) != 0;
+    memcpy(found->curve.term, x + light_fit_parameter_count(&fit) - TONE_TERMS, sizeof found->curve.term);
     apply(&fit, model, x, scene);
     mem_free(x);
     light_fit_release(&fit);

@@ -47,6 +47,7 @@ static bool observe_cross(const struct photograph *photo, struct overlap_observa
         if (!(sum[c] > 0.0) || (float)(sum[c] / 5.0) * stored * gain[c] < black)
             return false;
         observation->value[c] = (float)log(sum[c] / 5.0);
+        observation->level[c] = observation->value[c] + logf(stored * gain[c]);
         observation->min_value[c] = logf(dark / (stored * gain[c]));
         observation->max_value[c] = logf(BRIGHT_SHARE * photo->clip / (stored * gain[c]));
     }

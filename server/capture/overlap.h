@@ -25,6 +25,7 @@ struct overlap_observation {
     float cosine;                     /* between the normal and the direction to the camera */
     float value[3];                   /* log radiance, by the present exposure, gain and falloff */
     float min_value[3], max_value[3]; /* range in which `value` is usable: between dark and clipped, with margin */
+    float level[3];                   /* log of the stored value */
     float contrast;                   /* standard deviation of the cross over its mean */
 };
 

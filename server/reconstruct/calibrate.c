@@ -17,8 +17,8 @@
 
 static void log_light(const struct reconstruction *r, const struct light_found *found,
                       const struct reconstruct_hooks *hooks) {
-    char line[256], vignette[80] = "";
-    if (found->exposures_solved == 0 && !found->drift && !found->white_balance && !found->vignette)
+    char line[320], vignette[80] = "";
+    if (found->exposures_solved == 0 && !found->drift && !found->white_balance && !found->vignette && !found->tones)
         return;
     if (found->vignette) {
         const float *v = r->scene->photograph[0].vignette;
@@ -26,10 +26,11 @@ static void log_light(const struct reconstruction *r, const struct light_found *
                  100.0 * exp((double)(v[0] + v[1] + v[2])));
     }
     snprintf(line, sizeof line,
-             "calibration: %zu exposures solved%s%s%s; photographs of one place now differ by %.3f "
+             "calibration: %zu exposures solved%s%s%s%s; photographs of one place now differ by %.3f "
              "(rms of the logarithm), before by %.3f",
              found->exposures_solved, found->drift ? ", given exposures drift" : "",
-             found->white_balance ? ", white balance changes" : "", vignette, found->spread_after,
+             found->white_balance ? ", white balance changes" : "", vignette,
+             found->tones ? ", the camera bends tones, which are straightened" : "", found->spread_after,
              found->spread_before);
     hooks->log(hooks->user, line);
 }
@@ -65,16 +66,24 @@ static struct photograph *save_claims(const struct scene *scene) {
     return claim;
 }
 
-static void find_light(struct reconstruction *r, struct views *views, const struct photograph *claim,
-                       struct light_found *found) {
+/* Light anew, from what the bundle claims. */
+static void find_faults(struct reconstruction *r, struct views *views, const struct photograph *claim, int faults,
+                        struct light_found *found) {
     for (size_t i = 0; i < r->scene->photograph_count; i++) {
         struct photograph *photo = &r->scene->photograph[i];
         photo->exposure = claim[i].exposure;
         photo->gain = claim[i].gain;
         memcpy(photo->vignette, claim[i].vignette, sizeof photo->vignette);
     }
-    calibrate_light(r->scene, views, &r->atlas, &r->inverse, settings_bool(r->settings, "calibrate"), r->pool, found);
+    faults = settings_bool(r->settings, "calibrate") ? faults : 0;
+    calibrate_light(r->scene, views, &r->atlas, &r->inverse, faults, r->pool, found);
     views_update_median(views);
+}
+
+/* Tones are straightened once, before anything else: pixels have no former state to return to. */
+static void find_light(struct reconstruction *r, struct views *views, const struct photograph *claim,
+                       struct light_found *found) {
+    find_faults(r, views, claim, LIGHT_ALL & ~LIGHT_TONES, found);
 }
 
 static void update_edges(struct reconstruction *r, struct views *views, const struct poses_found *found) {
@@ -219,6 +228,23 @@ static void log_poses(const struct poses_found *poses, const struct blur_found *
     }
 }
 
+/* What some linear values of the files come to once the camera's curve is taken off, over what 1 comes to. */
+static cJSON *report_tones(const struct tone_curve *curve) {
+    static const double stored[] = {0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0};
+    enum { COUNT = sizeof stored / sizeof *stored };
+    double straight[COUNT];
+    struct tone_table *table = mem_array(1, sizeof *table);
+    tone_table_init(table);
+    tone_table_set(table, curve);
+    for (size_t i = 0; i < COUNT; i++)
+        straight[i] = exp(tone_straight(table, log(stored[i])) - tone_straight(table, 0.0));
+    mem_free(table);
+    cJSON *report = cJSON_CreateObject();
+    json_add(report, "stored", cJSON_CreateDoubleArray(stored, COUNT));
+    json_add(report, "straight", cJSON_CreateDoubleArray(straight, COUNT));
+    return report;
+}
+
 static void report_light(const struct reconstruction *r, const struct light_found *found, cJSON *report) {
     const float *v = r->scene->photograph[0].vignette;
     const double vignette[3] = {(double)v[0], (double)v[1], (double)v[2]};
@@ -226,18 +252,19 @@ static void report_light(const struct reconstruction *r, const struct light_foun
     json_add_bool(report, "exposure_drift", found->drift);
     json_add_bool(report, "white_balance_drift", found->white_balance);
     json_add(report, "vignette", found->vignette ? cJSON_CreateDoubleArray(vignette, 3) : cJSON_CreateNull());
+    json_add(report, "tone_curve", found->tones ? report_tones(&found->curve) : cJSON_CreateNull());
     json_add_number(report, "spread_before", found->spread_before);
     json_add_number(report, "spread_after", found->spread_after);
 }
 
 void calibrate(struct reconstruction *r, struct views *views, const struct reconstruct_hooks *hooks) {
-    struct photograph *claim = save_claims(r->scene);
-    struct light_found light;
+    struct light_found light, first;
     struct poses_found poses = {0};
     struct blur_found blur = {0};
     struct pose_registration registration = {0};
-    find_light(r, views, claim, &light);
-    double spread_before = light.spread_before;
+    struct photograph *claim = save_claims(r->scene);
+    find_faults(r, views, claim, LIGHT_ALL, &first);
+    light = first;
     if (settings_bool(r->settings, "calibrate")) {
         struct tracks tracks;
         tracks_make(&tracks, views, r->pool);
@@ -246,7 +273,9 @@ void calibrate(struct reconstruction *r, struct views *views, const struct recon
         calibrate_blur(r->scene, &tracks, &blur);
         tracks_release(&tracks);
     }
-    light.spread_before = spread_before;
+    light.spread_before = first.spread_before;
+    light.tones = first.tones;
+    light.curve = first.curve;
     r->exposures_drift = light.drift;
     r->colors_drift = light.white_balance;
     log_light(r, &light, hooks);

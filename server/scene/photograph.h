@@ -29,6 +29,7 @@ struct photograph {
     struct camera camera;
     bool is_test; /* held out: never used to reconstruct */
     bool is_hdr;
+    bool is_straight; /* the camera's tone curve was found and is taken off its pixels (capture/tone_curve.h) */
     bool exposure_known;
     float exposure;          /* pixel value per radiance; 1 until it is solved where not known */
     float settings_exposure; /* seconds ISO / 100 / f-number^2 of the camera, where all three are told; else 0 */

@@ -9,7 +9,9 @@
 #
 # FIDELITY_QUALITY  setting quality of a reconstruction (standard)
 # FIDELITY_ROOMS  names under the test data's rooms/, or paths ("staircase2 bathroom")
-# FIDELITY_KINDS  "hdr sdr scan phone"
+# FIDELITY_CONTRAST  of tones: 0 none, .6 much (.6)
+# FIDELITY_KINDS  "hdr sdr scan phone"; also tones: ordinary frames, each of an automatic exposure that is told, of a camera
+#                 with contrast (tone_curve.py; takes numpy, OpenEXR and pillow from PyPI into BUILD/retinex)
 #
 # scan and phone: the mesh that a scan of the room gives, and that with drifting poses and one 8-bit exposure a view of a
 # phone (rooms/NAME-scan, rooms/NAME-phone), judged by scan_scores: pixels where the scan has a hole are left out, and
@@ -41,7 +43,7 @@ row() { # WHAT VALUE GOAL BETTER
 }
 
 measure() { # ROOM KIND
-    local name=${1##*/} dir room label transforms=transforms.json color roughness overlap log_error msre
+    local name=${1##*/} dir room from label transforms=transforms.json color roughness overlap log_error msre
     room=$1
     [ "$name" = "$1" ] && room=$data/rooms/$1
     dir=$build/fidelity/$name-$2
@@ -54,7 +56,12 @@ measure() { # ROOM KIND
     rm -rf "$dir"
     mkdir -p "$dir"
     echo "== $label" >&2
-    reconstruct "$room" "$dir/out" texture_size=2048 "quality=$quality" \
+    from=$room
+    if [ "$2" = tones ]; then
+        from=$dir/room
+        picture_python && "$python" tests/bench/tone_curve.py "$room" "$from" "${FIDELITY_CONTRAST:-0.6}" || return
+    fi
+    reconstruct "$from" "$dir/out" texture_size=2048 "quality=$quality" \
         "transforms=$transforms" report_samples=1 &&
         evaluate "$room" "$dir/out" --spp 64 --pictures "$dir" &&
         jq -r '[.stages[] | "\(.name) \(.seconds | round) s"] | join(", ")' "$dir/out/report.json" >&2

@@ -58,3 +58,15 @@ mitsuba_ready() {
         return 1
     }
 }
+
+# Sets python to one that has numpy, OpenEXR and pillow, from PyPI in $build/retinex; false where they are not to be had.
+picture_python() {
+    python=$build/retinex/bin/python
+    [ -x "$python" ] || python3 -m venv "$build/retinex" >&2
+    "$python" -c 'import numpy, OpenEXR, PIL' 2>/dev/null ||
+        timeout 300 "$build/retinex/bin/pip" install -q numpy==2.4.6 OpenEXR==3.5.3 pillow==13.0.0 >&2
+    "$python" -c 'import numpy, OpenEXR, PIL' 2>/dev/null || {
+        echo "numpy, OpenEXR and pillow are not to be had" >&2
+        return 1
+    }
+}

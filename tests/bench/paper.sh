@@ -94,18 +94,12 @@ fig7() {
 # Fig. 8: everything at once; then, in the long form, 8192 x 8192.
 # Fig. 4: one photograph, that of a held-out view, against a single-image method.
 fig4() {
-    local room=$data/rooms/staircase2 out=$dir/fig4 view=1 frame=014 python=$build/retinex/bin/python
+    local room=$data/rooms/staircase2 out=$dir/fig4 view=1 frame=014
     if [ ! -e "$room/truth/$frame.exr" ]; then
         echo "no $room: fig4 is left out" >&2
         return
     fi
-    [ -x "$python" ] || python3 -m venv "$build/retinex" >&2
-    "$python" -c 'import numpy, OpenEXR, PIL' 2>/dev/null ||
-        timeout 300 "$build/retinex/bin/pip" install -q numpy==2.4.6 OpenEXR==3.5.3 pillow==13.0.0 >&2
-    if ! "$python" -c 'import numpy, OpenEXR, PIL' 2>/dev/null; then
-        echo "numpy, OpenEXR and pillow are not to be had: fig4 is left out" >&2
-        return
-    fi
+    picture_python || return
     run "$room" "$out" && rm -rf "$out.view" &&
         "$build/unbaked" relight "$out" --out "$out.view" --set passes=base_color --set format=exr --set view=$view --quiet &&
         "$python" tests/bench/retinex.py "$room/images/$frame.exr" "$room/truth/$frame.exr" \
