@@ -151,10 +151,8 @@ static void project(const struct light_fit *f, int model, double *x) {
     }
     for (size_t k = 0; k < 3 && !(model & LIGHT_VIGNETTE); k++)
         x[3 * f->frames + k] = 0.0;
-    /* Free exposures would explain any power: it stays as it is. */
-    bool are_free = (model & LIGHT_DRIFT) || 2 * f->unknown_exposure_count > f->frames;
     for (size_t k = 0; k < TONE_TERMS; k++) {
-        if (!(model & LIGHT_TONES) || (k == TONE_POWER && are_free))
+        if (!(model & LIGHT_TONES) || (k == TONE_POWER && light_fit_is_power_open(f, model)))
             x[first_term(f) + k] = 0.0;
     }
 }

@@ -56,6 +56,11 @@ void light_fit_release(struct light_fit *f);
 
 static inline size_t light_fit_parameter_count(const struct light_fit *f) { return 3 * f->frames + 3 + TONE_TERMS; }
 
+/* Whether a model has free exposures, which explain any power of all radiances: that of the curve stays as it is. */
+static inline bool light_fit_is_power_open(const struct light_fit *f, int model) {
+    return (model & LIGHT_DRIFT) || 2 * f->unknown_exposure_count > f->frames;
+}
+
 static inline bool light_fit_is_held_out(const struct light_fit *f, size_t point) {
     return !f->all_points && point % LIGHT_HELD_OUT_EVERY == 0;
 }

@@ -33,6 +33,12 @@ static void log_light(const struct reconstruction *r, const struct light_found *
              found->tones ? ", the camera bends tones, which are straightened" : "", found->spread_after,
              found->spread_before);
     hooks->log(hooks->user, line);
+    if (found->tones && found->is_power_open)
+        hooks->warning(
+            hooks->user,
+            "The camera bends tones, and the exposures are not told: its contrast is known but for a power of "
+            "all brightnesses, by which base colours may be off. Photographs with EXIF, or an exposure for each "
+            "frame of transforms.json, tell it.");
 }
 
 static cJSON *gain_array(rgb gain) {

@@ -156,6 +156,7 @@ static void test_tones(struct painted *room, enum exposures exposures, float sha
     CHECK(found.tones == (share != 0.0f) && !found.vignette && !found.white_balance && !found.drift);
     CHECK_THAT(before >= before_at_least && after <= after_at_most, "%g, then %g", before, after);
     CHECK(room->scene.photograph[7].is_straight == found.tones); /* held out */
+    CHECK(found.is_power_open == (exposures == UNTOLD));
     found = run(room, LIGHT_ALL);
     CHECK(!found.tones); /* once */
 }
