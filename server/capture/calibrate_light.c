@@ -24,8 +24,6 @@
 #define MIN_GAIN 0.04        /* +25 %: no change */
 #define MIN_SIGNIFICANCE 3.0 /* +25 %: no change */
 #define MIN_DRIFT 0.025      /* +25 %: no change */
-/* Of a tone curve, rms over encoded values: gloss imitates .004. */
-#define MIN_BEND 0.02
 
 /* --- model selection --------------------------------------------------------------------------- */
 
@@ -69,15 +67,6 @@ static double drift_of(const struct light_fit *f, const double *x) {
     return sqrt(squares / fmax(1.0, (double)(f->frames - f->unknown_exposure_count)));
 }
 
-/* Whether a fault is large enough to be one. */
-static bool is_sizeable(const struct light_fit *f, int fault, const double *x) {
-    const double *term = x + light_fit_parameter_count(f) - TONE_TERMS;
-    double squares = 0.0;
-    for (size_t k = 0; k < TONE_TERMS; k++)
-        squares += term[k] * term[k];
-    return fault == LIGHT_DRIFT ? drift_of(f, x) > MIN_DRIFT : fault != LIGHT_TONES || squares > MIN_BEND * MIN_BEND;
-}
-
 /* Forward selection: accepts those faults one by one, a tone curve before all others, since free exposures imitate it with
  * many numbers, then the one with the largest gain. Returns the model; x is its solution. */
 static int choose_model(struct light_fit *f, int faults, double *x) {
@@ -100,7 +89,7 @@ static int choose_model(struct light_fit *f, int faults, double *x) {
             light_fit_solve(f, model | fault, trial);
             used = held_out_costs(f, model | fault, trial, scale, cost);
             double gain = gain_of(base, cost, used);
-            if (gain > most && is_sizeable(f, fault, trial)) {
+            if (gain > most && (fault != LIGHT_DRIFT || drift_of(f, trial) > MIN_DRIFT)) {
                 most = gain;
                 chosen = fault;
                 memcpy(best, trial, n * sizeof *best);

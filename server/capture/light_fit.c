@@ -9,8 +9,8 @@
  * observations. Parameters outside the model are projected out of each step; the preconditioner has one number a frame,
  * so it commutes with the projection.
  *
- * A curve that pressed all observations of a point together would make them agree. So residuals are those of the stored
- * values, F's argument, and the basis is taken where the consensus of the point foretells the value. */
+ * A curve that pressed all observations of a point together would make them agree. So the cost by which they are judged is
+ * that of the stored values, F's argument, and the basis is taken where the consensus of the point foretells the value. */
 #include "server/capture/light_fit.h"
 
 #include <math.h>
@@ -46,10 +46,7 @@
 #define CG_TOLERANCE 1e-7 /* of the residual's norm, over that of the right-hand side */
 
 /* No curve. */
-static void forget_bend(struct light_fit *f) {
-    for (size_t i = 0; i < f->o->start[f->o->point_count]; i++)
-        f->bend[i] = (struct light_bend){.slope = {1.0f, 1.0f, 1.0f}};
-}
+static void forget_bend(struct light_fit *f) { memset(f->bend, 0, f->o->start[f->o->point_count] * sizeof *f->bend); }
 
 void light_fit_init(struct light_fit *f, const struct views *views, const struct overlaps *o) {
     size_t observations = o->start[o->point_count];
@@ -115,24 +112,19 @@ static double bent_by(const struct light_fit *f, const double *x, size_t observa
     return sum;
 }
 
-static double weight_of(const struct light_fit *f, size_t observation, int channel) {
-    double slope = (double)f->bend[observation].slope[channel];
-    return f->weight[observation] / (slope * slope);
-}
-
 /* out += A' W (I - M) z for one point and channel; z[] by observation of the point. */
 static void scatter(const struct light_fit *f, size_t point, int channel, const double *z, double *out) {
     size_t first = f->o->start[point], count = f->o->start[point + 1] - first;
     double sum = 0.0, weight = 0.0;
     for (size_t i = 0; i < count; i++) {
-        sum += weight_of(f, first + i, channel) * z[i];
-        weight += weight_of(f, first + i, channel);
+        sum += f->weight[first + i] * z[i];
+        weight += f->weight[first + i];
     }
     if (weight <= 0.0)
         return;
     double mean = sum / weight, *term = out + first_term(f);
     for (size_t i = 0; i < count; i++) {
-        double r = weight_of(f, first + i, channel) * (z[i] - mean);
+        double r = f->weight[first + i] * (z[i] - mean);
         for (size_t k = 0; k < TONE_TERMS; k++)
             term[k] -= r * (double)f->bend[first + i].basis[channel][k];
         out[3 * f->o->observation[first + i].train + (size_t)channel] += r;
@@ -252,10 +244,9 @@ static void find_errors(const struct light_fit *f, const double *x, size_t point
     size_t first = f->o->start[point], count = f->o->start[point + 1] - first;
     double sum = 0.0, total = 0.0;
     for (size_t i = 0; i < count; i++) {
-        double slope = (double)f->bend[first + i].slope[channel], own = weight[i] / (slope * slope);
         off[i] = light_fit_value(f, first + i, channel) - light_fit_predict(f, x, first + i, channel);
-        sum += own * off[i];
-        total += own;
+        sum += weight[i] * off[i];
+        total += weight[i];
     }
     for (size_t i = 0; i < count; i++)
         off[i] = total > 0.0 ? off[i] - sum / total : NAN;
@@ -287,7 +278,6 @@ bool light_fit_bend(struct light_fit *f, const double *x) {
                 tone_basis(&f->tones, foretold, basis);
                 for (size_t k = 0; k < TONE_TERMS; k++)
                     bend->basis[c][k] = (float)basis[k];
-                bend->slope[c] = (float)tone_slope(&f->tones, foretold);
             }
         }
     }

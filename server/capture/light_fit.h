@@ -31,7 +31,6 @@ enum { LIGHT_TONES = 1, LIGHT_DRIFT = 2, LIGHT_COLOR = 4, LIGHT_VIGNETTE = 8, LI
 struct light_bend {
     float basis[3][TONE_TERMS]; /* at p, which is nearer to the truth than s */
     float added[3];             /* F(s) - s; without it the value is that of a camera without a curve */
-    float slope[3];             /* of F at p: noise of the stored value is so much larger in F(s) */
 };
 
 struct light_fit {

@@ -118,12 +118,6 @@ double tone_stored(const struct tone_table *t, double straight) {
     return node(low) + STEP * (straight - t->straight[low]) / (t->straight[high] - t->straight[low]);
 }
 
-double tone_slope(const struct tone_table *t, double s) {
-    double part;
-    size_t i = before(s, &part);
-    return s < DARKEST || s > 0.0 ? 1.0 : (t->straight[i + 1] - t->straight[i]) / STEP;
-}
-
 /* --- photographs ------------------------------------------------------------------------------------------ */
 
 static float straighten(const struct tone_table *t, float value) {

@@ -44,8 +44,6 @@ void tone_basis(const struct tone_table *t, double s, double basis[TONE_TERMS]);
 /* F(s), and the s of which it is F: beyond the ends a straight line of slope 1. */
 double tone_straight(const struct tone_table *t, double s);
 double tone_stored(const struct tone_table *t, double straight);
-/* Derivative of F. */
-double tone_slope(const struct tone_table *t, double s);
 
 /* Puts the pixels of all photographs that are not HDR, and their clip, to exp(F); those are straight from then on. */
 void tone_straighten(const struct tone_table *t, struct scene *scene);

@@ -156,6 +156,8 @@ static void test_tones(struct painted *room, enum exposures exposures, float sha
     CHECK(found.tones == (share != 0.0f) && !found.vignette && !found.white_balance && !found.drift);
     CHECK_THAT(before >= before_at_least && after <= after_at_most, "%g, then %g", before, after);
     CHECK(room->scene.photograph[7].is_straight == found.tones); /* held out */
+    if (share == 0.6f && exposures != UNTOLD)
+        CHECK_NEAR(found.curve.term[TONE_POWER], -0.268, 0.05); /* of that curve by its own formula */
     CHECK(found.is_power_open == (exposures == UNTOLD));
     found = run(room, LIGHT_ALL);
     CHECK(!found.tones); /* once */
@@ -202,6 +204,7 @@ int main(void) {
     painted_noise = 0.5f; /* of 29 % no curve may be made that presses or pulls what one point shows together */
     painted_make(&room, 1, false);
     test_tones(&room, TOLD, 0.6f, 0.2, 0.14);
+    test_tones(&room, FAR, 0.6f, 0.25, 0.16);
     test_tones(&room, TOLD, -0.4f, 0.14, 0.14);
     painted_release(&room);
     return check_result();

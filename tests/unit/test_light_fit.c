@@ -1,4 +1,5 @@
-/* light_fit.h: a point that is too dark in all its photographs says nothing, however often it is weighed. */
+/* light_fit.h: a point that is too dark in all its photographs says nothing, however often it is weighed; a tone curve does
+ * not choose which points speak. */
 #include "server/capture/light_fit.h"
 
 #include <math.h>
@@ -43,6 +44,11 @@ int main(void) {
             }
         }
     }
+    observation[0].min_value[0] = 10.0f;
+    light_fit_residuals(&fit, LIGHT_TONES, x, 0, fit.prior_weight, square);
+    CHECK(isfinite(square[0]));
+    light_fit_residuals(&fit, 0, x, 0, fit.prior_weight, square);
+    CHECK(isinf(square[0]));
     light_fit_release(&fit);
     return check_result();
 }

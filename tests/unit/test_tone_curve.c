@@ -37,14 +37,12 @@ static void test_straight(void) {
     CHECK(tone_table_set(&table, &curve));
     CHECK(!tone_table_set(&table, &falls));
     for (double s = -9.0; s < 1.0; s += 0.037) {
-        double basis[TONE_TERMS], expected = s, step = 1e-4;
+        double basis[TONE_TERMS], expected = s;
         tone_basis(&table, s, basis);
         for (int k = 0; k < TONE_TERMS; k++)
             expected += curve.term[k] * basis[k];
         CHECK_NEAR(tone_straight(&table, s), expected, 1e-9);
         CHECK_NEAR(tone_stored(&table, tone_straight(&table, s)), s, 1e-9);
-        double slope = (tone_straight(&table, s + step) - tone_straight(&table, s - step)) / (2.0 * step);
-        CHECK_NEAR(tone_slope(&table, s), slope, 0.02);
     }
 }
 
