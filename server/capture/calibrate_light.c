@@ -184,7 +184,7 @@ void calibrate_light(struct scene *scene, const struct views *views, const struc
     found->white_balance = (model & LIGHT_COLOR) != 0;
     found->vignette = (model & LIGHT_VIGNETTE) != 0;
     found->tones = (model & LIGHT_TONES) != 0;
-    found->is_power_open = light_fit_is_power_open(&fit, 0);
+    found->is_power_open = fit.may_bend && light_fit_is_power_open(&fit, 0);
     memcpy(found->curve.term, x + light_fit_parameter_count(&fit) - TONE_TERMS, sizeof found->curve.term);
     apply(&fit, model, x, scene);
     mem_free(x);

@@ -24,7 +24,7 @@ struct light_found {
     size_t exposures_solved;                    /* that the bundle does not give */
     bool drift, white_balance, vignette, tones; /* whether the fault was accepted */
     struct tone_curve curve;
-    bool is_power_open;                 /* of the curve: exposures are not told */
+    bool is_power_open;                 /* of the curve: no photograph is HDR, and exposures are not told */
     double spread_before, spread_after; /* rms deviation of log radiance from the mean of its point, all channels */
 };
 

@@ -33,6 +33,10 @@ static void log_light(const struct reconstruction *r, const struct light_found *
              found->tones ? ", the camera bends tones, which are straightened" : "", found->spread_after,
              found->spread_before);
     hooks->log(hooks->user, line);
+    if (found->is_power_open && !found->tones)
+        hooks->log(hooks->user,
+                   "calibration: the exposures are not told, and without them a camera's contrast is not seen; "
+                   "the photographs count as plain sRGB");
     if (found->tones && found->is_power_open)
         hooks->warning(
             hooks->user,
@@ -282,6 +286,7 @@ void calibrate(struct reconstruction *r, struct views *views, const struct recon
     light.spread_before = first.spread_before;
     light.tones = first.tones;
     light.curve = first.curve;
+    light.is_power_open = first.is_power_open;
     r->exposures_drift = light.drift;
     r->colors_drift = light.white_balance;
     log_light(r, &light, hooks);
