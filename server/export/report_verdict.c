@@ -177,6 +177,13 @@ static void put_weak(struct buf *out, const cJSON *report) {
                    photographs);
         reasons++;
     }
+    const cJSON *calibration = cJSON_GetObjectItemCaseSensitive(report, "calibration");
+    if (cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(calibration, "contrast_unknown"))) {
+        buf_puts(out,
+                 "<li>The exposures of the photographs are not told: contrast that the camera adds is not seen, and "
+                 "makes what is dark too dark. EXIF, or an exposure for each frame, tells it.</li>");
+        reasons++;
+    }
     if (unseen > UNSEEN_LIGHT) {
         buf_printf(out, "<li>%.0f %% of the light's directions lead to where no photograph looks.</li>",
                    100.0 * unseen);

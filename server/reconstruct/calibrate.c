@@ -263,6 +263,7 @@ static void report_light(const struct reconstruction *r, const struct light_foun
     json_add_bool(report, "white_balance_drift", found->white_balance);
     json_add(report, "vignette", found->vignette ? cJSON_CreateDoubleArray(vignette, 3) : cJSON_CreateNull());
     json_add(report, "tone_curve", found->tones ? report_tones(&found->curve) : cJSON_CreateNull());
+    json_add_bool(report, "contrast_unknown", found->is_power_open);
     json_add_number(report, "spread_before", found->spread_before);
     json_add_number(report, "spread_after", found->spread_after);
 }

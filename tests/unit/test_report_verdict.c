@@ -41,6 +41,8 @@ int main(void) {
     CHECK(says(bad, "2 sources of light in no photograph"));
     CHECK(says(bad, "brightness of 1 source of light is uncertain: the standard deviation is up to 50 %"));
     CHECK(!says(bad, "No weakness is known"));
+    CHECK(says("{\"calibration\": {\"contrast_unknown\": true}}", "The exposures of the photographs are not told"));
+    CHECK(!says("{\"calibration\": {\"contrast_unknown\": false}}", "not told"));
     const char *holes =
         "{\"holes\": {\"filled\": 2, \"filled_m2\": 145.2, \"openings_kept\": 1, \"openings_m2\": 0.5}}";
     CHECK(says(holes, "2 holes of the mesh were filled, 145 m²"));
