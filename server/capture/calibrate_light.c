@@ -67,8 +67,8 @@ static double drift_of(const struct light_fit *f, const double *x) {
     return sqrt(squares / fmax(1.0, (double)(f->frames - f->unknown_exposure_count)));
 }
 
-/* Forward selection: accepts those faults one by one, a tone curve before all others, since free exposures imitate it with
- * many numbers, then the one with the largest gain. Returns the model; x is its solution. */
+/* Forward selection: accepts those faults one by one, a tone curve before all others, since free exposures imitate it
+ * with many numbers, then the one with the largest gain. Returns the model; x is its solution. */
 static int choose_model(struct light_fit *f, int faults, double *x) {
     size_t n = light_fit_parameter_count(f), points = f->o->point_count / LIGHT_HELD_OUT_EVERY + 1, used;
     double *base = mem_array(points, sizeof *base), *cost = mem_array(points, sizeof *cost);

@@ -1,4 +1,4 @@
-/* calibrate_light.h -- exposure, white balance, vignette and tone curve of photographs, from points that several of them see.
+/* calibrate_light.h -- exposure, white balance, vignette and tone curve of photographs, from points that several see.
  *
  * The logarithm of what photograph f shows of point p in channel c is modelled as
  *
@@ -7,8 +7,8 @@
  * and G and v come by weighted least squares with the L eliminated. Robust weights suppress outliers (highlights,
  * edges); contrast and grazing angles lower weights. Exposures that the bundle does not give are always solved. Four
  * faults are modelled only where the capture shows them: drift of given exposures, changing white balance, a vignette,
- * and a tone curve of the camera (tone_curve.h) where no photograph is HDR. A fault is accepted when it makes photographs agree significantly better at points held out from the solve; otherwise
- * it is exactly zero. */
+ * and a tone curve of the camera (tone_curve.h) where no photograph is HDR. A fault is accepted when it makes
+ * photographs agree significantly better at points held out from the solve; otherwise it is exactly zero. */
 #ifndef UNBAKE_CAPTURE_CALIBRATE_LIGHT_H
 #define UNBAKE_CAPTURE_CALIBRATE_LIGHT_H
 

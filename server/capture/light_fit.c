@@ -9,8 +9,8 @@
  * observations. Parameters outside the model are projected out of each step; the preconditioner has one number a frame,
  * so it commutes with the projection.
  *
- * A curve that pressed all observations of a point together would make them agree. So the cost by which they are judged is
- * that of the stored values, F's argument, and the basis is taken where the consensus of the point foretells the value. */
+ * A curve that pressed all observations of a point together would make them agree. So the cost by which they are judged
+ * is that of the stored values, F's argument, and the basis is taken where the others of the point foretell the value. */
 #include "server/capture/light_fit.h"
 
 #include <math.h>
@@ -252,7 +252,7 @@ static void find_errors(const struct light_fit *f, const double *x, size_t point
         off[i] = total > 0.0 ? off[i] - sum / total : NAN;
 }
 
-/* Log of the stored value that would be off by nothing; the stored one where it is not known by what. */
+/* Log of the stored value that would agree with the others of its point; its own where there are none. */
 static double foretell(const struct light_fit *f, size_t observation, int channel, double off) {
     double level = (double)f->o->observation[observation].level[channel];
     return isnan(off) ? level : tone_stored(&f->tones, tone_straight(&f->tones, level) - off);

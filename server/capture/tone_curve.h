@@ -1,5 +1,5 @@
-/* tone_curve.h -- what a camera does to tones beyond sRGB: an S that makes shadows darker and midtones brighter, a shoulder
- * that holds highlights back.
+/* tone_curve.h -- what a camera does to tones beyond sRGB: an S that makes shadows darker and highlights brighter, a
+ * shoulder that holds highlights back.
  *
  * Stored values v are those of photograph.h, linear if the file is sRGB. With s = log v a camera with a curve stores what
  * is in truth
@@ -36,7 +36,7 @@ struct tone_table {
 
 /* Of no curve. */
 void tone_table_init(struct tone_table *t);
-/* False, and nothing is changed, where the curve does not rise everywhere by MIN_SLOPE at least. */
+/* False, and nothing is changed, unless the curve rises everywhere, by a slope between 1/20 and 20. */
 bool tone_table_set(struct tone_table *t, const struct tone_curve *curve);
 
 /* b_k at s; outside of what is tabulated (from 1/500 to 1) its value at the end. */

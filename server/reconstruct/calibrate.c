@@ -30,8 +30,7 @@ static void log_light(const struct reconstruction *r, const struct light_found *
              "(rms of the logarithm), before by %.3f",
              found->exposures_solved, found->drift ? ", given exposures drift" : "",
              found->white_balance ? ", white balance changes" : "", vignette,
-             found->tones ? ", the camera bends tones, which are straightened" : "", found->spread_after,
-             found->spread_before);
+             found->tones ? ", a tone curve of the camera, taken off" : "", found->spread_after, found->spread_before);
     hooks->log(hooks->user, line);
     if (found->is_power_open && !found->tones)
         hooks->log(hooks->user,
@@ -40,9 +39,8 @@ static void log_light(const struct reconstruction *r, const struct light_found *
     if (found->tones && found->is_power_open)
         hooks->warning(
             hooks->user,
-            "The camera bends tones, and the exposures are not told: its contrast is known but for a power of "
-            "all brightnesses, by which base colours may be off. Photographs with EXIF, or an exposure for each "
-            "frame of transforms.json, tell it.");
+            "The camera changes contrast. Exposures are not told, so that only a part of it can be taken off, and base "
+            "colours may be off. Photographs with EXIF, or an exposure for each frame of transforms.json, tell the rest.");
 }
 
 static cJSON *gain_array(rgb gain) {

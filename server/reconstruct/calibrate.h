@@ -1,7 +1,7 @@
 /* calibrate.h -- self-calibration of the photographs, the last step of `prepare`.
  *
  * Unknown exposures are solved. With the setting `calibrate`, faults of the capture are estimated and, where the
- * evidence is clear, corrected: drift of exposure and white balance, vignette, a camera's tone curve (calibrate_light.h),
+ * evidence is clear, corrected: drift of exposure and white balance, vignette, tone curve (calibrate_light.h),
  * poses off by a few pixels (calibrate_poses.h), a mesh that lies beside all photographs (pose_registration.h), motion blur
  * (calibrate_blur.h). A capture without faults is not changed at all. */
 #ifndef UNBAKE_RECONSTRUCT_CALIBRATE_H

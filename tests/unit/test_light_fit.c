@@ -1,5 +1,5 @@
-/* light_fit.h: a point that is too dark in all its photographs says nothing, however often it is weighed; a tone curve does
- * not choose which points speak. */
+/* light_fit.h: a point that is too dark in all its photographs says nothing, however often it is weighed; a tone
+ * curve does not choose which points speak. */
 #include "server/capture/light_fit.h"
 
 #include <math.h>

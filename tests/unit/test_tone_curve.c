@@ -1,5 +1,5 @@
-/* tone_curve.h: the basis is orthonormal over encoded values, stored values are found again from straight ones, a curve that
- * falls is refused, and pixels are straightened once. */
+/* tone_curve.h: the basis is orthonormal over encoded values, stored values are found again from straight ones, a
+ * curve that falls is refused, and pixels are straightened once. */
 #include "server/capture/tone_curve.h"
 
 #include <math.h>
