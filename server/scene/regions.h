@@ -1,9 +1,9 @@
 /* regions.h -- triangles joined to regions over the links between them.
  *
- * Graph segmentation (Felzenszwalb and Huttenlocher 2004) as used for scans by Dai et al. 2017 (ScanNet): two regions are
- * joined over a link no heavier than the heaviest inside either of them plus a bonus for small regions. What a link
- * weighs is the caller's. Changes to the published method: sizes are areas, since triangles of a modelled room differ by
- * a factor of millions. */
+ * Graph segmentation (Felzenszwalb and Huttenlocher 2004) as used for scans by Dai et al. 2017 (ScanNet): two regions
+ * are joined over a link no heavier than the heaviest inside either of them plus a bonus for small regions. What a link
+ * weighs is the caller's. Changes to the published method: sizes are areas, since triangles of a modelled room differ
+ * by a factor of millions. */
 #ifndef UNBAKE_SCENE_REGIONS_H
 #define UNBAKE_SCENE_REGIONS_H
 

@@ -2,8 +2,8 @@
  *
  * 1. Radiances are smoothed over neighbours that show nearly the same, in logarithms.
  * 2. Triangles are joined by what they show (regions.h). Of the regions those are cores that have some area away from
- *    their borders. Bands of triangles that show two things at once, patterns and noise have none: they are taken apart,
- *    and their triangles join the core that is reached over the lightest links, as a watershed.
+ *    their borders. Bands of triangles that show two things at once, patterns and noise have none: they are taken
+ *    apart, and their triangles join the core that is reached over the lightest links, as a watershed.
  * 3. Cores that meet are compared there, and join unless the step between them is that of two things. */
 #include "server/scene/segment_color.h"
 
