@@ -181,32 +181,50 @@ static void keep_cores(struct color_split *s, double least_area, bool *is_core) 
     mem_free(ring);
 }
 
-/* Gives all triangles to cores; where a connected part of a segment has none it is one region. */
+/* Gives all triangles to cores, round by round over the links that are left, the lightest first; where a connected part
+ * of a segment has none it is one region. */
 static void grow_cores(struct color_split *s, bool *is_core) {
+    size_t *left = mem_array(s->link_count + 1, sizeof *left), count = s->link_count, before;
     uint32_t root[2];
-    for (bool any = true; any;) {
-        any = false;
-        for (size_t i = 0; i < s->link_count; i++) {
-            roots_of(s, i, root);
-            if (is_core[root[0]] == is_core[root[1]])
-                continue;
-            regions_join(&s->regions, root[0], root[1], 0.0f);
-            is_core[regions_root(&s->regions, root[0])] = any = true;
+    for (size_t i = 0; i < count; i++)
+        left[i] = i;
+    do {
+        before = count;
+        count = 0;
+        for (size_t i = 0; i < before; i++) {
+            roots_of(s, left[i], root);
+            if (!is_core[root[0]] && !is_core[root[1]]) {
+                left[count++] = left[i];
+            } else if (!is_core[root[0]] || !is_core[root[1]]) {
+                regions_join(&s->regions, root[0], root[1], 0.0f);
+                is_core[regions_root(&s->regions, root[0])] = true;
+            }
         }
-    }
-    for (size_t i = 0; i < s->link_count; i++) {
-        roots_of(s, i, root);
-        if (root[0] != root[1] && !is_core[root[0]])
+    } while (count < before);
+    for (size_t i = 0; i < count; i++) {
+        roots_of(s, left[i], root);
+        if (root[0] != root[1])
             regions_join(&s->regions, root[0], root[1], 0.0f);
     }
+    mem_free(left);
 }
 
 /* --- borders ------------------------------------------------------------------------------------- */
 
-/* What a region shows some triangles from its border with another; with NONE for the other: all of it. */
+/* What a region shows some triangles from its border with another, or all of it. */
 struct side {
     uint32_t region, other;
     double weight, sum[3], square; /* areas; of the values, by areas; mean over the channels */
+};
+
+/* The regions as they are at present. */
+struct standing {
+    size_t count;
+    uint32_t *of_triangle; /* [triangle_count] numbers of regions; owned, as all */
+    uint32_t *root;        /* [count] */
+    struct side *all;      /* [count] */
+    struct side *side;     /* [side_count] by region, then by the other */
+    size_t side_count;
 };
 
 static int by_regions(const void *left, const void *right) {
@@ -216,54 +234,90 @@ static int by_regions(const void *left, const void *right) {
     return a->other < b->other ? -1 : a->other > b->other;
 }
 
-static struct side side_of(const struct color_split *s, uint32_t t, uint32_t region, uint32_t other) {
-    struct side side = {.region = region, .other = other, .weight = (double)mesh_triangle_area(s->mesh, t)};
+static void add_triangle(const struct color_split *s, uint32_t t, struct side *to) {
+    double weight = (double)mesh_triangle_area(s->mesh, t);
+    to->weight += weight;
     for (int k = 0; k < 3; k++) {
         double value = (double)(&s->value[t].r)[k];
-        side.sum[k] = side.weight * value;
-        side.square += side.weight * value * value / 3.0;
+        to->sum[k] += weight * value;
+        to->square += weight * value * value / 3.0;
     }
-    return side;
 }
 
-/* All sides, in order; the caller's. */
-static struct side *find_sides(const struct color_split *s, const uint32_t *root, size_t *count) {
-    size_t n = s->mesh->triangle_count, used = 0;
+static void add_side(const struct side *from, struct side *to) {
+    to->weight += from->weight;
+    to->square += from->square;
+    for (int k = 0; k < 3; k++)
+        to->sum[k] += from->sum[k];
+}
+
+static void number_regions(struct color_split *s, struct standing *now) {
+    uint32_t *root = all_roots(s);
+    size_t n = s->mesh->triangle_count;
+    now->of_triangle = mem_array(n, sizeof *now->of_triangle);
+    now->root = mem_array(n, sizeof *now->root);
+    now->count = 0;
+    for (uint32_t t = 0; t < n; t++) {
+        if (root[t] != t)
+            continue;
+        now->of_triangle[t] = (uint32_t)now->count;
+        now->root[now->count++] = t;
+    }
+    for (uint32_t t = 0; t < n; t++)
+        now->of_triangle[t] = now->of_triangle[root[t]];
+    mem_free(root);
+}
+
+/* Sides of all regions, from triangles NEAR_RINGS or more from their border. */
+static void find_sides(const struct color_split *s, struct standing *now) {
+    size_t n = s->mesh->triangle_count, near = 0, used = 0;
     uint8_t *ring = mem_array(n, sizeof *ring);
     uint32_t *beyond = mem_array(n, sizeof *beyond);
-    struct side *side = mem_array(2 * n + 1, sizeof *side);
-    find_rings(s, root, ring, beyond);
+    find_rings(s, now->of_triangle, ring, beyond);
+    for (uint32_t t = 0; t < n; t++)
+        near += ring[t] >= NEAR_RINGS && is_known(s, t);
+    struct side *side = mem_calloc(near + 1, sizeof *side);
     for (uint32_t t = 0; t < n; t++) {
-        if (!is_known(s, t))
+        if (ring[t] < NEAR_RINGS || !is_known(s, t))
             continue;
-        side[used++] = side_of(s, t, root[t], NONE);
-        if (ring[t] >= NEAR_RINGS)
-            side[used++] = side_of(s, t, root[t], beyond[t]);
+        side[used].region = now->of_triangle[t];
+        side[used].other = beyond[t];
+        add_triangle(s, t, &side[used++]);
     }
     qsort(side, used, sizeof *side, by_regions);
-    *count = 0;
+    now->side_count = 0;
     for (size_t i = 0; i < used; i++) {
-        struct side *to = *count > 0 ? &side[*count - 1] : NULL;
-        if (!to || by_regions(to, &side[i]) != 0) {
-            side[(*count)++] = side[i];
-            continue;
-        }
-        to->weight += side[i].weight;
-        to->square += side[i].square;
-        for (int k = 0; k < 3; k++)
-            to->sum[k] += side[i].sum[k];
+        if (now->side_count > 0 && by_regions(&side[now->side_count - 1], &side[i]) == 0)
+            add_side(&side[i], &side[now->side_count - 1]);
+        else
+            side[now->side_count++] = side[i];
     }
+    now->side = side;
     mem_free(beyond);
     mem_free(ring);
-    return side;
 }
 
-/* The side of a region towards another, or all of it where it is too narrow; NULL: nothing of it is known. */
-static const struct side *find_side(const struct side *side, size_t count, uint32_t region, uint32_t other) {
+static void stand(struct color_split *s, struct standing *now) {
+    number_regions(s, now);
+    now->all = mem_calloc(now->count, sizeof *now->all);
+    for (uint32_t t = 0; t < s->mesh->triangle_count; t++)
+        if (is_known(s, t))
+            add_triangle(s, t, &now->all[now->of_triangle[t]]);
+    find_sides(s, now);
+}
+
+static void standing_release(struct standing *now) {
+    mem_free(now->side);
+    mem_free(now->all);
+    mem_free(now->root);
+    mem_free(now->of_triangle);
+}
+
+/* The side of a region towards another, or all of it where it is too narrow. */
+static const struct side *find_side(const struct standing *now, uint32_t region, uint32_t other) {
     struct side wanted = {.region = region, .other = other};
-    const struct side *found = bsearch(&wanted, side, count, sizeof *side, by_regions);
-    wanted.other = NONE;
-    return found ? found : bsearch(&wanted, side, count, sizeof *side, by_regions);
+    const struct side *found = bsearch(&wanted, now->side, now->side_count, sizeof wanted, by_regions);
+    return found ? found : &now->all[region];
 }
 
 /* The step from a side to the opposite one, as a multiple of what parts two things. */
@@ -297,38 +351,50 @@ static int by_step(const void *left, const void *right) {
     return a->b < b->b ? -1 : a->b > b->b;
 }
 
-/* Each pair once for every link over which it meets; the caller's. */
-static struct region_pair *find_pairs(const struct color_split *s, const uint32_t *root, size_t *count) {
-    size_t sides;
-    struct side *side = find_sides(s, root, &sides);
-    struct region_pair *pair = mem_array(s->link_count + 1, sizeof *pair);
+/* The numbers of the two regions that meet over link i, the lesser first; false where they are one. */
+static bool regions_of(const struct color_split *s, const struct standing *now, size_t i, struct region_pair *pair) {
+    uint32_t a = now->of_triangle[s->link[i].half_edge / 3];
+    uint32_t b = now->of_triangle[region_link_end(s->adjacency, &s->link[i])];
+    *pair = (struct region_pair){a < b ? a : b, a < b ? b : a, 0.0f};
+    return a != b;
+}
+
+/* Pairs that can be compared, once for every link over which they meet; the caller's. */
+static struct region_pair *find_pairs(const struct color_split *s, const struct standing *now, size_t *count) {
+    struct region_pair one, *pair;
+    size_t borders = 0;
+    for (size_t i = 0; i < s->link_count; i++)
+        borders += regions_of(s, now, i, &one);
+    pair = mem_array(borders + 1, sizeof *pair);
     *count = 0;
     for (size_t i = 0; i < s->link_count; i++) {
-        uint32_t a = root[s->link[i].half_edge / 3], b = root[region_link_end(s->adjacency, &s->link[i])];
-        const struct side *of_a, *of_b;
-        if (a != b && (of_a = find_side(side, sides, a, b)) && (of_b = find_side(side, sides, b, a)))
-            pair[(*count)++] = (struct region_pair){a < b ? a : b, a < b ? b : a, step_of(of_a, of_b)};
+        if (!regions_of(s, now, i, &one))
+            continue;
+        const struct side *a = find_side(now, one.a, one.b), *b = find_side(now, one.b, one.a);
+        one.step = step_of(a, b);
+        if (a->weight > 0.0 && b->weight > 0.0)
+            pair[(*count)++] = one;
     }
-    mem_free(side);
     return pair;
 }
 
 /* Joins pairs without a step, the most alike first, each region once; returns whether there was one. */
 static bool join_alike(struct color_split *s) {
     size_t count;
-    uint32_t *root = all_roots(s);
-    struct region_pair *pair = find_pairs(s, root, &count);
-    bool *has_changed = mem_calloc(s->mesh->triangle_count, sizeof *has_changed), any = false;
+    struct standing now;
+    stand(s, &now);
+    struct region_pair *pair = find_pairs(s, &now, &count);
+    bool *has_changed = mem_calloc(now.count, sizeof *has_changed), any = false;
     qsort(pair, count, sizeof *pair, by_step);
     for (size_t i = 0; i < count && pair[i].step < 1.0f; i++) {
         if (has_changed[pair[i].a] || has_changed[pair[i].b])
             continue;
         has_changed[pair[i].a] = has_changed[pair[i].b] = any = true;
-        regions_join(&s->regions, pair[i].a, pair[i].b, 0.0f);
+        regions_join(&s->regions, now.root[pair[i].a], now.root[pair[i].b], 0.0f);
     }
     mem_free(has_changed);
     mem_free(pair);
-    mem_free(root);
+    standing_release(&now);
     return any;
 }
 
@@ -336,7 +402,7 @@ static bool join_alike(struct color_split *s) {
 
 /* Numbers the regions: the largest of each piece of a segment that hangs together as before, the others from `count`
  * on. */
-static size_t number_regions(struct color_split *s, uint32_t *of_triangle, size_t count) {
+static size_t number_parts(struct color_split *s, uint32_t *of_triangle, size_t count) {
     size_t n = s->mesh->triangle_count, found = count;
     uint32_t *largest = mem_array(n, sizeof *largest), *number = mem_array(n, sizeof *number), *root = all_roots(s);
     struct regions piece;
@@ -383,7 +449,7 @@ size_t segment_color_split(uint32_t *of_triangle, size_t count, const struct mes
     grow_cores(&s, is_core);
     while (join_alike(&s)) {
     }
-    size_t found = number_regions(&s, of_triangle, count);
+    size_t found = number_parts(&s, of_triangle, count);
     mem_free(s.link);
     regions_release(&s.regions);
     mem_free(s.value);

@@ -14,8 +14,8 @@
 #include "server/scene/adjacency.h"
 
 /* of_triangle[triangle_count] in [0, count). shown[triangle_count]: radiance; negative red: not known. Makes parts of
- * at least least_area (m^2) segments of their own, numbered from `count` on; the largest keeps its number, in each piece
- * of a segment. Returns how many there are then. */
+ * at least least_area (m^2) segments of their own, numbered from `count` on; in each piece of a segment the largest
+ * keeps its number. Returns how many there are then. */
 size_t segment_color_split(uint32_t *of_triangle, size_t count, const struct mesh *mesh,
                            const struct adjacency *adjacency, const rgb *shown, double least_area);
 

@@ -1,5 +1,5 @@
-/* test_segment_color.c -- what on a wall of a scan has another colour: a wooden panel, a black frame; and what has not: a
- * shadow, light that fades, stripes of paper, noise. */
+/* test_segment_color.c -- what on a wall of a scan has another colour: a wooden panel, a black frame; and what has not:
+ * a shadow, light that fades, stripes of paper, noise. */
 #include "server/scene/segment_color.h"
 
 #include "common/rng.h"
