@@ -25,7 +25,6 @@
 #define MIN_COLOR 0.15f
 #define MIN_BRIGHTNESS 1.1f
 #define MIN_DEVIATIONS 2.0f /* of what the sides vary by */
-
 /* Part of the least area that a core has away from its borders. */
 #define MIN_WITHIN 0.1
 
@@ -119,19 +118,20 @@ static uint32_t *all_roots(struct color_split *s) {
     return root;
 }
 
-/* ring[triangle_count]: how many triangles it is from the border of its region with another of its segment, up to
- * FAR_RINGS; 0: farther. beyond[triangle_count]: where ring is not 0, the region beyond the nearest border. */
-static void find_rings(const struct color_split *s, const uint32_t *root, uint8_t *ring, uint32_t *beyond) {
+/* region[triangle_count]: equal within a region. ring[triangle_count]: how many triangles it is from the border of its
+ * region with another of its segment, up to FAR_RINGS; 0: farther. beyond[triangle_count]: where ring is not 0, the
+ * region beyond the nearest border. */
+static void find_rings(const struct color_split *s, const uint32_t *region, uint8_t *ring, uint32_t *beyond) {
     size_t n = s->mesh->triangle_count, first = 0, last = 0;
     uint32_t *queue = mem_array(n, sizeof *queue);
     memset(ring, 0, n);
     for (uint32_t t = 0; t < n; t++) {
         for (uint32_t half = 3 * t; half < 3 * t + 3 && ring[t] == 0; half++) {
             uint32_t other = s->adjacency->next[half] / 3;
-            if (s->of_triangle[other] != s->of_triangle[t] || root[other] == root[t])
+            if (s->of_triangle[other] != s->of_triangle[t] || region[other] == region[t])
                 continue;
             ring[t] = 1;
-            beyond[t] = root[other];
+            beyond[t] = region[other];
             queue[last++] = t;
         }
     }
@@ -139,7 +139,7 @@ static void find_rings(const struct color_split *s, const uint32_t *root, uint8_
         uint32_t t = queue[first];
         for (uint32_t half = 3 * t; half < 3 * t + 3 && ring[t] < FAR_RINGS; half++) {
             uint32_t other = s->adjacency->next[half] / 3;
-            if (ring[other] != 0 || root[other] != root[t])
+            if (ring[other] != 0 || region[other] != region[t])
                 continue;
             ring[other] = (uint8_t)(ring[t] + 1);
             beyond[other] = beyond[t];
