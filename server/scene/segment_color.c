@@ -7,6 +7,7 @@
  * 3. Cores that meet are compared there, and join unless the step between them is that of two things. */
 #include "server/scene/segment_color.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
@@ -54,7 +55,7 @@ static void take_logarithms(struct color_split *s, const rgb *shown) {
         sum += (double)rgb_mean(shown[t]);
         known += 1.0;
     }
-    float floor = FLOOR * (float)(known > 0.0 ? sum / known : 1.0);
+    float floor = fmaxf(FLOOR * (float)(known > 0.0 ? sum / known : 1.0), FLT_MIN);
     for (size_t t = 0; t < s->mesh->triangle_count; t++)
         s->value[t] = shown[t].r < 0.0f
                           ? rgb_gray(NAN)

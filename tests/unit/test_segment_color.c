@@ -147,6 +147,7 @@ int main(void) {
           1);
     check_least("wood, of less than is asked for", (struct paint){.wall = white, .panel = wood, .shadow = 1.0f}, 2.0,
                 0);
+    check("no light", (struct paint){.wall = {0.0f, 0.0f, 0.0f}, .panel = {0.0f, 0.0f, 0.0f}}, 0);
     check("paler red", (struct paint){.wall = white, .panel = {0.6f, 0.8f, 0.8f}, .shadow = 1.0f}, 1);
     test_segments_stay();
     test_pieces(true);
