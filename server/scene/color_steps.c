@@ -13,8 +13,8 @@
 
 /* What a region shows some triangles from its border with another, or all of it. */
 struct side {
-    uint32_t region, other;
-    double weight, sum[3], square; /* areas; of the values, by areas; mean over the channels */
+    uint32_t region, other, triangle; /* the last while it is one triangle's */
+    double weight, sum[3], square;    /* areas; of the values, by areas; mean over the channels */
 };
 
 /* The regions as they are at present. */
@@ -32,6 +32,13 @@ static int by_regions(const void *left, const void *right) {
     if (a->region != b->region)
         return a->region < b->region ? -1 : 1;
     return a->other < b->other ? -1 : a->other > b->other;
+}
+
+/* The same, and in the order of triangles, so that sums do not depend on how equals are sorted. */
+static int by_regions_and_triangle(const void *left, const void *right) {
+    const struct side *a = left, *b = right;
+    int order = by_regions(left, right);
+    return order != 0 ? order : a->triangle < b->triangle ? -1 : a->triangle > b->triangle;
 }
 
 static void add_triangle(const struct color_regions *s, uint32_t t, struct side *to) {
@@ -82,9 +89,10 @@ static void find_sides(const struct color_regions *s, struct standing *now) {
             continue;
         side[used].region = now->of_triangle[t];
         side[used].other = beyond[t];
+        side[used].triangle = t;
         add_triangle(s, t, &side[used++]);
     }
-    qsort(side, used, sizeof *side, by_regions);
+    qsort(side, used, sizeof *side, by_regions_and_triangle);
     now->side_count = 0;
     for (size_t i = 0; i < used; i++) {
         if (now->side_count > 0 && by_regions(&side[now->side_count - 1], &side[i]) == 0)
