@@ -26,7 +26,6 @@ struct triangle_light_job {
 /* Observations of one triangle. */
 struct triangle_observations {
     struct censored value[MAX_POINTS * OBSERVATIONS_PER_POINT];
-    rgb sum[2]; /* of all channels; of measured values, of lower bounds */
     size_t count;
     float pixels; /* sum over observations of the pixels that the whole triangle fills */
 };
@@ -53,20 +52,18 @@ static void observe_point(const struct views *views, uint32_t triangle, vec3 poi
         bool saturated = photograph_sample_saturates(&s);
         observations->value[observations->count++] =
             (struct censored){fmaxf(rgb_mean(s.radiance), 0.0f), 1.0f, saturated};
-        observations->sum[saturated] = rgb_add(observations->sum[saturated], s.radiance);
         observations->pixels += area * view[k].weight * photo->camera.fx * photo->camera.fy;
     }
 }
 
 /* Mean of measured values, or of lower bounds where there is none. */
-static float mean_of(const struct triangle_observations *observations, rgb *color, bool *is_bound) {
+static float mean_of(const struct triangle_observations *observations, bool *is_bound) {
     float sum[2] = {0.0f, 0.0f}, count[2] = {0.0f, 0.0f};
     for (size_t i = 0; i < observations->count; i++) {
         sum[observations->value[i].is_bound] += observations->value[i].value;
         count[observations->value[i].is_bound] += 1.0f;
     }
     *is_bound = count[false] == 0.0f;
-    *color = rgb_clamp(rgb_scale(observations->sum[*is_bound], 1.0f / count[*is_bound]), 0.0f, INFINITY);
     return sum[*is_bound] / count[*is_bound];
 }
 
@@ -85,12 +82,11 @@ static void measure(void *user, size_t index, int thread) {
     }
     struct triangle_light *light = job->light;
     light->observed[triangle] = light->mean[triangle] = -1.0f;
-    light->color[triangle] = rgb_gray(-1.0f);
     light->pixels[triangle] = 0.0f;
     if (observations.count == 0)
         return;
     bool is_bound;
-    light->mean[triangle] = mean_of(&observations, &light->color[triangle], &light->is_bound[triangle]);
+    light->mean[triangle] = mean_of(&observations, &light->is_bound[triangle]);
     light->observed[triangle] =
         censored_quantile(observations.value, observations.count, 1.0f - BRIGHTER_SHARE, &is_bound);
     light->pixels[triangle] = observations.pixels / (float)observations.count;
@@ -101,7 +97,6 @@ void triangle_light_measure(struct triangle_light *light, const struct views *vi
     light->observed = mem_array(count, sizeof *light->observed);
     light->mean = mem_array(count, sizeof *light->mean);
     light->pixels = mem_array(count, sizeof *light->pixels);
-    light->color = mem_array(count, sizeof *light->color);
     light->is_bound = mem_calloc(count, sizeof *light->is_bound);
     struct triangle_light_job job = {views, light};
     parallel_for(pool, count, measure, &job);
@@ -112,6 +107,5 @@ void triangle_light_release(struct triangle_light *light) {
     mem_free(light->mean);
     mem_free(light->pixels);
     mem_free(light->is_bound);
-    mem_free(light->color);
     *light = (struct triangle_light){0};
 }

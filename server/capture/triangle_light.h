@@ -13,7 +13,6 @@ struct triangle_light {
     float *observed; /* [triangle_count] radiance (mean of the channels) that most observations reach: emission is seen
                        * from everywhere, a highlight is not; negative: no clean observation; owned */
     float *mean;     /* [triangle_count] mean over observations; negative as above; owned */
-    rgb *color;      /* [triangle_count] the same of each channel; negative red: none; owned */
     bool *is_bound;  /* [triangle_count] all are saturated: a lower bound; owned */
     float *pixels;   /* [triangle_count] pixels that it fills in a photograph, mean; owned */
 };

@@ -143,11 +143,7 @@ static void report_split(const struct prepare *p, const struct split *split) {
             json_add_string(entry, "name", name);
         cJSON_AddItemToArray(list, entry);
     }
-    json_add_int(p->r->report, "parts_of_another_color", (int64_t)split->color_count);
     char line[128];
-    snprintf(line, sizeof line, "segments: %zu parts of another colour are segments of their own", split->color_count);
-    if (split->color_count > 0)
-        p->pace->hooks->log(p->pace->hooks->user, line);
     snprintf(line, sizeof line, "segments: %zu parts that shine were split off, as segments of their own",
              split->part_count);
     if (split->part_count > 0)
@@ -159,7 +155,7 @@ static bool split_bright_parts(struct prepare *p) {
     struct split split;
     split_segments(&split, p->r, p->views);
     report_split(p, &split);
-    bool any = split.color_count + split.part_count > 0;
+    bool any = split.part_count > 0;
     split_release(&split);
     return any;
 }

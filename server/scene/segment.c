@@ -1,10 +1,13 @@
 /* segment.c -- see segment.h.
  *
- * Automatic segmentation: graph segmentation (regions.h), where a link weighs the difference of two triangles' normals.
- * Noisy surfaces thus tolerate differences that would be borders on clean ones. Normals are smoothed first, but not
- * across creases; a region that stays small joins its most similar neighbour or, in a scan, where small floating
- * components are fusion debris, the nearest region; and in a scan, which rounds what folds there are, parts that stand
- * off the plane of their region are split off (segment_relief.h). */
+ * Automatic segmentation: the graph segmentation of Felzenszwalb and Huttenlocher 2004 over triangles, as used for
+ * scans by Dai et al. 2017 (ScanNet). The weight of an edge between two triangles is the difference of their normals;
+ * two regions are joined over an edge no heavier than the heaviest edge inside either of them plus a bonus for small
+ * regions. Noisy surfaces thus tolerate differences that would be borders on clean ones. Changes to the published
+ * method: sizes are areas, since triangles of a modelled room differ by a factor of millions; normals are smoothed
+ * first, but not across creases; a region that stays small joins its most similar neighbour or, in a scan, where
+ * small floating components are fusion debris, the nearest region; and in a scan, which rounds what folds there are,
+ * parts that stand off the plane of their region are split off (segment_relief.h). */
 #include "server/scene/segment.h"
 
 #include <math.h>
@@ -15,14 +18,17 @@
 #include "common/mem.h"
 #include "common/rng.h"
 #include "server/scene/adjacency.h"
-#include "server/scene/regions.h"
 #include "server/scene/segment_names.h"
 #include "server/scene/segment_relief.h"
 
 #define CONVEX_FACTOR                                                                                                  \
-    0.3f                   /* of the weight of a convex fold: objects are convex, and borders between objects are
+    0.3f            /* of the weight of a convex fold: objects are convex, and borders between objects are
                                * mostly concave */
-#define FLAT 0.002f        /* weight below which there is no fold: 3.6 degrees concave, 6.6 convex */
+#define FLAT 0.002f /* weight below which there is no fold: 3.6 degrees concave, 6.6 convex */
+#define SIZE_BONUS                                                                                                     \
+    0.5 /* added to the internal difference of a region of 1 / BONUS_PARTS of the mesh's
+                                    * area */
+#define BONUS_PARTS 100000.0
 #define SMALL_PARTS 5000.0 /* a region of less than 1 / SMALL_PARTS of the mesh is small */
 #define SCAN_EVENNESS                                                                                                  \
     16.0 /* mean square of triangle areas over their squared mean: 1 to 3 for fused depth maps,
@@ -52,12 +58,50 @@ void segments_from_object_id(struct segments *s, const struct mesh *mesh) {
     }
 }
 
+struct link {
+    float weight;
+    uint32_t half_edge; /* continues at the next one of its ring */
+};
+
+/* Disjoint sets of triangles (union by area, path halving). */
+struct regions {
+    uint32_t *parent; /* [triangle_count] */
+    double *area;     /* [triangle_count] of a root: m^2 */
+    float *inside;    /* [triangle_count] of a root: greatest weight joined inside */
+};
+
+static uint32_t root_of(struct regions *r, uint32_t t) {
+    while (r->parent[t] != t) {
+        r->parent[t] = r->parent[r->parent[t]];
+        t = r->parent[t];
+    }
+    return t;
+}
+
+static void join(struct regions *r, uint32_t a, uint32_t b, float weight) {
+    if (r->area[a] < r->area[b] || (r->area[a] == r->area[b] && b < a)) {
+        uint32_t swap = a;
+        a = b;
+        b = swap;
+    }
+    r->parent[b] = a;
+    r->area[a] += r->area[b];
+    r->inside[a] = fmaxf(weight, fmaxf(r->inside[a], r->inside[b]));
+}
+
 static vec3 centre_of(const struct mesh *mesh, uint32_t t) { return mesh_point(mesh, t, 1.0f / 3.0f, 1.0f / 3.0f); }
 
+static int lightest_first(const void *left, const void *right) {
+    const struct link *a = left, *b = right;
+    if (a->weight != b->weight)
+        return a->weight < b->weight ? -1 : 1;
+    return a->half_edge < b->half_edge ? -1 : a->half_edge > b->half_edge;
+}
+
 /* All pairs of triangles that share an edge, in order of increasing weight. */
-static struct region_link *make_links(const struct mesh *mesh, const struct adjacency *adjacency, size_t *count) {
+static struct link *make_links(const struct mesh *mesh, const struct adjacency *adjacency, size_t *count) {
     vec3 *normal = adjacency_smooth_normals(adjacency, mesh);
-    struct region_link *link = mem_array(3 * mesh->triangle_count, sizeof *link);
+    struct link *link = mem_array(3 * mesh->triangle_count, sizeof *link);
     *count = 0;
     for (uint32_t h = 0; h < 3 * mesh->triangle_count; h++) {
         uint32_t next = adjacency->next[h];
@@ -68,10 +112,10 @@ static struct region_link *make_links(const struct mesh *mesh, const struct adja
         vec3 between = vec3_sub(centre_of(mesh, b), centre_of(mesh, a));
         bool convex = vec3_dot(vec3_sub(normal[b], normal[a]), between) > 0.0f;
         float weight = convex ? CONVEX_FACTOR * bend : bend;
-        link[(*count)++] = (struct region_link){fmaxf(0.0f, weight - FLAT), h};
+        link[(*count)++] = (struct link){fmaxf(0.0f, weight - FLAT), h};
     }
     mem_free(normal);
-    regions_sort_links(link, *count);
+    qsort(link, *count, sizeof *link, lightest_first);
     return link;
 }
 
@@ -136,7 +180,7 @@ static void merge_debris(struct regions *r, const struct mesh *mesh, double smal
     for (uint32_t t = 0; t < n; t++) {
         target[t] = NONE;
         distance_m[t] = cubes.side_m;
-        if (r->area[regions_root(r, t)] < small_area)
+        if (r->area[root_of(r, t)] < small_area)
             continue;
         int64_t cube[3];
         cube_of(&cubes, centre_of(mesh, t), cube);
@@ -145,20 +189,20 @@ static void merge_debris(struct regions *r, const struct mesh *mesh, double smal
         *head = t;
     }
     for (uint32_t t = 0; t < n; t++) {
-        uint32_t root = regions_root(r, t);
+        uint32_t root = root_of(r, t);
         if (r->area[root] < small_area)
             target[root] = nearest_triangle(&cubes, centre_of(mesh, t), &distance_m[root], target[root]);
     }
     uint32_t strays = NONE;
     for (uint32_t t = 0; t < n; t++) {
-        if (regions_root(r, t) != t || r->area[t] >= small_area)
+        if (root_of(r, t) != t || r->area[t] >= small_area)
             continue;
         if (target[t] != NONE)
-            regions_join(r, regions_root(r, target[t]), t, 0.0f);
+            join(r, root_of(r, target[t]), t, 0.0f);
         else if (strays == NONE)
             strays = t;
         else
-            regions_join(r, regions_root(r, strays), t, 0.0f);
+            join(r, root_of(r, strays), t, 0.0f);
     }
     mem_free(distance_m);
     mem_free(target);
@@ -174,7 +218,7 @@ static void number_regions(struct segments *s, struct regions *r, size_t triangl
     *s = (struct segments){0};
     s->of_triangle = mem_array(triangle_count, sizeof *s->of_triangle);
     for (uint32_t t = 0; t < triangle_count; t++) {
-        uint32_t root = regions_root(r, t);
+        uint32_t root = root_of(r, t);
         if (number[root] == NONE)
             number[root] = (uint32_t)s->count++;
         s->of_triangle[t] = number[root];
@@ -186,30 +230,42 @@ void segments_automatic(struct segments *s, const struct mesh *mesh) {
     size_t n = mesh->triangle_count, link_count;
     struct adjacency adjacency;
     adjacency_make(&adjacency, mesh);
-    struct region_link *link = make_links(mesh, &adjacency, &link_count);
-    struct regions r;
+    struct link *link = make_links(mesh, &adjacency, &link_count);
+    struct regions r = {mem_array(n, sizeof *r.parent), mem_array(n, sizeof *r.area), mem_calloc(n, sizeof *r.inside)};
     double total = mesh_area(mesh);
-    regions_init(&r, mesh);
-    regions_join_by_weight(&r, &adjacency, link, link_count, total);
+    for (uint32_t t = 0; t < n; t++) {
+        r.parent[t] = t;
+        r.area[t] = (double)mesh_triangle_area(mesh, t);
+    }
+    double bonus = SIZE_BONUS * total / BONUS_PARTS;
     for (size_t i = 0; i < link_count; i++) {
-        uint32_t a = regions_root(&r, link[i].half_edge / 3),
-                 b = regions_root(&r, region_link_end(&adjacency, &link[i]));
+        uint32_t a = root_of(&r, link[i].half_edge / 3);
+        uint32_t b = root_of(&r, adjacency.next[link[i].half_edge] / 3);
+        double weight = (double)link[i].weight;
+        if (a != b && weight <= (double)r.inside[a] + bonus / r.area[a] &&
+            weight <= (double)r.inside[b] + bonus / r.area[b])
+            join(&r, a, b, link[i].weight);
+    }
+    for (size_t i = 0; i < link_count; i++) {
+        uint32_t a = root_of(&r, link[i].half_edge / 3);
+        uint32_t b = root_of(&r, adjacency.next[link[i].half_edge] / 3);
         if (a != b && fmin(r.area[a], r.area[b]) < total / SMALL_PARTS)
-            regions_join(&r, a, b, link[i].weight);
+            join(&r, a, b, link[i].weight);
     }
     bool scan = is_scan(mesh, total);
     if (scan)
         merge_debris(&r, mesh, total / SMALL_PARTS);
     number_regions(s, &r, n);
-    s->least_area = scan ? total / SMALL_PARTS : 0.0;
     if (scan)
-        s->count = segment_relief_split(s->of_triangle, s->count, mesh, &adjacency, s->least_area);
+        s->count = segment_relief_split(s->of_triangle, s->count, mesh, &adjacency, total / SMALL_PARTS);
     s->id = mem_array(s->count, sizeof *s->id);
     for (size_t i = 0; i < s->count; i++)
         s->id[i] = (int64_t)i;
     s->name = segment_names_make(s->of_triangle, s->count, mesh);
     s->name_count = s->name ? s->count : 0;
-    regions_release(&r);
+    mem_free(r.parent);
+    mem_free(r.area);
+    mem_free(r.inside);
     mem_free(link);
     adjacency_release(&adjacency);
 }

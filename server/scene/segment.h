@@ -17,7 +17,6 @@ struct segments {
     bool is_given;         /* by the input: `id` is its object_id */
     int64_t *id;           /* [count] the input's object_id, or the segment's own number; of a part that was split
                             * off: that of the whole; owned */
-    double least_area;     /* m^2, of an automatic segment of a scan; 0 of other meshes */
     size_t name_count;
     char **name; /* [name_count] of automatic segments by `id` (segment_names.h); none: NULL; owned */
 };

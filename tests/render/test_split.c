@@ -1,6 +1,6 @@
 /* split.h: of a wall that is one segment with a screen on it the screen is split off and found to emit, the
  * wall is not; white tiles among black ones and a patch of sun stay where they are, though they
- * are brighter by more. Of a scanned wall a red panel is parted. The same for any number of threads. */
+ * are brighter by more. The same for any number of threads. */
 #include "server/reconstruct/reconstruct.h"
 #include "tests/check.h"
 #include "tests/render/shell.h"
@@ -9,29 +9,23 @@
 #define COLUMNS 16 /* cells of a wall, of 0.25 m */
 #define ROWS 12
 #define WHITE 1 /* the ceiling */
-#define RED 2
-#define GREEN 3
 #define WALL 4  /* what is looked at */
 #define BLACK 5 /* the wall across */
 
 /* Of a wall's cell: its object in truth, or less than 0 for a hole. */
 typedef int64_t paint_function(int column, int row);
 
-/* A wall from `corner` along 4 m of unit `u` and 3 m of `v`, in cells that are cut into fine x fine quads. */
-static void add_fine_wall(struct mesh *m, vec3 corner, vec3 u, vec3 v, int fine, paint_function *paint) {
-    vec3 du = vec3_scale(u, 4.0f / (float)(fine * COLUMNS)), dv = vec3_scale(v, 3.0f / (float)(fine * ROWS));
-    for (int row = 0; row < fine * ROWS; row++) {
-        for (int column = 0; column < fine * COLUMNS; column++) {
-            int64_t object = paint(column / fine, row / fine);
+/* A wall from `corner` along 4 m of unit `u` and 3 m of `v`, in cells. */
+static void add_wall(struct mesh *m, vec3 corner, vec3 u, vec3 v, paint_function *paint) {
+    vec3 du = vec3_scale(u, 4.0f / COLUMNS), dv = vec3_scale(v, 3.0f / ROWS);
+    for (int row = 0; row < ROWS; row++) {
+        for (int column = 0; column < COLUMNS; column++) {
+            int64_t object = paint(column, row);
             vec3 at = vec3_mad(vec3_mad(corner, (float)column, du), (float)row, dv);
             if (object >= 0)
                 add_quad(m, object, at, du, dv);
         }
     }
-}
-
-static void add_wall(struct mesh *m, vec3 corner, vec3 u, vec3 v, paint_function *paint) {
-    add_fine_wall(m, corner, u, v, 1, paint);
 }
 
 static int64_t plain_floor(int column, int row) {
@@ -140,69 +134,6 @@ static void test_tiles(struct parallel *pool) {
     scene_release(&scene);
 }
 
-static int64_t panel(int column, int row) { return screen(column, row) == LAMP ? RED : WALL; }
-
-static int64_t plain_white(int column, int row) {
-    (void)column, (void)row;
-    return WHITE;
-}
-
-static int64_t plain_green(int column, int row) {
-    (void)column, (void)row;
-    return GREEN;
-}
-
-static int64_t plain_black(int column, int row) {
-    (void)column, (void)row;
-    return BLACK;
-}
-
-#define FINE 4 /* quads along a scanned cell */
-
-/* The same room as a scan has it: all of it in small triangles, and no objects once it was photographed. */
-static void make_scan(struct mesh *m) {
-    size_t quads = 6 * COLUMNS * ROWS * FINE * FINE + 1;
-    *m = (struct mesh){0};
-    m->position = mem_array(4 * quads, sizeof *m->position);
-    m->index = mem_array(2 * quads, sizeof *m->index);
-    m->face = mem_array(2 * quads, sizeof *m->face);
-    m->object_id = mem_array(2 * quads, sizeof *m->object_id);
-    add_fine_wall(m, (vec3){0, 0, 0}, (vec3){1, 0, 0}, (vec3){0, 1, 0}, FINE, panel);
-    add_fine_wall(m, (vec3){4, 0, 0}, (vec3){-1, 0, 0}, (vec3){0, 0, 1}, FINE, plain_floor);
-    add_fine_wall(m, (vec3){0, 3, 0}, (vec3){1, 0, 0}, (vec3){0, 0, 1}, FINE, plain_white);
-    add_fine_wall(m, (vec3){0, 0, 0}, (vec3){0, 0.75f, 0}, (vec3){0, 0, 1}, FINE, plain_white);
-    add_fine_wall(m, (vec3){4, 0, 0}, (vec3){0, 0, 0.75f}, (vec3){0, 1, 0}, FINE, plain_green);
-    add_fine_wall(m, (vec3){4, 0, 3}, (vec3){-1, 0, 0}, (vec3){0, 1, 0}, FINE, plain_black);
-    add_quad(m, LAMP, (vec3){1.5f, 2.9f, 1.0f}, (vec3){1, 0, 0}, (vec3){0, 0, 1});
-}
-
-/* Whether triangle t of that room is of the panel. */
-static bool is_red(size_t t) {
-    size_t quad = t / 2, row = quad / (COLUMNS * FINE), column = quad % (COLUMNS * FINE);
-    return row < ROWS * FINE && panel((int)column / FINE, (int)row / FINE) == RED;
-}
-
-static void test_color(struct parallel *pool) {
-    struct scene scene = {0};
-    struct reconstruction r;
-    size_t wrong = 0, reds = 0;
-    make_scan(&scene.mesh);
-    photograph_mesh(&scene, lamp_radiance, NULL, look_at_wall, pool);
-    mem_free(scene.mesh.object_id);
-    scene.mesh.object_id = NULL;
-    CHECK(reconstruct(&scene, 0, &r) == STATUS_OK);
-    CHECK(cJSON_GetNumberValue(cJSON_GetObjectItem(r.report, "parts_of_another_color")) == 1.0);
-    CHECK_THAT(r.segments.count == OBJECTS + 1, "%zu segments", r.segments.count);
-    CHECK(r.segments.id[OBJECTS] == r.segments.id[r.segments.of_triangle[0]]);
-    for (size_t t = 0; t < scene.mesh.triangle_count; t++) {
-        reds += is_red(t);
-        wrong += (r.segments.of_triangle[t] == OBJECTS) != is_red(t);
-    }
-    CHECK_THAT(wrong <= reds / 10, "%zu triangles of %zu", wrong, reds);
-    reconstruct_release(&r);
-    scene_release(&scene);
-}
-
 /* Nobody looks at the window or out of it. */
 static vec3 look_away(int frame) {
     vec3 at = spread(frame * 7 + 3, 0.0f);
@@ -235,7 +166,6 @@ int main(void) {
     wall_color[BLACK] = rgb_gray(0.04f);
     test_screen(pool);
     test_tiles(pool);
-    test_color(pool);
     test_sun(pool);
     parallel_free(pool);
     return check_result();

@@ -16,7 +16,6 @@
 #include "server/light/decision/shining.h"
 #include "server/scene/adjacency.h"
 #include "server/scene/by_segment.h"
-#include "server/scene/segment_color.h"
 
 #define FIRST_LEVEL 1.5f /* over the photographs' median radiance; no part is dimmer */
 #define LEVEL_STEP 1.25f /* from a level to the next; smaller steps find larger parts and take longer */
@@ -232,29 +231,13 @@ static void number_parts(struct split *split, const struct split_job *job, struc
     }
 }
 
-/* Makes parts of another colour segments of their own, in a scan; returns how many. */
-static size_t split_colors(const struct split_job *job, const struct mesh *mesh, struct segments *segments) {
-    size_t before = segments->count, bytes = mesh->triangle_count * sizeof *segments->of_triangle;
-    if (segments->least_area == 0.0)
-        return 0;
-    uint32_t *whole = mem_array(mesh->triangle_count, sizeof *whole);
-    memcpy(whole, segments->of_triangle, bytes);
-    segments->count = segment_color_split(segments->of_triangle, before, mesh, &job->adjacency, job->light.color,
-                                          segments->least_area);
-    segments->id = mem_realloc_array(segments->id, segments->count, sizeof *segments->id);
-    for (size_t t = 0; t < mesh->triangle_count; t++)
-        segments->id[segments->of_triangle[t]] = segments->id[whole[t]];
-    mem_free(whole);
-    return segments->count - before;
-}
-
 void split_segments(struct split *split, struct reconstruction *r, const struct views *views) {
     size_t triangles = r->scene->mesh.triangle_count;
     struct split_job job = {.r = r, .first_level = FIRST_LEVEL * views->median_radiance};
+    *split = (struct split){0};
     triangle_light_measure(&job.light, views, r->pool);
-    adjacency_make(&job.adjacency, &r->scene->mesh);
-    size_t colors = split_colors(&job, &r->scene->mesh, &r->segments);
     shining_init(&job.shining, r, &job.light);
+    adjacency_make(&job.adjacency, &r->scene->mesh);
     by_segment_sort_triangles(&job.triangles, &r->segments, triangles);
     job.parent = mem_array(triangles, sizeof *job.parent);
     job.part = mem_calloc(triangles, sizeof *job.part);
@@ -262,7 +245,6 @@ void split_segments(struct split *split, struct reconstruction *r, const struct 
     job.needed = mem_calloc(triangles, sizeof *job.needed);
     job.count = mem_calloc(r->segments.count, sizeof *job.count);
     parallel_for(r->pool, r->segments.count, try_segment, &job);
-    *split = (struct split){.color_count = colors};
     number_parts(split, &job, &r->segments);
     mem_free(job.count);
     mem_free(job.needed);

@@ -1,4 +1,4 @@
-/* split.h -- splits bright parts off their segments, and in a scan what has another colour.
+/* split.h -- splits bright parts off their segments.
  *
  * A segment emits as a whole or not at all, but a screen and its bezel, or a bulb and its fixture, often are one
  * segment. A connected part is split off if all of it is brighter than a white surface could be there, and the rest of
@@ -18,7 +18,6 @@
 
 /* The segments that hold bright parts: parts are the new segments [old_count, r->segments.count). */
 struct split {
-    size_t color_count; /* parts of another colour (segment_color.h), among the segments below old_count */
     size_t old_count, part_count;
     uint32_t *whole; /* [part_count] the segment that a part was taken from; owned */
 };
