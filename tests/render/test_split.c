@@ -1,6 +1,6 @@
 /* split.h: of a wall that is one segment with a screen on it the screen is split off and found to emit, the
- * wall is not; white tiles among black ones and a patch of sun stay where they are, though they
- * are brighter by more. The same for any number of threads. */
+ * wall is not; white tiles among black ones, a patch of sun and what a lamp lights from nearby stay where they are,
+ * though they are brighter by more. The same for any number of threads. */
 #include "server/reconstruct/reconstruct.h"
 #include "tests/check.h"
 #include "tests/render/shell.h"
@@ -41,7 +41,7 @@ static int64_t window(int column, int row) { return column >= 6 && column < 10 &
 
 /* The room of small_room.h, its floor and the wall at z = 0 in cells, the lamp left out where that wall holds it. */
 static void make_room(struct mesh *m, paint_function *paint, bool has_lamp) {
-    size_t quads = OBJECTS + 2 * COLUMNS * ROWS;
+    size_t quads = OBJECTS + 2 + 2 * COLUMNS * ROWS;
     *m = (struct mesh){0};
     m->position = mem_array(4 * quads, sizeof *m->position);
     m->index = mem_array(2 * quads, sizeof *m->index);
@@ -67,6 +67,11 @@ static void join_wall(struct mesh *m) {
         if (on_wall)
             m->object_id[t] = WALL;
     }
+}
+
+static int64_t plain_wall(int column, int row) {
+    (void)column, (void)row;
+    return WALL;
 }
 
 static enum status reconstruct(struct scene *scene, int threads, struct reconstruction *r) {
@@ -160,6 +165,29 @@ static void test_sun(struct parallel *pool) {
     scene_release(&scene);
 }
 
+static vec3 stand_off(int frame) {
+    vec3 at = spread(frame, 0.4f);
+    return (vec3){at.x, at.y, 1.0f + 0.6f * at.z};
+}
+
+/* A lamp with its back to the cameras lights a plain wall from so near that it is brighter there than white paint would
+ * be in the light that photographs show. */
+static void test_lit(struct parallel *pool) {
+    struct scene scene = {0};
+    make_room(&scene.mesh, plain_wall, false);
+    add_quad(&scene.mesh, LAMP, (vec3){1.7f, 1.2f, 0.7f}, (vec3){0, 0.6f, 0}, (vec3){0.6f, 0, 0});
+    add_quad(&scene.mesh, BLACK, (vec3){1.6f, 1.1f, 0.71f}, (vec3){0.8f, 0, 0}, (vec3){0, 0.8f, 0});
+    camera_place = stand_off;
+    photograph_mesh(&scene, lamp_radiance, NULL, look_at_wall, pool);
+    camera_place = NULL;
+    struct reconstruction r;
+    CHECK(reconstruct(&scene, 0, &r) == STATUS_OK);
+    CHECK_THAT(part_count(&r) == 0, "%zu parts", part_count(&r));
+    CHECK(!r.is_emitter[WALL] && r.is_emitter[LAMP]);
+    reconstruct_release(&r);
+    scene_release(&scene);
+}
+
 int main(void) {
     struct parallel *pool = parallel_new(0);
     wall_color[WHITE] = rgb_gray(0.85f);
@@ -167,6 +195,7 @@ int main(void) {
     test_screen(pool);
     test_tiles(pool);
     test_sun(pool);
+    test_lit(pool);
     parallel_free(pool);
     return check_result();
 }

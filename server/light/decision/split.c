@@ -13,7 +13,9 @@
 #include "common/quantile.h"
 #include "server/capture/triangle_light.h"
 #include "server/light/decision/reflection.h"
+#include "server/light/decision/rim.h"
 #include "server/light/decision/shining.h"
+#include "server/light/light_priors.h"
 #include "server/scene/adjacency.h"
 #include "server/scene/by_segment.h"
 
@@ -28,6 +30,12 @@
 #define MIN_CONTRAST 2.0f
 /* Triangles below this part of their part's radiance are mixed with their neighbours. */
 #define PURE 0.3f
+/* How far from a part's rim its step is measured: beyond mixed pixels, and before light has fallen off. */
+#define RIM_PIXELS 2.0f
+#define RIM_TRIANGLES 16 /* the same in triangles, at most */
+/* Deviations of base colour within a segment by which the step must exceed none, as all in which a lamp is told from
+ * what it lights (reflection.h). */
+#define RIM_SURE 3.0
 
 struct split_job {
     const struct reconstruction *r;
@@ -41,6 +49,7 @@ struct split_job {
     bool *settled;    /* [triangle_count] belongs to no further part */
     float *needed;    /* [triangle_count] no level below this is tested */
     uint32_t *count;  /* [segment_count] parts found */
+    struct rim rim;
 };
 
 /* A segment at one level. */
@@ -51,6 +60,7 @@ struct split_level {
     uint32_t segment;
     float radiance;          /* least observed radiance of a part at this level */
     uint32_t *part, *darker; /* [triangle_count] scratch: a possible part; what is darker than the level */
+    uint32_t *beside;        /* [triangle_count] scratch */
     float *value;            /* [triangle_count] scratch, as below */
     struct member *member;
 };
@@ -122,6 +132,13 @@ static size_t settle(const struct split_level *l, size_t part_size, float radian
     return kept;
 }
 
+/* Whether a part ends more sharply than base colour may in a segment. */
+static bool has_sharp_rim(const struct split_level *l, size_t part_size, float pixels) {
+    float triangles = ceilf(RIM_PIXELS / sqrtf(pixels / (float)part_size));
+    double step = rim_step(&l->job->rim, l->part, part_size, (int)fminf(triangles, RIM_TRIANGLES), l->beside);
+    return step > RIM_SURE * M_SQRT2 * hypot(ALBEDO_POINT, ALBEDO_PATCH);
+}
+
 static void make_part(const struct split_level *l, size_t part_size) {
     uint32_t part = ++l->job->count[l->segment];
     for (size_t i = 0; i < part_size; i++)
@@ -144,7 +161,7 @@ static void try_part(const struct split_level *l, size_t part_size, const struct
     }
     part_size = settle(l, part_size, part.radiance);
     if (darker->pixels >= fmaxf(MIN_PIXELS, MIN_SHARE * part.pixels) &&
-        part.radiance >= MIN_CONTRAST * darker->radiance &&
+        part.radiance >= MIN_CONTRAST * darker->radiance && has_sharp_rim(l, part_size, part.pixels) &&
         !shining_is_sunlit(&job->shining, l->part, part_size, l->darker, darker_count))
         make_part(l, part_size);
 }
@@ -201,12 +218,14 @@ static void try_segment(void *user, size_t segment, int thread) {
         return;
     l.part = mem_array(count, sizeof *l.part);
     l.darker = mem_array(count, sizeof *l.darker);
+    l.beside = mem_array(count, sizeof *l.beside);
     l.value = mem_array(count, sizeof *l.value);
     l.member = mem_array(count, sizeof *l.member);
     for (; l.radiance <= most; l.radiance *= LEVEL_STEP)
         try_level(&l);
     mem_free(l.member);
     mem_free(l.value);
+    mem_free(l.beside);
     mem_free(l.darker);
     mem_free(l.part);
 }
@@ -238,6 +257,7 @@ void split_segments(struct split *split, struct reconstruction *r, const struct 
     triangle_light_measure(&job.light, views, r->pool);
     shining_init(&job.shining, r, &job.light);
     adjacency_make(&job.adjacency, &r->scene->mesh);
+    job.rim = (struct rim){&job.adjacency, r->segments.of_triangle, job.light.observed, mem_calloc(triangles, 1)};
     by_segment_sort_triangles(&job.triangles, &r->segments, triangles);
     job.parent = mem_array(triangles, sizeof *job.parent);
     job.part = mem_calloc(triangles, sizeof *job.part);
@@ -246,6 +266,7 @@ void split_segments(struct split *split, struct reconstruction *r, const struct 
     job.count = mem_calloc(r->segments.count, sizeof *job.count);
     parallel_for(r->pool, r->segments.count, try_segment, &job);
     number_parts(split, &job, &r->segments);
+    mem_free(job.rim.side);
     mem_free(job.count);
     mem_free(job.needed);
     mem_free(job.settled);
