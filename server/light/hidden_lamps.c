@@ -16,17 +16,20 @@
 #define SURE 20.0
 
 struct lamp_candidate {
-    uint32_t segment;
-    double gain;   /* nats */
-    bool is_whole; /* `column` is that of light_model_respond_hidden, and not of SCREEN_POINTS */
-    float *column; /* of the response; owned */
+    bool is_segment; /* else a part of the border of unseen space */
+    uint32_t number; /* of the segment or part */
+    double gain;     /* nats */
+    bool is_whole;   /* `column` is all of its response, and not of SCREEN_POINTS */
+    float *column;   /* of the response; owned */
     struct joint_source source;
 };
 
 struct lamp_search {
     struct light_model *m;
-    size_t count;
+    const struct unseen_space *space; /* NULL: only segments are sought */
+    size_t count, part_count;
     struct lamp_candidate *candidate;
+    uint32_t part[LIGHT_MAX]; /* [part_count] that are lamps */
 };
 
 /* --- candidates -------------------------------------------------------------------------------------------- */
@@ -44,17 +47,52 @@ bool hidden_lamps_any(const struct light_model *m) {
     return any;
 }
 
+/* Points of a part, evenly spread over its faces. */
+static size_t spread_part(const struct unseen_space *u, uint32_t number, size_t wanted,
+                          struct segment_light_disc *disc) {
+    const struct unseen_part *part = &u->part[number];
+    size_t faces = part->end - part->first, count = faces < wanted ? faces : wanted;
+    float area_m2 = u->side_m * u->side_m * (float)faces / (float)count;
+    for (size_t i = 0; i < count; i++) {
+        const struct unseen_face *face = &u->face[part->first + (2 * i + 1) * faces / (2 * count)];
+        struct surface_point at = {.position = face->middle, .normal = face->normal, .shading = face->normal};
+        disc[i] = (struct segment_light_disc){at, area_m2, 1.0f};
+    }
+    return count;
+}
+
+/* Fills a candidate's column, by so many points, or as well as it can be. */
+static void respond(const struct lamp_search *s, struct lamp_candidate *c, size_t points) {
+    const struct light_model *m = s->m;
+    struct segment_light_disc disc[SEGMENT_LIGHT_POINTS];
+    c->is_whole = points == SEGMENT_LIGHT_POINTS;
+    memset(c->column, 0, m->points.count * sizeof *c->column);
+    if (!c->is_segment)
+        segment_light_add_discs(&m->lamps.light, m->points.point, m->points.count, disc,
+                                spread_part(s->space, c->number, points, disc), c->column);
+    else if (c->is_whole)
+        light_model_respond_hidden(m, c->number, c->column);
+    else
+        segment_light_add(&m->lamps.light, m->points.point, m->points.count, c->number, points, c->column);
+}
+
+static void add_candidate(struct lamp_search *s, bool is_segment, uint32_t number) {
+    struct lamp_candidate *c = &s->candidate[s->count++];
+    *c = (struct lamp_candidate){.is_segment = is_segment, .number = number};
+    c->column = mem_calloc(s->m->points.count + 1, sizeof *c->column);
+    respond(s, c, SCREEN_POINTS);
+}
+
 static void find_candidates(struct lamp_search *s) {
     const struct light_model *m = s->m;
-    s->candidate = mem_calloc(m->r->segments.count + 1, sizeof *s->candidate);
+    size_t parts = s->space ? s->space->part_count : 0;
+    s->candidate = mem_calloc(m->r->segments.count + parts + 1, sizeof *s->candidate);
     for (size_t i = 0; i < m->r->segments.count; i++) {
-        if (!may_be_lamp(m, i))
-            continue;
-        struct lamp_candidate *c = &s->candidate[s->count++];
-        c->segment = (uint32_t)i;
-        c->column = mem_calloc(m->points.count + 1, sizeof *c->column);
-        segment_light_add(&m->lamps.light, m->points.point, m->points.count, c->segment, SCREEN_POINTS, c->column);
+        if (may_be_lamp(m, i))
+            add_candidate(s, true, (uint32_t)i);
     }
+    for (size_t i = 0; i < parts; i++)
+        add_candidate(s, false, (uint32_t)i);
 }
 
 static void try_candidate(void *user, size_t index, int thread) {
@@ -69,7 +107,9 @@ static int by_gain(const void *a, const void *b) {
     const struct lamp_candidate *first = a, *second = b;
     if (first->gain != second->gain)
         return first->gain < second->gain ? 1 : -1;
-    return (first->segment > second->segment) - (first->segment < second->segment);
+    if (first->is_segment != second->is_segment)
+        return first->is_segment ? -1 : 1;
+    return (first->number > second->number) - (first->number < second->number);
 }
 
 /* Logarithm of the odds that a lamp is there, of which one is expected among `count` candidates, if the loss is `gain`
@@ -90,14 +130,21 @@ static void find_likeliest(struct lamp_search *s) {
     size_t likeliest = s->count < LIKELIEST ? s->count : LIKELIEST;
     sort_candidates(s, s->count);
     for (size_t i = 0; i < likeliest; i++) {
-        struct lamp_candidate *c = &s->candidate[i];
-        if (c->is_whole)
-            continue;
-        memset(c->column, 0, s->m->points.count * sizeof *c->column);
-        light_model_respond_hidden(s->m, c->segment, c->column);
-        c->is_whole = true;
+        if (!s->candidate[i].is_whole)
+            respond(s, &s->candidate[i], SEGMENT_LIGHT_POINTS);
     }
     sort_candidates(s, likeliest);
+}
+
+/* A candidate, the fit's last source, is a lamp. */
+static void take_lamp(struct lamp_search *s, struct lamp_candidate *c) {
+    if (c->is_segment) {
+        struct light_lamp *lamp = light_lamps_add_hidden(&s->m->lamps, c->number);
+        lamp->source = s->m->fit.source_count - 1, lamp->column = c->column;
+    } else {
+        s->part[s->part_count++] = c->number;
+        mem_free(c->column);
+    }
 }
 
 /* Fits the likeliest candidate together with all sources; false, and all as it was, where the evidence for it does not
@@ -115,8 +162,7 @@ static bool add_likeliest(struct lamp_search *s) {
     joint_fit_add(&m->fit, &best->source, best->column);
     bool is_likely = log_odds(m, without - joint_fit_solve(&m->fit), s->count) > log(SURE);
     if (is_likely) {
-        struct light_lamp *lamp = light_lamps_add_hidden(&m->lamps, best->segment);
-        lamp->source = m->fit.source_count - 1, lamp->column = best->column;
+        take_lamp(s, best);
         *best = s->candidate[--s->count];
     } else {
         joint_fit_remove_last(&m->fit);
@@ -126,13 +172,41 @@ static bool add_likeliest(struct lamp_search *s) {
     return is_likely;
 }
 
+/* Takes what unseen_lamps.h added as lamps, for which the evidence sufficed. */
+static void take_added(struct lamp_search *s) {
+    for (size_t i = s->count; i-- > 0;) {
+        struct lamp_candidate *c = &s->candidate[i];
+        if (!c->is_segment || !segment_range_has(&s->m->r->unseen_lamps, c->number))
+            continue;
+        respond(s, c, SEGMENT_LIGHT_POINTS);
+        try_candidate(s, i, 0);
+        joint_fit_add(&s->m->fit, &c->source, c->column);
+        take_lamp(s, c);
+        *c = s->candidate[--s->count];
+    }
+    joint_fit_solve(&s->m->fit);
+}
+
+static void search(struct lamp_search *s) {
+    struct light_model *m = s->m;
+    size_t before = m->lamps.count;
+    find_candidates(s);
+    take_added(s);
+    while (s->count > 0 && m->lamps.count - before + s->part_count < LIGHT_MAX && add_likeliest(s))
+        continue;
+    for (size_t i = 0; i < s->count; i++)
+        mem_free(s->candidate[i].column);
+    mem_free(s->candidate);
+}
+
 void hidden_lamps_find(struct light_model *m) {
     struct lamp_search s = {.m = m};
-    size_t before = m->lamps.count;
-    find_candidates(&s);
-    while (s.count > 0 && m->lamps.count - before < LIGHT_MAX && add_likeliest(&s))
-        continue;
-    for (size_t i = 0; i < s.count; i++)
-        mem_free(s.candidate[i].column);
-    mem_free(s.candidate);
+    search(&s);
+}
+
+size_t hidden_lamps_find_parts(struct light_model *m, const struct unseen_space *space, uint32_t part[LIGHT_MAX]) {
+    struct lamp_search s = {.m = m, .space = space};
+    search(&s);
+    memcpy(part, s.part, s.part_count * sizeof *part);
+    return s.part_count;
 }

@@ -108,7 +108,7 @@ float light_deviation(const struct reconstruction *r) {
         power[segment] += emitted;
         all += emitted;
     }
-    if (r->environment.map.pixel || r->sun.is_there || r->opening_count > 0)
+    if (r->environment.map.pixel || r->sun.is_there || r->openings.count > 0)
         all = 0.0;
     for (uint32_t i = 0; i < r->light.source_count && all > 0.0; i++) {
         const struct estimated_source *s = &r->light.source[i];

@@ -121,7 +121,7 @@ static size_t sort_bright(const struct light_lamps *l, bool saturated, struct br
 static void choose_saturated(struct light_lamps *l) {
     struct bright *found;
     size_t count = sort_bright(l, true, &found);
-    for (size_t i = 0; i < count && l->count <= LIGHT_MAX + l->r->opening_count; i++)
+    for (size_t i = 0; i < count && l->count <= LIGHT_MAX + l->r->openings.count; i++)
         add_saturated(l, found[i].segment);
     mem_free(found);
 }
@@ -155,7 +155,9 @@ static void choose_openings(struct light_lamps *l) {
 
 static void choose_again(struct light_lamps *l) {
     const struct reconstruction *r = l->r;
-    for (size_t i = 0; i < r->segments.count - r->opening_count && l->count < LIGHT_LAMPS_MAX; i++) {
+    for (size_t i = 0; i < r->segments.count && l->count < LIGHT_LAMPS_MAX; i++) {
+        if (segment_range_has(&r->openings, i))
+            continue;
         if (r->evidence[i].is_unbounded)
             add_saturated(l, (uint32_t)i);
         else if (r->evidence[i].is_hidden)

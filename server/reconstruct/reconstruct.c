@@ -10,7 +10,9 @@
 #include "server/capture/views.h"
 #include "server/light/emitters.h"
 #include "server/light/light_estimate.h"
+#include "server/light/added_surface.h"
 #include "server/light/openings.h"
+#include "server/light/unseen_lamps.h"
 #include "server/light/sun/sun_find.h"
 #include "server/light/sky/unseen_light.h"
 #include "server/material/emission_pattern.h"
@@ -59,13 +61,13 @@ static void log_hidden_lights(const struct stage_run *run) {
     const struct reconstruction *r = run->r;
     size_t lamps = 0;
     char line[128];
-    for (size_t i = 0; i < r->segments.count - r->opening_count; i++)
-        lamps += r->evidence[i].is_hidden;
+    for (size_t i = 0; i < r->segments.count; i++)
+        lamps += r->evidence[i].is_hidden && !segment_range_has(&r->openings, i);
     snprintf(line, sizeof line, "light: %zu lamps that no photograph shows were found by what they light", lamps);
     if (lamps > 0)
         run->hooks->log(run->hooks->user, line);
-    snprintf(line, sizeof line, "light: it comes in at %zu places where nothing was scanned", r->opening_count);
-    if (r->opening_count > 0)
+    snprintf(line, sizeof line, "light: it comes in at %zu places where nothing was scanned", r->openings.count);
+    if (r->openings.count > 0)
         run->hooks->log(run->hooks->user, line);
     if (r->sun.is_there && !r->sun.is_measured)
         run->hooks->log(run->hooks->user, "light: a sun that no photograph shows was found by what it lights");
@@ -75,14 +77,13 @@ static enum status prepare(struct stage_run *run, struct error *err) {
     return prepare_run(run->r, &run->views, &run->pace, err);
 }
 
-/* Adds the surfaces from which light comes in where a scan lacks some, and fuses again what photographs show. */
-static enum status find_openings(struct stage_run *run, struct error *err) {
+/* Makes again what was made of the mesh, and fuses again what photographs show, if so many quads were added to it. */
+static enum status take_up_surface(struct stage_run *run, size_t quads, struct error *err) {
     struct reconstruction *r = run->r;
-    size_t cells = openings_find(r, &run->views);
-    if (cells == 0)
+    if (quads == 0)
         return STATUS_OK;
     fused_release(&r->fused);
-    enum status status = prepare_again(r, &run->views, OPENINGS_TRIANGLES * cells, err);
+    enum status status = prepare_again(r, &run->views, ADDED_TRIANGLES * quads, err);
     if (status == STATUS_OK)
         fuse(&r->fused, &run->views, &r->noise, &r->atlas, &r->inverse, r->pool);
     return status;
@@ -90,7 +91,10 @@ static enum status find_openings(struct stage_run *run, struct error *err) {
 
 static enum status fuse_photographs(struct stage_run *run, struct error *err) {
     fuse(&run->r->fused, &run->views, &run->r->noise, &run->r->atlas, &run->r->inverse, run->r->pool);
-    enum status status = find_openings(run, err);
+    /* Surface from which light comes where a scan has none. */
+    enum status status = take_up_surface(run, openings_find(run->r, &run->views), err);
+    if (status == STATUS_OK)
+        status = take_up_surface(run, unseen_lamps_find(run->r, &run->views), err);
     if (status != STATUS_OK)
         return status;
     prepare_report_surface(run->r);

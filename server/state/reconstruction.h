@@ -37,6 +37,15 @@ struct held_out {
     double brightness_error;                    /* squared, of the whole view, relative (metrics_brightness_error) */
 };
 
+/* Segments from `first` on. */
+struct segment_range {
+    size_t first, count;
+};
+
+static inline bool segment_range_has(const struct segment_range *range, size_t segment) {
+    return segment >= range->first && segment - range->first < range->count;
+}
+
 struct reconstruction {
     struct scene *scene;             /* borrowed */
     const struct settings *settings; /* borrowed */
@@ -57,7 +66,8 @@ struct reconstruction {
     double unseen_share;            /* part of the rays from surfaces that meet nothing observed */
     bool exposures_drift, colors_drift; /* given exposures, white balance (calibrate.h) */
     bool is_surrounded;                 /* holes of the scan were filled, and what is left open shows no sky */
-    size_t opening_count;               /* the last segments of so many are openings (openings.h) */
+    struct segment_range openings;      /* segments that openings.h added */
+    struct segment_range unseen_lamps;  /* that unseen_lamps.h added */
     bool sky_is_fitted;                 /* unobserved sky was fitted to surfaces (unseen_light.h), not filled in */
     struct grey_card grey_card;         /* a point of known reflectance */
     double luminance_per_unit;          /* cd/m2 of radiance 1, once reported; 0: unknown */

@@ -100,7 +100,7 @@ static void check_lights(const struct reconstruction *r) {
         CHECK_THAT(height > 3.0, "%g m high", height);
         CHECK_THAT(red > 0.5 * (double)lamp_radiance.r && red < 1.5 * (double)lamp_radiance.r, "%g in red", red);
     }
-    CHECK(count > 0 && (size_t)count <= r->opening_count);
+    CHECK(count > 0 && (size_t)count <= r->openings.count);
 }
 
 /* Figures of the surface are those of what it is with the openings. */
@@ -177,7 +177,7 @@ static void test_mostly_unscanned(struct parallel *pool) {
     CHECK(shell_run(&scene, &settings, 2, &shell, &r) == STATUS_CANCELLED);
     CHECK(scene.mesh.triangle_count > scanned);
     CHECK_THAT(r.unseen_share > 0.3, "%g of the rays", r.unseen_share);
-    CHECK(r.opening_count == 0 && !r.is_surrounded && r.sky_is_fitted);
+    CHECK(r.openings.count == 0 && !r.is_surrounded && r.sky_is_fitted);
     reconstruct_release(&r);
     shell_release(&shell);
     settings_release(&settings);
