@@ -12,6 +12,8 @@
 #define SCREEN_POINTS 8
 /* Candidates that are tried with their whole response. */
 #define LIKELIEST 8
+/* Candidates that are tried again once there is a further lamp, for time: it takes from what most of them gain. */
+#define AGAIN 32
 /* Odds that are asked of a lamp: a false one costs more than a missed one. */
 #define SURE 20.0
 
@@ -28,7 +30,8 @@ struct lamp_search {
     struct light_model *m;
     const struct unseen_space *space; /* NULL: only segments are sought */
     size_t count, part_count;
-    struct lamp_candidate *candidate;
+    struct lamp_candidate *candidate; /* [count] once they were tried the likeliest first */
+    bool was_tried;
     uint32_t part[LIGHT_MAX]; /* [part_count] that are lamps */
 };
 
@@ -114,9 +117,8 @@ static int by_gain(const void *a, const void *b) {
 
 /* Logarithm of the odds that a lamp is there, of which one is expected among `count` candidates, if the loss is `gain`
  * lower with it. How alike patches are is measured with it: without, what it lights agrees. */
-static double log_odds(struct light_model *m, double gain, size_t count) {
-    light_model_measure(m);
-    return gain / m->patches_alike - log((double)count);
+static double log_odds(const struct light_model *m, double gain, size_t count) {
+    return gain / light_model_alike_last(m) - log((double)count);
 }
 
 /* Sorts the first `count` candidates by what each gains with all other sources as they are. */
@@ -128,7 +130,8 @@ static void sort_candidates(struct lamp_search *s, size_t count) {
 /* Sorts the likeliest candidate to the front. */
 static void find_likeliest(struct lamp_search *s) {
     size_t likeliest = s->count < LIKELIEST ? s->count : LIKELIEST;
-    sort_candidates(s, s->count);
+    sort_candidates(s, s->was_tried && s->count > AGAIN ? AGAIN : s->count);
+    s->was_tried = true;
     for (size_t i = 0; i < likeliest; i++) {
         if (!s->candidate[i].is_whole)
             respond(s, &s->candidate[i], SEGMENT_LIGHT_POINTS);

@@ -9,7 +9,7 @@ struct alike {
     const struct joint_fit *f;
     float radius_m;
     vec3 *middle;  /* [patch_count] of the patches */
-    double *score; /* [patch_count] derivative of the loss by the patch's offset, for its prior's part */
+    double *score; /* [patch_count] weighted derivative of the loss by the patch's offset, for its prior's part */
     double products, squares;
 };
 
@@ -34,7 +34,15 @@ static void add_block(struct alike *a, const struct joint_block *b) {
     }
 }
 
-double joint_alike(const struct joint_fit *f, const vec3 *position, float radius_m) {
+/* A source's share of the light of a patch. */
+static double share_of(const struct joint_fit *f, size_t patch, size_t source, const double *x) {
+    double share = 0.0;
+    for (size_t i = f->patch[patch]; i < f->patch[patch + 1]; i++)
+        share += (double)f->response[i * f->source_max + source] * x[source] / joint_fit_light(f, i, x);
+    return share / (double)(f->patch[patch + 1] - f->patch[patch]);
+}
+
+double joint_alike(const struct joint_fit *f, const vec3 *position, float radius_m, size_t source) {
     struct alike a = {.f = f, .radius_m = radius_m};
     struct joint_scratch s;
     double *x = joint_fit_radiances(f);
@@ -47,7 +55,8 @@ double joint_alike(const struct joint_fit *f, const vec3 *position, float radius
         joint_find_base(f, b, x, &s);
         joint_settle(f, b, &s);
         for (size_t p = b->first_patch; p < b->end_patch; p++)
-            a.score[p] = s.stiffness[p - b->first_patch] * s.offset[p - b->first_patch];
+            a.score[p] = s.stiffness[p - b->first_patch] * s.offset[p - b->first_patch] *
+                         (source == JOINT_ALIKE_ALL ? 1.0 : share_of(f, p, source, x));
         add_block(&a, b);
     }
     joint_scratch_release(&s);

@@ -240,16 +240,19 @@ void light_model_survey(struct light_model *m, const struct views *views, const 
     make_fit(m);
 }
 
-void light_model_measure(struct light_model *m) {
+static double measure_alike(const struct light_model *m, size_t source) {
     vec3 *position = mem_array(m->points.count + 1, sizeof *position);
     for (size_t i = 0; i < m->points.count; i++)
         position[i] = m->points.point[i].at.position;
-    m->patches_alike = joint_alike(&m->fit, position, ALIKE_EDGES * m->points.edge_m);
+    double alike = joint_alike(&m->fit, position, ALIKE_EDGES * m->points.edge_m, source);
     mem_free(position);
+    return alike;
 }
 
+double light_model_alike_last(const struct light_model *m) { return measure_alike(m, m->fit.source_count - 1); }
+
 void light_model_find_errors(struct light_model *m) {
-    light_model_measure(m);
+    m->patches_alike = measure_alike(m, JOINT_ALIKE_ALL);
     joint_fit_errors(&m->fit);
     for (size_t j = 0; j < m->fit.source_count; j++)
         m->fit.source[j].error *= sqrt(m->patches_alike);

@@ -37,8 +37,8 @@ void light_model_allow_for_highlights(struct light_model *m);
 /* Adds to column[points.count] the response of a hidden lamp: its own light and what unseen surfaces reflect of it. */
 void light_model_respond_hidden(const struct light_model *m, uint32_t segment, float *column);
 
-/* Measures m->patches_alike at the fit's values. */
-void light_model_measure(struct light_model *m);
+/* How many patches are worth one to the source that was added last, at the fit's values (joint_alike.h). */
+double light_model_alike_last(const struct light_model *m);
 
 /* Sets the errors of the fit's sources at their values: standard deviations by patches of which so many are worth one,
  * which is measured first. */

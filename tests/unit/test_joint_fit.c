@@ -268,12 +268,42 @@ static void test_patches_alike(struct parallel *pool) {
                 point[i].observed *= expf(0.15f * deviate(seed, draw, 7));
             }
             start(&f, pool);
-            mean[together] += joint_alike(&f, position, 0.6f) / 8.0;
+            mean[together] += joint_alike(&f, position, 0.6f, JOINT_ALIKE_ALL) / 8.0;
             joint_fit_release(&f);
         }
     }
     CHECK_THAT(mean[0] >= 1.0 && mean[0] < 1.3, "%g", mean[0]);
     CHECK_NEAR(mean[1], 4.0, 0.8);
+}
+
+/* Where errors agree in one half of the floor alone, as there, four patches count as one to the source that lights that
+ * half, and one by one to the source of the other half. */
+static void test_source_alike(struct parallel *pool) {
+    const float x[2] = {0.0f, 0.0f};
+    static vec3 position[POINTS];
+    static float half[2][POINTS];
+    double mean[2] = {0.0, 0.0};
+    for (uint64_t seed = 1; seed <= 8; seed++) {
+        struct joint_fit f;
+        struct joint_source source = source_about(0.0, 1.0);
+        make_floor(seed, 0.5f, x, 0.0f);
+        for (size_t i = 0; i < POINTS; i++) {
+            uint32_t row = point[i].patch / (SIDE / PATCH), column = point[i].patch % (SIDE / PATCH);
+            int side = column < SIDE / PATCH / 2;
+            position[i] = (vec3){0.1f * PATCH * (float)column, 0.0f, 0.1f * PATCH * (float)row};
+            half[side][i] = 1.0f, half[!side][i] = 0.0f;
+            uint32_t draw = side ? row / 2 * SIDE + column / 2 : row * SIDE + column;
+            point[i].observed *= expf(0.15f * deviate(seed, draw, 7));
+        }
+        start(&f, pool);
+        for (size_t side = 0; side < 2; side++)
+            joint_fit_add(&f, &source, half[side]);
+        for (size_t side = 0; side < 2; side++)
+            mean[side] += joint_alike(&f, position, 0.6f, 1 + side) / 8.0;
+        joint_fit_release(&f);
+    }
+    CHECK_THAT(mean[0] >= 1.0 && mean[0] < 1.5, "%g", mean[0]);
+    CHECK_NEAR(mean[1], 4.0, 1.0);
 }
 
 /* The same of stated deviations (light_model.h): as many errors are within one as for independent patches, though four
@@ -367,6 +397,7 @@ int main(void) {
     test_minimum(pool);
     test_patches(pool);
     test_patches_alike(pool);
+    test_source_alike(pool);
     test_deviations_alike(pool);
     test_highlights(pool);
     test_threads();
