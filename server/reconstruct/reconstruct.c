@@ -10,7 +10,6 @@
 #include "server/capture/views.h"
 #include "server/light/emitters.h"
 #include "server/light/light_estimate.h"
-#include "server/light/added_surface.h"
 #include "server/light/openings.h"
 #include "server/light/unseen_lamps.h"
 #include "server/light/sun/sun_find.h"
@@ -77,24 +76,31 @@ static enum status prepare(struct stage_run *run, struct error *err) {
     return prepare_run(run->r, &run->views, &run->pace, err);
 }
 
-/* Makes again what was made of the mesh, and fuses again what photographs show, if so many quads were added to it. */
-static enum status take_up_surface(struct stage_run *run, size_t quads, struct error *err) {
+/* Makes again what was made of the mesh, and fuses again what photographs show, if surface was added to it. All that was
+ * added, the triangles from `scanned` on, is coarse. */
+static enum status take_up_surface(struct stage_run *run, bool was_added, size_t scanned, struct error *err) {
     struct reconstruction *r = run->r;
-    if (quads == 0)
+    if (!was_added)
         return STATUS_OK;
     fused_release(&r->fused);
-    enum status status = prepare_again(r, &run->views, ADDED_TRIANGLES * quads, err);
+    enum status status = prepare_again(r, &run->views, r->scene->mesh.triangle_count - scanned, err);
     if (status == STATUS_OK)
         fuse(&r->fused, &run->views, &r->noise, &r->atlas, &r->inverse, r->pool);
     return status;
 }
 
+/* Adds surface from which light comes where a scan has none. */
+static enum status find_unscanned(struct stage_run *run, struct error *err) {
+    size_t scanned = run->r->scene->mesh.triangle_count;
+    enum status status = take_up_surface(run, openings_find(run->r, &run->views) > 0, scanned, err);
+    if (status == STATUS_OK)
+        status = take_up_surface(run, unseen_lamps_find(run->r, &run->views) > 0, scanned, err);
+    return status;
+}
+
 static enum status fuse_photographs(struct stage_run *run, struct error *err) {
     fuse(&run->r->fused, &run->views, &run->r->noise, &run->r->atlas, &run->r->inverse, run->r->pool);
-    /* Surface from which light comes where a scan has none. */
-    enum status status = take_up_surface(run, openings_find(run->r, &run->views), err);
-    if (status == STATUS_OK)
-        status = take_up_surface(run, unseen_lamps_find(run->r, &run->views), err);
+    enum status status = find_unscanned(run, err);
     if (status != STATUS_OK)
         return status;
     prepare_report_surface(run->r);
