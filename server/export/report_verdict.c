@@ -69,19 +69,31 @@ static void put_found(struct buf *out, const cJSON *report) {
     buf_puts(out, ".</p>");
 }
 
-/* Lamps that stand for what lies behind gaps of the mesh. */
-static void put_light_of_openings(struct buf *out, const cJSON *report) {
+/* Lights of a kind whose surface was added to the mesh. */
+static int count_added(const cJSON *report, const char *of_kind) {
     const cJSON *light;
     int count = 0;
     cJSON_ArrayForEach(light, cJSON_GetObjectItemCaseSensitive(report, "lights")) {
         const char *kind = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(light, "kind"));
-        count += kind && strcmp(kind, "opening") == 0;
+        count += kind && strcmp(kind, of_kind) == 0 && is_true(light, "added");
     }
-    if (count > 0)
+    return count;
+}
+
+/* Lamps that stand for what lies behind gaps of the mesh, or where no photograph looks. */
+static void put_added_lights(struct buf *out, const cJSON *report) {
+    int openings = count_added(report, "opening"), lamps = count_added(report, "hidden");
+    if (openings > 0)
         buf_printf(out,
                    "<p>Light comes in from %d place%s where nothing was scanned: the lamps that are named “opening” "
                    "stand outside the mesh, as bright as what they light tells.</p>",
-                   count, count == 1 ? "" : "s");
+                   openings, openings == 1 ? "" : "s");
+    if (lamps > 0)
+        buf_printf(
+            out,
+            "<p>%d piece%s of surface %s added where the scan has none and no photograph looks, since a lamp must "
+            "be there: those that are named “hidden lamp”, as bright as what they light tells.</p>",
+            lamps, lamps == 1 ? "" : "s", lamps == 1 ? "was" : "were");
 }
 
 /* What was done about the holes of the mesh. */
@@ -96,7 +108,7 @@ static void put_holes(struct buf *out, const cJSON *report) {
         buf_printf(out,
                    "<p>%.0f opening%s of the mesh, %.3g m², %s taken for a way out of the room: a window, a door.</p>",
                    kept, kept == 1.0 ? "" : "s", number_at(report, "holes", "openings_m2"), kept == 1.0 ? "is" : "are");
-    put_light_of_openings(out, report);
+    put_added_lights(out, report);
 }
 
 static void put_views(struct buf *out, const cJSON *report) {

@@ -168,7 +168,9 @@ void light_report(const struct reconstruction *r) {
             const char *name = segments_name(&r->segments, &r->scene->mesh, s->segment);
             if (name)
                 json_add_string(entry, "name", name);
-            if (s->kind == ESTIMATED_OPENING)
+            bool is_added = s->kind == ESTIMATED_OPENING || segment_range_has(&r->unseen_lamps, s->segment);
+            json_add_bool(entry, "added", is_added);
+            if (is_added)
                 report_place(r, entry, s->segment);
         }
         const double radiance[3] = {(double)s->radiance.r, (double)s->radiance.g, (double)s->radiance.b};

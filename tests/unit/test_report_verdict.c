@@ -49,9 +49,11 @@ int main(void) {
     CHECK(says(holes, "1 opening of the mesh, 0.5 m², is taken for a way out"));
     CHECK(!says(good, "of the mesh"));
     CHECK(!says(holes, "nothing was scanned"));
-    const char *openings = "{\"holes\": {\"filled\": 1}, \"lights\": [{\"kind\": \"opening\"}, {\"kind\": \"hidden\"}, "
-                           "{\"kind\": \"opening\"}]}";
+    const char *openings = "{\"holes\": {\"filled\": 1}, \"lights\": [{\"kind\": \"opening\", \"added\": true}, "
+                           "{\"kind\": \"hidden\", \"added\": false}, {\"kind\": \"hidden\", \"added\": true}, "
+                           "{\"kind\": \"opening\", \"added\": true}]}";
     CHECK(says(openings, "Light comes in from 2 places where nothing was scanned"));
+    CHECK(says(openings, "1 piece of surface was added where the scan has none"));
     CHECK(!says(bad, "outlines") && !says(good, "outlines"));
     const char *outlines = "{\"metrics\": {\"held_out_views\": 1, \"psnr_db\": 25, \"msre\": 0.1, "
                            "\"msre_at_outlines\": 0.06, \"outline_share\": 0.05}, \"seen_surface_share\": 1,"
