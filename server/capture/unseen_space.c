@@ -6,12 +6,11 @@
 
 #include "common/mem.h"
 
-#define CUBES 160     /* along the diagonal of the mesh's box: 6 cm in a room */
-#define PART_M 1.0f   /* edge of the blocks within which faces are connected */
-#define LEAST_FACES 4 /* of a part */
-#define SAMPLES 5     /* points of a cube that are looked for */
-#define FACE_OFF                                                                                                       \
-    0.75f /* of a cube's side: where the border is from the middle of what is seen; .5 is between the cubes */
+#define CUBES 160       /* along the diagonal of the mesh's box: 6 cm in a room */
+#define PART_M 1.0f     /* edge of the blocks within which faces are connected */
+#define LEAST_FACES 4   /* of a part */
+#define SAMPLES 5       /* points of a cube that are looked for */
+#define FACE_OFF 0.75f  /* of its side: so far the border is off the middle of a seen one, a quarter into the unseen */
 #define SAMPLE_OFF 0.3f /* of its side: all but the first lie so far off its middle */
 
 static const float sample_place[SAMPLES][3] = {{0, 0, 0}, {1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}};

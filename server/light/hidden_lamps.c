@@ -177,6 +177,7 @@ static bool add_likeliest(struct lamp_search *s) {
 
 /* Takes what unseen_lamps.h added as lamps, for which the evidence sufficed. */
 static void take_added(struct lamp_search *s) {
+    size_t sources = s->m->fit.source_count;
     for (size_t i = s->count; i-- > 0;) {
         struct lamp_candidate *c = &s->candidate[i];
         if (!c->is_segment || !segment_range_has(&s->m->r->unseen_lamps, c->number))
@@ -187,7 +188,8 @@ static void take_added(struct lamp_search *s) {
         take_lamp(s, c);
         *c = s->candidate[--s->count];
     }
-    joint_fit_solve(&s->m->fit);
+    if (s->m->fit.source_count > sources)
+        joint_fit_solve(&s->m->fit);
 }
 
 static void search(struct lamp_search *s) {
