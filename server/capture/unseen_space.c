@@ -2,7 +2,6 @@
 #include "server/capture/unseen_space.h"
 
 #include <math.h>
-#include <string.h>
 
 #include "common/mem.h"
 
@@ -10,8 +9,8 @@
 #define PART_M 1.0f     /* edge of the blocks within which faces are connected */
 #define LEAST_FACES 4   /* of a part */
 #define SAMPLES 5       /* points of a cube that are looked for */
-#define FACE_OFF 0.75f  /* of its side: so far the border is off the middle of a seen one, a quarter into the unseen */
-#define SAMPLE_OFF 0.3f /* of its side: all but the first lie so far off its middle */
+#define FACE_OFF 0.75f  /* of a cube's side, from the middle of a seen one: a quarter into the unseen */
+#define SAMPLE_OFF 0.3f /* of a cube's side: all but the first lie so far off its middle, along each axis */
 
 static const float sample_place[SAMPLES][3] = {{0, 0, 0}, {1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}};
 

@@ -19,8 +19,8 @@ struct rim {
 };
 
 /* Logarithm of the median radiance within part[count] over that beside it, both so many triangles from the rim, or as
- * far as there are any; INFINITY: nothing is known beside it. Differs from thread to thread by segment alone.
- * list[triangle_count of the segment]: scratch. */
+ * far as there are any; INFINITY: nothing is known beside it. list[triangle_count of the segment]: scratch. Several
+ * threads may ask at once, each of a segment of its own. */
 double rim_step(const struct rim *rim, const uint32_t *part, size_t count, int triangles, uint32_t *list);
 
 #endif
