@@ -7,12 +7,16 @@
 # job_is JOB STATE
 # interrupt PID            Ctrl-C, once the client is ready for it; its exit status is $?
 # make_room DIR [FRAMES]
-# $tiny                    settings of a job that passes through all stages with hardly any work in them
+# $tiny                    settings of a job that passes through all stages with hardly any work in them. No surface is
+#                          sought that a scan lacks: in the closed room of make_room there is none, and the search would
+#                          be most of the work
+# $endless                 settings of one that iterates until it is stopped
 # shellcheck shell=bash disable=SC2034
 . tests/api/lib.sh "$@"
 build=$(realpath "$build")
 port=0
-tiny="--set texture_size=64 --set texels_per_metre=2 --set gather_samples=16 --set gloss_passes=1 --set iterations=3 --set texels_per_iteration=64 --set report_samples=1"
+tiny="--set texture_size=64 --set texels_per_metre=2 --set gather_samples=16 --set gloss_passes=1 --set iterations=3 --set texels_per_iteration=64 --set report_samples=1 --set holes=keep"
+endless=${tiny/iterations=3/iterations=1000000000}
 
 daemon_start() {
     start_daemon --listen "127.0.0.1:$port" "$@"

@@ -33,12 +33,12 @@ equal() { [ "$1" = "$2" ] || fail "${3:-value} is '$1', wanted '$2'"; }
 
 # wait_for SECONDS COMMAND...: until it succeeds.
 wait_for() {
-    local left=$(($1 * 20))
+    local left=$(($1 * 10))
     shift
     until "$@" >/dev/null 2>&1; do
         left=$((left - 1))
         [ "$left" -gt 0 ] || { fail "still not after a long wait: $*"; return 1; }
-        sleep 0.05
+        sleep 0.1
     done
 }
 

@@ -11,7 +11,6 @@ refused() { # WANTED-STATUS PART COMMAND...
     grep -qF -- "$part" "$work/err" || fail "$*: $(cat "$work/err")"
 }
 quick=$tiny
-endless="--set texture_size=64 --set texels_per_metre=2 --set iterations=1000000000 --set texels_per_iteration=64"
 
 mkdir -m 750 "$data"
 make_room "$work/room"

@@ -3,7 +3,6 @@
 # of jobs, exit statuses, --json of every command, mistakes.
 . tests/api/client.sh "$@"
 quick=$tiny
-long="--set texture_size=64 --set texels_per_metre=2 --set iterations=1000000000 --set texels_per_iteration=64"
 
 # so FILTER: $out must be JSON, and FILTER true of it.
 so() {
@@ -86,7 +85,7 @@ run 0 watch 1
 run 0 retry 1 --from refine -q
 run 0 watch 1
 run 4 retry 1 --from lunch
-run 0 pause "$("$build/unbake" submit --scene "${scene:0:10}" $long -q)" -q
+run 0 pause "$("$build/unbake" submit --scene "${scene:0:10}" $endless -q)" -q
 wait_for 60 job_is last paused # its worker, if it has one by now, has ended
 run 0 edit last --priority 7 --label a=b --name 'new name' --first --json
 so '.priority == 7 and .labels == {"a": "b"} and .name == "new name"'
@@ -170,7 +169,7 @@ run 7 get 1 report.html -o "$work/got"
 
 # --- what is asked of jobs -------------------------------------------------------------------------
 
-run 0 submit "$work/room" $long -q
+run 0 submit "$work/room" $endless -q
 job=$out
 wait_for 60 job_is "$job" running
 run 6 rm "$job"

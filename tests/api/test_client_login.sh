@@ -5,7 +5,6 @@
 export XDG_CONFIG_HOME=$work/config
 unset UNBAKE_TOKEN UNBAKE_CA
 tokens=$XDG_CONFIG_HOME/unbake/tokens
-quick="--set texture_size=64 --set texels_per_metre=2 --set iterations=1000000000 --set texels_per_iteration=64"
 
 daemon_start
 run 4 login <<<"unbake_1_nothing"
@@ -28,7 +27,7 @@ run 0 list
 
 # --- sharing ---
 make_room "$work/room"
-run 0 submit "$work/room" $quick
+run 0 submit "$work/room" $endless
 run 0 show 1 --json
 jq -e '.owner == "alice" and .shared == false' <<<"$out" >/dev/null || fail "$out"
 UNBAKE_TOKEN=$vic run 3 show 1
@@ -44,7 +43,7 @@ UNBAKE_TOKEN=$vic run 4 cancel 1
 has "$err" "may only read"
 run 0 edit 1 --unshare
 UNBAKE_TOKEN=$vic run 3 show 1
-run 0 submit --scene "$(unset out; run 0 show 1 --json; jq -r .scene <<<"$out")" $quick --share
+run 0 submit --scene "$(unset out; run 0 show 1 --json; jq -r .scene <<<"$out")" $endless --share
 UNBAKE_TOKEN=$vic run 0 show 2
 # A watch under way ends when its token is revoked.
 "$build/unbake" watch 2 --retry 20 >"$work/watch" 2>&1 & background=$!
@@ -83,7 +82,7 @@ if command -v openssl >/dev/null; then
     run 5 list --retry 0
     has "$err" "--ca FILE"
     run 0 login --ca "$work/cert.pem" <<<"$ada"
-    UNBAKE_CA=$work/cert.pem run 0 submit "$work/room" $quick --name again
+    UNBAKE_CA=$work/cert.pem run 0 submit "$work/room" $endless --name again
     UNBAKE_CA=$work/cert.pem run 0 cancel last
     daemon_end TERM
 fi

@@ -2,7 +2,6 @@
 # `watch` goes on where it was while the daemon is killed and started again, and Ctrl-C leaves the
 # job alone.
 . tests/api/client.sh "$@"
-long="--set texture_size=64 --set texels_per_metre=2 --set iterations=1000000000 --set texels_per_iteration=64"
 
 running_attempt() { # NUMBER
     "$build/unbake" show 1 --json | jq -e ".state == \"running\" and .attempt >= $1"
@@ -13,7 +12,7 @@ lines() { # NUMBER: so many progress events are in the file
 
 make_room "$work/room"
 daemon_start --set checkpoint_interval_sec=1
-run 0 submit "$work/room" $long -q
+run 0 submit "$work/room" $endless -q
 "$build/unbake" watch 1 --json --all >"$work/events" 2>"$work/watch.err" &
 watcher=$!
 "$build/unbake" watch 1 >"$work/plain" 2>"$work/plain.err" &
@@ -69,7 +68,7 @@ head -c 150000 "$work/second.tar" | curl -s -o /dev/null -X PATCH -H 'Tus-Resuma
     -H 'Content-Type: application/offset+octet-stream' --data-binary @- "$url$upload"
 received() { curl -s "$url/metrics" | sed -n 's/^unbaked_uploaded_bytes_total //p'; }
 before=$(received)
-run 0 submit "$work/second" $long
+run 0 submit "$work/second" $endless
 has "$err" "are on the server already: going on from there"
 has "$err" "sent second"
 equal "$(($(received) - before))" $((length - 150000)) "bytes that were sent"
@@ -81,5 +80,5 @@ make_room "$work/third" 4
 head -c 3000000 /dev/urandom >"$work/third/notes.bin"
 equal "$(find "$data" ! -type l -perm /077 | head)" "" "of scenes and jobs, open to other users"
 daemon_end TERM || fail "the daemon did not end with 0"
-run 5 submit "$work/third" $long --retry 1
+run 5 submit "$work/third" $endless --retry 1
 finish

@@ -4,7 +4,6 @@
 . tests/api/client.sh "$@"
 export XDG_CONFIG_HOME=$work/config
 unset UNBAKE_TOKEN UNBAKE_CA BROWSER DISPLAY WAYLAND_DISPLAY
-long="--set texture_size=64 --set texels_per_metre=2 --set iterations=1000000000 --set texels_per_iteration=64"
 so() { jq -e "$1" <<<"$out" >/dev/null 2>&1 || fail "not so: $1: $out"; }
 
 make_room "$work/room"
@@ -26,7 +25,7 @@ for form in "-o json" "--format json"; do
     equal "$out" "$all" "wait $form"
 done
 equal "$(jq -s -c 'map([.id, .state])' <<<"$out")" '[[1,"succeeded"],[2,"succeeded"]]'
-run 0 submit "$work/room" $long -q
+run 0 submit "$work/room" $endless -q
 run 9 wait 3 --timeout 0.2 -q
 run 0 wait 3 2 --any -q
 equal "$out" "2 succeeded"

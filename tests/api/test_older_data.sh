@@ -2,7 +2,6 @@
 # A data folder as versions before 17 of state.db left it, with the files of all attempts of a job in one folder: what
 # has ended is served as before, and a job that ran when that daemon was killed goes on from its checkpoint. Then, what all that has taken of the processors.
 . tests/api/client.sh "$@"
-endless="--set texture_size=64 --set texels_per_metre=2 --set iterations=1000000000 --set texels_per_iteration=64"
 said() { "$build/unbake" logs 2 2>/dev/null | grep -q "$1"; }
 
 make_room "$work/room"

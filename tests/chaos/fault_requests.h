@@ -84,10 +84,11 @@ static inline bool change(const char *method, const char *path, const char *acti
 
 static inline bool submit(const char *name, int iterations, char path[40]) {
     struct buf body;
-    char *json = mem_printf("{\"scene\":\"%s\",\"name\":\"%s\",\"settings\":{\"texture_size\":64,\"iterations\":%d,"
-                            "\"texels_per_iteration\":64,\"cameras_per_texel\":1,\"samples_per_camera\":2,"
-                            "\"gather_samples\":16,\"gloss_passes\":1,\"texels_per_metre\":2,\"report_samples\":1}}",
-                            scene, name, iterations);
+    char *json = mem_printf(
+        "{\"scene\":\"%s\",\"name\":\"%s\",\"settings\":{\"texture_size\":64,\"iterations\":%d,"
+        "\"texels_per_iteration\":64,\"cameras_per_texel\":1,\"samples_per_camera\":2,"
+        "\"gather_samples\":16,\"gloss_passes\":1,\"texels_per_metre\":2,\"report_samples\":1," CLOSED_ROOM "}}",
+        scene, name, iterations);
     bool made = ask_json(201, "POST", "/v1/jobs", json, &body);
     if (made)
         snprintf(path, 40, "/v1/jobs/%lld", strtoll(buf_text(&body) + 6, NULL, 10));

@@ -36,6 +36,7 @@ static char *root;                                  /* the faults are below it *
 static char peace[WORKER_OUTPUTS][SHA256_HEX_SIZE]; /* the outputs when nothing failed */
 static struct faults *faults;
 static bool is_memory; /* not the disk */
+static bool is_long;   /* ALL: surface is sought that a scan lacks, too */
 static long vague;     /* attempts that could not say that it was memory */
 static long astray;    /* allocations that failed elsewhere than planned: progress is told by the clock */
 
@@ -43,7 +44,9 @@ static long astray;    /* allocations that failed elsewhere than planned: progre
 static int attempt(const char *dir, int number) {
     int fd, status;
     /* libseccomp (2.5.4) uses memory that it did not get. */
-    worker_order(dir, room, number, 1, 0.0, !is_memory, is_memory ? SETTINGS : SETTINGS FEW_TEXELS);
+    char *settings = mem_printf("%s%s%s", SETTINGS, is_memory ? "" : FEW_TEXELS, is_long ? "" : "," CLOSED_ROOM);
+    worker_order(dir, room, number, 1, 0.0, !is_memory, settings);
+    mem_free(settings);
     pid_t pid = worker_start(binary, dir, library, log_path, &fd);
     worker_hear(fd, "nothing", 120.0); /* until it ends */
     waitpid(pid, &status, 0);
@@ -228,8 +231,8 @@ static long campaign(const char *what, void (*strike_one)(const struct turn *), 
 
 int main(int argc, char **argv) {
     long step = argc >= 7 ? strtol(argv[5], NULL, 10) : 0, from = argc > 7 ? strtol(argv[7], NULL, 10) : 1;
-    bool all = step > 0 && argv[6][0] == '1';
     char top[] = "/dev/shm/unbake-chaos-XXXXXX", page[64]; /* in memory: thousands of attempts wait for syncs */
+    is_long = step > 0 && argv[6][0] == '1';
     if (access("/dev/shm", W_OK) != 0)
         strcpy(top, "/tmp/unbake-chaos-XXXXXX");
     if (step <= 0 || !mkdtemp(top))
@@ -251,9 +254,9 @@ int main(int argc, char **argv) {
     CHECK(attempt(dir, 1) == 0);
     worker_hash(dir, peace);
     file_remove_tree(dir, NULL);
-    long strikes = campaign("workers", strike, step, all, from);
+    long strikes = campaign("workers", strike, step, is_long, from);
     /* They do less, and sooner. */
-    strikes += campaign("checks of scenes", strike_check, (step + 6) / 7, all, 1);
+    strikes += campaign("checks of scenes", strike_check, (step + 6) / 7, is_long, 1);
     if (is_memory) {
         figure("no memory, workers: allocations made to fail", (double)strikes, 5000, "higher");
         figure("no memory, workers: of them elsewhere than planned", (double)astray, 0.05 * (double)strikes, "lower");

@@ -18,7 +18,7 @@
 #define SETTINGS                                                                                                       \
     "\"texture_size\":64,\"iterations\":%ld,\"texels_per_iteration\":128,\"cameras_per_texel\":1,"                     \
     "\"samples_per_camera\":2,\"report_samples\":1,\"gather_samples\":16,\"gloss_passes\":1,"                          \
-    "\"texels_per_metre\":2,\"preview_interval_sec\":1"
+    "\"texels_per_metre\":2,\"preview_interval_sec\":1," CLOSED_ROOM
 
 static struct rig rig;
 static int port; /* that nodes are told */

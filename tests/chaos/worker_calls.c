@@ -7,7 +7,7 @@
 #define SETTINGS                                                                                                       \
     "\"texture_size\":64,\"iterations\":1,\"texels_per_iteration\":64,"                                                \
     "\"cameras_per_texel\":1,\"samples_per_camera\":2,\"report_samples\":1,"                                           \
-    "\"gather_samples\":16,\"gloss_passes\":1,\"texels_per_metre\":2,\"preview_interval_sec\":60"
+    "\"gather_samples\":16,\"gloss_passes\":1,\"texels_per_metre\":2,\"preview_interval_sec\":60," CLOSED_ROOM
 
 static char binary[512], library[PATH_MAX], log_path[128], dir[128];
 static struct faults *faults;

@@ -14,7 +14,7 @@
 #define SETTINGS                                                                                                       \
     "\"texture_size\":128,\"iterations\":150,\"texels_per_iteration\":512,"                                            \
     "\"cameras_per_texel\":1,\"samples_per_camera\":4,\"report_samples\":1,"                                           \
-    "\"gather_samples\":16,\"gloss_passes\":1,\"texels_per_metre\":4,\"preview_interval_sec\":60"
+    "\"gather_samples\":16,\"gloss_passes\":1,\"texels_per_metre\":4,\"preview_interval_sec\":60," CLOSED_ROOM
 
 static char binary[512], library[PATH_MAX];
 static struct faults *faults;
