@@ -6,6 +6,7 @@
 # has TEXT PART            PART must be in TEXT
 # job_is JOB STATE
 # interrupt PID            Ctrl-C, once the client is ready for it; its exit status is $?
+# held daemon_start ...    with chaos/preload/files.so under it: `hold WORD...` holds its workers up, see chaos/hold.c
 # make_room DIR [FRAMES]
 # $tiny                    settings of a job that passes through all stages with hardly any work in them. No surface is
 #                          sought that a scan lacks: in the closed room of make_room there is none, and the search would
@@ -32,6 +33,11 @@ daemon_end() {
     daemon_pid=
     return $code
 }
+
+# The address sanitizer wants to come first and does well enough second.
+preload=$build/tests/chaos/preload/files.so
+held() { ASAN_OPTIONS=verify_asan_link_order=0 LD_PRELOAD=$preload UNBAKE_FAULTS=$work/faults "$@"; }
+hold() { "$build/tests/chaos/hold" "$work/faults" "$@"; }
 
 run() {
     local wanted=$1 code

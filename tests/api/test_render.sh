@@ -8,7 +8,8 @@ make_room "$work/room" 8
 mkdir "$work/lib"
 ln -s "$build/tests/chaos/preload/oidn.so" "$work/lib/libOpenImageDenoise.so.2"
 export LD_LIBRARY_PATH=$work/lib # of the daemon
-daemon_start --set threads=2 --set small_render_paths=100000 --set max_attempts=9
+hold new "$data" || exit 1
+held daemon_start --set threads=2 --set small_render_paths=100000 --set max_attempts=9
 unset LD_LIBRARY_PATH
 # shellcheck disable=SC2086
 run 0 submit "$work/room" $tiny --watch
@@ -99,7 +100,8 @@ for pass in radiance direct; do
 done
 
 # --- a worker dies in the middle of several pictures: those that are done stay, and all bytes are the same ---
-many="--set cameras=photographs --view all --size 64x48 --spp 300 --set format=both"
+many="--set cameras=photographs --view all --size 64x48 --spp 10 --set format=both"
+hold slow 10 # a picture takes some eighty operations on files
 # shellcheck disable=SC2086
 run 0 render 1 $lamp $many -q; id=$out
 rendered() { [ "$("$build/unbake" show "$id" --json | jq '[.outputs[] | select(.name | test("radiance.exr"))] | length')" -ge "$1" ]; }
@@ -144,7 +146,7 @@ printf '{"w":8,"h":6,"fl_x":8,"fl_y":8,"frames":[{"file_path":"a","transform_mat
 cannot 'setting view: cameras.json has no view "99" among its 1' $lamp --set cameras="$work/cameras.json" --view 99
 
 # --- a small render does not wait behind a reconstruction, a large one does ---
-run 0 submit "$work/room" --set texture_size=64 --set texels_per_metre=2 --set iterations=1000000000 --set texels_per_iteration=64 -q
+run 0 submit "$work/room" $endless -q
 room=$out
 wait_for 60 job_is "$room" running
 # shellcheck disable=SC2086

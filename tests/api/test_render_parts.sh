@@ -1,16 +1,19 @@
 #!/bin/bash
 # A render in parts: at once on this machine and as jobs of a site, with a part's worker, a node and the daemon killed in
-# the middle. The pictures and views.json are those of a render in one part.
+# the middle. The pictures and views.json are those of a render in one part. What is killed is slow by its files, not by
+# its paths: `hold slow`.
 set -u
 . tests/api/site.sh "$@"
 lamp="--set lamp.1.kind=sphere --set lamp.1.position=0,1,0 --set lamp.1.radius=0.3"
-many="$lamp --set cameras=photographs --view all --size 64x48 --spp 200 --set format=both"
+many="$lamp --set cameras=photographs --view all --size 64x48 --spp 8 --set format=both"
 make_room "$work/room" 8
 flags="--set threads=2 --set max_running=2 --set small_render_paths=100000 --set max_attempts=3"
 daemon_start
-site_make batch "echo {memory_mib} >>$work/memory"
+site_make batch "export LD_PRELOAD=$preload UNBAKE_FAULTS=$work/faults ASAN_OPTIONS=verify_asan_link_order=0
+echo {memory_mib} >>$work/memory"
 daemon_end TERM
-start() { daemon_start $flags $site_flags --set executors=process,batch; } # shellcheck disable=SC2086
+hold new "$work" || exit 1
+start() { held daemon_start $flags $site_flags --set executors=process,batch; } # shellcheck disable=SC2086
 start
 # shellcheck disable=SC2086
 run 0 submit "$work/room" $tiny --watch
@@ -23,11 +26,12 @@ same() { # same JOB NAME
     run 0 get "$1" -q -o "$work/$2"
     diff -r -x preview "$work/whole" "$work/$2" || fail "$2: it differs from the render in one part"
 }
-rendered() { [ "$(field_of "$id" '[.outputs[] | select(.name | test("radiance.exr"))] | length')" -ge "$1" ]; }
+rendered() { [ "$("$build/unbake" show "$id" | grep -c "radiance\.exr")" -ge "$1" ]; }
 workers() { grep -c "job $id: attempt [0-9]* runs as process" "$work/log"; }
 pid_of() { grep "job $id: attempt $1 runs as process" "$work/log" | sed 's/.*process \([0-9]*\) .*/\1/'; }
 
 # --- at once on this machine; the worker of one part is killed ---
+hold slow 20
 # shellcheck disable=SC2086
 run 0 render 1 $many --set parts=2 --set executor=process -q; id=$out
 wait_for 60 test -s "$data/jobs/$id/attempt-2/out/views.jsonl"
@@ -36,6 +40,7 @@ equal "$(field_of "$id" '[.state, .parts.count]')" '["running",2]' "a job in par
 kill -KILL "$(pid_of 2)"
 wait_for 60 test -s "$data/jobs/$id/attempt-4/job.json"
 [ "$(jq .part.done "$data/jobs/$id/attempt-4/job.json")" -ge 1 ] || fail "what the killed part had done is done again"
+hold go
 wait_for 120 job_is "$id" succeeded
 same "$id" local
 run 0 show "$id"; has "$out" "2 of 2 done"
@@ -49,12 +54,15 @@ equal "$(curl -s "$url/v1/jobs/$id/log" | grep -c 'unbaked worker')" 0 "faults i
 # --- as jobs of a site: what they read is fetched, and a node is killed ---
 cp "$work/room/images/1.png" "$work/sky.png"
 sky="--environment $work/sky.png"
+hold go
 # shellcheck disable=SC2086
 run 0 render 1 $many $sky --set parts=1 -q -o "$work/whole"
+hold slow 20
 # shellcheck disable=SC2086
 run 0 render 1 $many $sky --set parts=2 --set executor=batch -q; job=$out id=$out
 wait_for 60 grep -q "job $id: attempt 3 runs on" "$work/log"
 kill -KILL "$(node_pid)"
+hold go
 wait_for 120 job_is "$id" succeeded
 same "$id" at-site
 [ "$(grep -c "job $id: attempt [0-9]* is lost" "$work/log")" = 1 ] || fail "no attempt, or more than one, was lost"
@@ -65,15 +73,18 @@ equal "$(find "$work/cache" -name '*.use' | wc -l)" 1 "what the cache has of its
 cat "$work/cache/"*/files/sky.png | cmp - "$work/sky.png" || fail "the cache has no sky"
 
 # --- in both places, and the daemon dies: parts at the site go on without it ---
+hold slow 20
 # shellcheck disable=SC2086
 run 0 render 1 $many $sky --set parts=4 -q; job=$out id=$out
 wait_for 60 rendered 2
 daemon_end KILL
 start
+hold go
 wait_for 120 job_is "$id" succeeded
 same "$id" both
 
 # --- a user's wishes are for all parts; what is done stays ---
+hold slow 20
 # shellcheck disable=SC2086
 run 0 render 1 $many $sky --set parts=4 -q; job=$out id=$out
 wait_for 60 rendered 2

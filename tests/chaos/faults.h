@@ -17,9 +17,10 @@
 
 #define FAULTS_CALLS_MAX 65536
 /* In place of an errno, with preload/files.c: whoever is about to do it is killed, or held up until
- * something else is armed, or nothing. */
+ * something else is armed, or nothing, or for delay_ms. */
 #define FAULTS_KILL (-1)
 #define FAULTS_HOLD (-2)
+#define FAULTS_SLOW (-3)
 
 enum faults_role { FAULTS_DAEMON = 1, FAULTS_WORKER = 2 };
 
@@ -31,7 +32,8 @@ struct faults {
     atomic_long count;    /* so many were done */
     atomic_long fail_at;  /* n, from 1; 0: none */
     atomic_bool for_good; /* all later ones fail, too */
-    atomic_int error;     /* errno of operations, or FAULTS_KILL, FAULTS_HOLD */
+    atomic_int error;     /* errno of operations, or FAULTS_KILL, FAULTS_HOLD, FAULTS_SLOW */
+    atomic_int delay_ms;  /* of FAULTS_SLOW */
     atomic_int armed;     /* so many times */
     atomic_bool is_told;  /* whoever is held up has been told to stop */
     atomic_long failed;   /* so many have */

@@ -120,6 +120,11 @@ static bool fails(void) {
         hold(armed);
         return false;
     }
+    if (error == FAULTS_SLOW) {
+        int ms = atomic_load(&faults->delay_ms);
+        nanosleep(&(struct timespec){.tv_sec = ms / 1000, .tv_nsec = ms % 1000 * 1000000L}, NULL);
+        return false;
+    }
     errno = error;
     return true;
 }
