@@ -232,7 +232,7 @@ async function dropFolder(page, files) {
 
 // An upload whose connection breaks off in the middle goes on; so does one whose page was closed, where it stopped.
 async function resumeUpload(files) {
-  const big = { ...files, "noise.bin": Buffer.alloc(20 << 20, 5).toString("base64") }; // three parts
+  const big = { ...files, "noise.bin": Buffer.alloc(9 << 20, 5).toString("base64") }; // two parts
   let page = await open(""), parts = 0;
   await page.waitForSelector("#jobs button");
   await page.setRequestInterception(true);
