@@ -6,7 +6,7 @@ set -u
 . tests/api/site.sh "$@"
 make_room "$work/room"
 daemon_start
-site_make batch "export LD_DEBUG=statistics"
+site_make batch "export LD_DEBUG=statistics" lease_sec=4
 daemon_end TERM
 # shellcheck disable=SC2086
 start() { daemon_start --set executors=process,batch $site_flags; }
@@ -46,10 +46,10 @@ kill -STOP "$daemon_pid"
 wait_for 60 bash -c "! kill -0 $(node_pid)"
 kill -CONT "$daemon_pid"
 same "daemon silent for a lease" 2
-grep -q 'has not answered for 6 s' "$work/nodes.log" || fail "the node did not give up"
+grep -q 'has not answered for 4 s' "$work/nodes.log" || fail "the node did not give up"
 
 job=$frozen
-is_told() { is .reason "$(hostname) has been silent for 9 s; batch still has the job"; }
+is_told() { is .reason "$(hostname) has been silent for 6 s; batch still has the job"; }
 wait_for 60 is_told
 is .attempt 1 || fail "the attempt was given up while its site had it"
 kill -CONT "$frozen_pid"

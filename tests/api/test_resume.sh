@@ -41,8 +41,8 @@ stop() {
     daemon=
 }
 submit() {
-    "$build/unbake" submit "$dir/room" --set texture_size=96 --set iterations=40 \
-        --set gather_samples=32 --set gloss_passes=1 --set texels_per_iteration=2048 --set report_samples=4 --set preview_interval_sec=60 >/dev/null 2>&1 ||
+    "$build/unbake" submit "$dir/room" --set texture_size=64 --set iterations=40 \
+        --set gather_samples=16 --set gloss_passes=1 --set texels_per_iteration=1024 --set report_samples=1 --set preview_interval_sec=60 >/dev/null 2>&1 ||
         fail "submit"
 }
 # textures NAME: the hashes of what the job left.
