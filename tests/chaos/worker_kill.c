@@ -11,10 +11,11 @@
 
 #define KILLS_PER_JOB 25
 #define LIVES_PER_JOB 20 /* such a part of a job's operations a life has at most */
+/* So few texels that each is looked at some hundred times: the correction is solved of what checkpoints hold. */
 #define SETTINGS                                                                                                       \
-    "\"texture_size\":128,\"iterations\":150,\"texels_per_iteration\":512,"                                            \
+    "\"texture_size\":64,\"iterations\":150,\"texels_per_iteration\":256,"                                             \
     "\"cameras_per_texel\":1,\"samples_per_camera\":4,\"report_samples\":1,"                                           \
-    "\"gather_samples\":16,\"gloss_passes\":1,\"texels_per_metre\":4,\"preview_interval_sec\":60," CLOSED_ROOM
+    "\"gather_samples\":16,\"gloss_passes\":1,\"texels_per_metre\":2,\"preview_interval_sec\":60," CLOSED_ROOM
 
 static char binary[512], library[PATH_MAX];
 static struct faults *faults;
