@@ -46,7 +46,7 @@ base_color=.base_color_psnr_db
 msre_of=.msre
 found=.emitters_found
 false_found=.emitters_false
-try hdr 24 0.2
+try hdr 25 0.2
 # In another light it is near the true room in that light (relight_room.c): a glowing ball, each lamp alone.
 "$build/tests/render/relight_room" "$work/hdr" "$work/hdr.out" "$work/relit" views=0,1 spp=8 label=hdr least=20 ratio=1.05 ||
     fail "relit it is not near the truth"
@@ -68,7 +68,7 @@ jq -S . "$work/evaluated/evaluation.json" >"$work/by_job.json"
 jq -S . "$work/hdr.json" | cmp - "$work/by_job.json" || fail "a job and the command evaluate differently"
 [ -s "$work/evaluated/pictures/base_color_$(jq -r '[.frames[] | select(.split == "test").file_path][0]' "$work/hdr/transforms.json" |
     sed 's/.*\///; s/\..*//').png" ] || fail "no pictures of the comparison: $(ls -R "$work/evaluated")"
-try sdr 24 0.2 --sdr
+try sdr 25 0.2 --sdr
 stop_daemon
 equal "$daemon_status" 0 "the daemon's exit status"
 finish
