@@ -14,6 +14,9 @@
 #define IS_BRIEF false
 #endif
 
+/* The long form of a test: in full size, and once more what adds little to a day's run. */
+#define IS_LONG (getenv("UNBAKE_LONG") != NULL)
+
 struct shell {
     long polls_until_stop; /* negative: never */
     bool spares_solve;     /* polls count from the first checkpoint on */
@@ -110,11 +113,15 @@ static inline void shell_release(struct shell *s) {
         mem_free(s->saved[i]);
 }
 
-/* Gutters are narrow where JSON does not say otherwise: of 64 texels a side wide ones would be a fifth. */
+/* Where JSON does not say otherwise gutters are narrow, as of 64 texels a side wide ones would be a fifth, and
+ * photographs are not calibrated, which takes half of the time and has tests of its own; in the long form
+ * (UNBAKE_LONG) they are. */
 static inline struct settings shell_settings(const char *json) {
     struct settings s;
     struct error err = {0};
-    cJSON *object = cJSON_Parse("{\"padding\": 2}");
+    cJSON *object = cJSON_CreateObject();
+    json_add_int(object, "padding", 2);
+    json_add_bool(object, "calibrate", IS_LONG);
     settings_init(&s);
     CHECK(settings_apply(&s, object, NULL, &err) == STATUS_OK);
     cJSON_Delete(object);
@@ -124,10 +131,13 @@ static inline struct settings shell_settings(const char *json) {
     return s;
 }
 
+/* Half of the texels that a texture of 64 x 64 has room for: where something is decided, or only bytes are compared. */
+#define SHELL_COARSE_TEXTURE "\"texture_size\":64,\"texels_per_metre\":4.8"
+
 /* Hardly anything is refined. The time of the whole goes with the number of texels. */
-#define SHELL_SETTINGS(texture_size)                                                                                   \
-    "{\"texture_size\":" texture_size ",\"iterations\":2,\"report_samples\":1,\"gather_samples\":64,"                  \
-    "\"texels_per_iteration\":64}"
+#define SHELL_LITTLE "\"iterations\":2,\"report_samples\":1,\"gather_samples\":64,\"texels_per_iteration\":64"
+#define SHELL_SETTINGS(texture_size) "{\"texture_size\":" texture_size "," SHELL_LITTLE "}"
+#define SHELL_COARSE "{" SHELL_COARSE_TEXTURE "," SHELL_LITTLE "}"
 #define SHELL_SMALL SHELL_SETTINGS("64")
 /* For what is found from few texels: one of several lamps, light in the shade of a small part of the floor. */
 #define SHELL_FINE SHELL_SETTINGS("128")

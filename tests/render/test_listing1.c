@@ -71,8 +71,9 @@ static double refine_figure(const struct reconstruction *r, const char *name) {
     return cJSON_GetNumberValue(cJSON_GetObjectItem(cJSON_GetObjectItem(r->report, "refine"), name));
 }
 
-static const char few_looks[] = "{\"texture_size\":64,\"refine_looks\":%d,\"time_limit_sec\":%d,\"report_samples\":2,"
-                                "\"calibrate\":false,\"gather_samples\":64,\"texels_per_iteration\":512}";
+static const char few_looks[] =
+    "{" SHELL_COARSE_TEXTURE ",\"refine_looks\":%d,\"time_limit_sec\":%d,\"report_samples\":2,"
+    "\"calibrate\":false,\"gather_samples\":64,\"texels_per_iteration\":512}";
 
 /* Goes on from the checkpoint, if there is one, to so many looks, or to the limit: the iterations by then. */
 static double run_looks(struct scene *scene, struct shell *shell, int wanted, int limit_sec, double *looks) {
@@ -98,8 +99,8 @@ static void test_ends_early(struct scene *scene) {
     double second = run_looks(scene, &shell, 4, 0, &looks);
     CHECK_THAT(second > first, "%g iterations, then %g", first, second);
     shell.sec_a_look = 1.0;
-    double third = run_looks(scene, &shell, 0, 200, &looks);
-    CHECK_THAT(third > second && third < second + 200.0, "%g iterations, then %g", second, third);
+    double third = run_looks(scene, &shell, 0, 80, &looks);
+    CHECK_THAT(third > second && third < second + 80.0, "%g iterations, then %g", second, third);
     shell_release(&shell);
 }
 
@@ -117,8 +118,9 @@ static void turn_inside_out(struct mesh *mesh, int64_t object) {
 
 static void test_recovers(struct scene *scene) {
     turn_inside_out(&scene->mesh, INSIDE_OUT);
-    struct settings s = shell_settings("{\"texture_size\":64,\"iterations\":400,\"report_samples\":32,"
-                                       "\"gather_samples\":64,\"texels_per_iteration\":512}");
+    struct settings s =
+        shell_settings("{\"texture_size\":64,\"iterations\":200,\"report_samples\":16,\"calibrate\":true,"
+                       "\"gather_samples\":64,\"texels_per_iteration\":512}");
     struct shell shell = {.polls_until_stop = -1};
     struct reconstruction r;
     CHECK(shell_run(scene, &s, 0, &shell, &r) == STATUS_OK);
@@ -169,12 +171,12 @@ int main(void) {
     make_scene(&scene, pool);
     parallel_free(pool);
     test_same_bytes(&scene, true, 2,
-                    "{\"texture_size\":64,\"iterations\":2,\"report_samples\":2,"
+                    "{" SHELL_COARSE_TEXTURE ",\"iterations\":2,\"report_samples\":2,"
                     "\"gather_samples\":64,\"texels_per_iteration\":256}");
     /* One iteration at each of the coarse levels, the first of which decides on emitters, and two at the finest. What
-     * goes before is that of the run above, but for the calibration, which takes a third of the time. */
+     * goes before is that of the run above, but for the calibration of the long form. */
     test_same_bytes(&scene, false, 5,
-                    "{\"texture_size\":64,\"iterations\":5,\"report_samples\":2,\"calibrate\":false,"
+                    "{" SHELL_COARSE_TEXTURE ",\"iterations\":5,\"report_samples\":2,\"calibrate\":false,"
                     "\"method\":\"listing1\",\"texels_per_iteration\":256,\"coarse_levels\":2}");
     test_stop_in_solve(&scene);
     test_ends_early(&scene);
