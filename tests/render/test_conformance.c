@@ -1,5 +1,6 @@
 /* The path tracer and its derivatives against Mitsuba 3 on the conformance room: every picture by
- * z-tests per pixel and on the mean, with both sides' standard errors. */
+ * z-tests per pixel and on the mean, with both sides' standard errors. In the long form (UNBAKE_LONG) of twice the
+ * samples. */
 #include "common/mem.h"
 #include "common/rng.h"
 #include "server/render/film.h"
@@ -9,7 +10,8 @@
 #define WIDTH 48
 #define HEIGHT 36
 #define PIXELS (WIDTH * HEIGHT)
-#define GROUPS 48 /* independent estimates, from whose spread our error comes */
+#define GROUPS 24 /* independent estimates, from whose spread our error comes */
+#define GROUPS_LONG 48
 #define GROUP_SPP 16
 
 enum { LEFT = 4, FLOOR = 0, TALL = 6, LAMP = 8, SHADE = 9, SEGMENTS = 10 };
@@ -63,7 +65,8 @@ static void estimate_pixel(void *user, size_t pixel, int thread) {
     struct ray ray[GROUP_SPP];
     struct path_key key[GROUP_SPP];
     rgb radiance[GROUP_SPP], adjoint[GROUP_SPP];
-    for (int group = 0; group < GROUPS; group++) {
+    int groups = e->picture[PRIMAL].estimates;
+    for (int group = 0; group < groups; group++) {
         for (uint32_t i = 0; i < GROUP_SPP; i++) {
             key[i] = (struct path_key){(uint32_t)pixel, (uint32_t)group, i};
             uint64_t bits = rng_key(pixel, (uint64_t)group, i);
@@ -107,7 +110,7 @@ static void compare(const struct estimate *e, enum picture p, const char *name) 
 
 static void run(struct estimate *e) {
     for (int p = 0; p < PICTURES; p++)
-        room_picture_init(&e->picture[p], WIDTH, HEIGHT, GROUPS);
+        room_picture_init(&e->picture[p], WIDTH, HEIGHT, getenv("UNBAKE_LONG") ? GROUPS_LONG : GROUPS);
     parallel_for(e->room->pool, PIXELS, estimate_pixel, e);
 }
 

@@ -1,9 +1,10 @@
 /* Whole rooms with constant materials against Mitsuba 3: light transport, shading normals and
- * many emitters, by z-tests per pixel and on the mean. */
+ * many emitters, by z-tests per pixel and on the mean. In the long form (UNBAKE_LONG) of twice the samples. */
 #include "server/render/film.h"
 #include "tests/render/room.h"
 
-#define RUNS 12 /* independent estimates, from whose spread our error comes */
+#define RUNS 6 /* independent estimates, from whose spread our error comes */
+#define RUNS_LONG 12
 #define RUN_SPP 4
 
 static void check_view(const struct room *room, const char *name, const char *number) {
@@ -13,10 +14,10 @@ static void check_view(const struct room *room, const char *name, const char *nu
     struct camera camera;
     room_camera(path, frame, &camera);
     struct room_picture picture;
-    room_picture_init(&picture, camera.width, camera.height, RUNS);
+    room_picture_init(&picture, camera.width, camera.height, getenv("UNBAKE_LONG") ? RUNS_LONG : RUNS);
     /* 16 bounces at most, like theirs. */
     struct path_settings settings = {.max_depth = 17, .roulette_depth = 6, .seed = 5};
-    for (int run = 0; run < RUNS; run++) {
+    for (int run = 0; run < picture.estimates; run++) {
         struct image image;
         CHECK(film_render(&room->world, &camera, RUN_SPP, &settings, (uint32_t)run, room->pool, &image) == 0);
         for (size_t i = 0; i < picture.count; i++)
