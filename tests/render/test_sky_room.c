@@ -103,8 +103,9 @@ static double passes_of(const struct reconstruction *r) {
 }
 
 static void test_reconstruction(struct scene *scene, struct scene *masked, struct parallel *pool) {
-    struct settings s = shell_settings("{\"texture_size\":64,\"iterations\":250,\"report_samples\":32,"
-                                       "\"texels_per_iteration\":512,\"max_depth\":8}");
+    struct settings s =
+        shell_settings("{\"texture_size\":64,\"iterations\":30,\"report_samples\":16,\"gather_samples\":128,"
+                       "\"texels_per_iteration\":512,\"max_depth\":8}");
     struct shell shell = {.polls_until_stop = -1};
     struct reconstruction r;
     int emitters;
@@ -146,7 +147,8 @@ static void test_beside_seen(const struct image *sky, struct parallel *pool) {
     make_open_mesh(&scene.mesh, 2.4f);
     photograph_mesh(&scene, rgb_gray(0.0f), &dusk, look_out_often, pool);
     mask_open(&parted, &scene, -0.05f);
-    struct settings s = shell_settings("{\"texture_size\":64,\"iterations\":1,\"report_samples\":1}");
+    struct settings s =
+        shell_settings("{\"texture_size\":64,\"iterations\":1,\"report_samples\":1,\"gather_samples\":64}");
     struct shell shell = {.polls_until_stop = -1};
     struct reconstruction r;
     CHECK(shell_run(&parted, &s, 0, &shell, &r) == STATUS_OK);
@@ -189,7 +191,8 @@ static void test_mostly_unseen(struct parallel *pool) {
     scene.mesh.position[4 * 5 + 1].y = scene.mesh.position[4 * 5 + 2].y = 0.3f; /* and of the wall at z = 3 */
     photograph_mesh(&scene, rgb_gray(0.0f), &even, look_out_often, pool);
     mask_open(&parted, &scene, 0.0f);
-    struct settings s = shell_settings("{\"texture_size\":64,\"iterations\":1,\"report_samples\":1}");
+    struct settings s =
+        shell_settings("{" SHELL_COARSE_TEXTURE ",\"iterations\":1,\"report_samples\":1,\"gather_samples\":64}");
     struct shell shell = {.polls_until_stop = -1};
     struct reconstruction r;
     CHECK(shell_run(&parted, &s, 0, &shell, &r) == STATUS_OK);
@@ -209,9 +212,10 @@ static void test_mostly_unseen(struct parallel *pool) {
 }
 
 int main(void) {
-    photograph_samples = 64;
+    photograph_samples = 64; /* noise matters to what is found of light that none shows */
     struct open_room room;
     open_room_init(&room);
+    photograph_samples = 32;
     test_reconstruction(&room.scene, &room.masked, room.pool);
     test_beside_seen(&room.sky, room.pool);
     test_mostly_unseen(room.pool);
