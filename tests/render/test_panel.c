@@ -68,11 +68,10 @@ static uint32_t segment_at(const struct reconstruction *r, float x, float y) {
 }
 
 int main(void) {
-    photograph_samples = 64;
     struct parallel *pool = parallel_new(0);
     struct scene scene = {0};
-    struct settings settings = shell_settings("{\"texture_size\":256,\"iterations\":1,\"report_samples\":1,"
-                                              "\"gather_samples\":128,\"calibrate\":false}");
+    struct settings settings = shell_settings("{\"texture_size\":192,\"iterations\":1,\"report_samples\":1,"
+                                              "\"gather_samples\":64,\"calibrate\":false,\"holes\":\"keep\"}");
     struct shell shell = {.polls_until_stop = -1};
     struct reconstruction r;
     wall_color[WALL] = wall_color[PANEL] = rgb_gray(0.8f);
