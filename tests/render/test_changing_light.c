@@ -79,7 +79,7 @@ static void check_picture(const struct reconstruction *r) {
 
 static void test(struct scene *scene, enum paint paint, int threads) {
     struct reconstruction r;
-    shell_solve(scene, threads, &r);
+    shell_solve_with(paint == CHANGING ? SHELL_SMALL : SHELL_COARSE, scene, threads, &r);
     for (size_t s = 0; s < r.segments.count; s++) {
         int64_t id = r.segments.id[s];
         bool changes = id == SCREEN && paint == CHANGING;

@@ -22,7 +22,7 @@ static void test_hidden(struct parallel *pool) {
     rgb found[2];
     for (int i = IS_BRIEF; i < 2; i++) {
         struct reconstruction r;
-        shell_solve(&scene, threads[i], &r);
+        shell_solve_with(SHELL_COARSE, &scene, threads[i], &r);
         for (size_t s = 0; s < r.segments.count; s++) {
             bool is_lamp = r.segments.id[s] == LAMP;
             CHECK_THAT(r.evidence[s].is_hidden == is_lamp && r.is_emitter[s] == is_lamp, "segment %zu", s);
@@ -48,7 +48,7 @@ static void test_none_hidden(struct parallel *pool) {
     make_mesh(&scene.mesh);
     photograph_mesh(&scene, lamp_radiance, NULL, look_up, pool);
     struct reconstruction r;
-    shell_solve(&scene, 0, &r);
+    shell_solve_with(SHELL_COARSE, &scene, 0, &r);
     for (size_t s = 0; s < r.segments.count; s++)
         CHECK_THAT(!r.evidence[s].is_hidden && r.is_emitter[s] == (r.segments.id[s] == LAMP), "segment %zu", s);
     reconstruct_release(&r);

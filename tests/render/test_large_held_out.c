@@ -24,7 +24,7 @@ static void enlarge(struct photograph *photo, uint32_t factor) {
 
 /* Of the first held-out view. */
 static double compare(struct scene *scene, uint32_t *width, uint32_t *height) {
-    struct settings s = shell_settings("{\"texture_size\":64,\"iterations\":1,\"report_samples\":4,"
+    struct settings s = shell_settings("{" SHELL_COARSE_TEXTURE ",\"iterations\":1,\"report_samples\":4,"
                                        "\"gather_samples\":64}");
     struct shell shell = {.polls_until_stop = -1};
     struct reconstruction r;

@@ -26,7 +26,7 @@ static void digest(const struct reconstruction *r, char hex[SHA256_HEX_SIZE]) {
 }
 
 /* Amounts of work of which a test has time; nothing is said of time. */
-#define LITTLE "\"texture_size\":64,\"report_samples\":2,\"texels_per_iteration\":512"
+#define LITTLE SHELL_COARSE_TEXTURE ",\"report_samples\":2,\"texels_per_iteration\":512"
 
 static void run(struct scene *scene, const char *json, int threads, double step_sec, char hex[SHA256_HEX_SIZE]) {
     struct settings s = shell_settings(json);
@@ -49,7 +49,7 @@ static void test_busy_machine(struct scene *scene, const char *json) {
 }
 
 static void test_limit(struct scene *scene) {
-    struct settings s = shell_settings("{\"texture_size\":256,\"report_samples\":16,\"gather_samples\":128,"
+    struct settings s = shell_settings("{\"texture_size\":128,\"report_samples\":16,\"gather_samples\":128,"
                                        "\"time_limit_sec\":1}");
     struct shell shell = {.polls_until_stop = -1, .sec_a_look = SLOW_SEC};
     struct reconstruction r;
