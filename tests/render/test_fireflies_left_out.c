@@ -58,8 +58,8 @@ struct off {
 };
 
 static struct off reconstruct(struct scene *scene, const char *photographs) {
-    struct settings s = shell_settings("{\"texture_size\":128,\"report_samples\":1,\"gather_samples\":64,"
-                                       "\"denoise\":false,\"iterations\":20}");
+    struct settings s = shell_settings("{\"texture_size\":96,\"report_samples\":1,\"gather_samples\":64,"
+                                       "\"denoise\":false,\"iterations\":8}");
     struct shell shell = {.polls_until_stop = -1};
     struct reconstruction r;
     CHECK(shell_run(scene, &s, 0, &shell, &r) == STATUS_OK);
