@@ -99,7 +99,7 @@ static void compare(struct scene *scene, float edge_m, float *beside, float *wit
 /* Of a scan without normals prepare knows how far its edges may be off. */
 static void test_call(struct scene *scene) {
     struct scene scan = *scene;
-    struct shell shell = {.polls_until_stop = 1, .spares_solve = true};
+    struct shell shell = {.polls_until_stop = 0}; /* once all is prepared */
     struct settings s = shell_settings(SHELL_SMALL);
     struct reconstruction r;
     make_scan(&scan.mesh, GAP_M);

@@ -68,9 +68,10 @@ static void drop(struct mesh *mesh, int64_t object) {
     mesh->triangle_count = kept;
 }
 
-#define SETTINGS                                                                                                       \
-    "{\"texture_size\":64,\"report_samples\":1,\"gather_samples\":32,\"iterations\":2,\"calibrate\":false,"            \
-    "\"hold_out_every\":0,\"holes\":\"fill\"}"
+#define WORK                                                                                                           \
+    "\"report_samples\":1,\"gather_samples\":32,\"iterations\":2,\"calibrate\":false,\"hold_out_every\":0,"            \
+    "\"holes\":\"fill\""
+#define SETTINGS "{\"texture_size\":64," WORK "}"
 
 /* The walls that were scanned, as photographs of the whole room show them: their base colours come out right, since the
  * light comes from where the lamp is. Without openings the floor is white. */
@@ -161,7 +162,7 @@ static vec3 look_at_wall(int frame) { return look_low(2 * frame); }
 
 /* Only the floor and the wall with the hole were scanned: the hole is filled, and all else stays distant. */
 static void test_mostly_unscanned(struct parallel *pool) {
-    struct settings settings = shell_settings(SETTINGS);
+    struct settings settings = shell_settings("{" SHELL_COARSE_TEXTURE "," WORK "}");
     struct shell shell = {.polls_until_stop = 1}; /* after fuse */
     struct reconstruction r;
     struct scene scene = {0};
