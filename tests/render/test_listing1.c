@@ -119,7 +119,7 @@ static void turn_inside_out(struct mesh *mesh, int64_t object) {
 static void test_recovers(struct scene *scene) {
     turn_inside_out(&scene->mesh, INSIDE_OUT);
     struct settings s =
-        shell_settings("{\"texture_size\":64,\"iterations\":200,\"report_samples\":16,\"calibrate\":true,"
+        shell_settings("{\"texture_size\":64,\"iterations\":120,\"report_samples\":16,\"calibrate\":true,"
                        "\"gather_samples\":64,\"texels_per_iteration\":512}");
     struct shell shell = {.polls_until_stop = -1};
     struct reconstruction r;

@@ -104,7 +104,7 @@ static double passes_of(const struct reconstruction *r) {
 
 static void test_reconstruction(struct scene *scene, struct scene *masked, struct parallel *pool) {
     struct settings s =
-        shell_settings("{\"texture_size\":64,\"iterations\":30,\"report_samples\":16,\"gather_samples\":128,"
+        shell_settings("{\"texture_size\":64,\"iterations\":16,\"report_samples\":16,\"gather_samples\":128,"
                        "\"texels_per_iteration\":512,\"max_depth\":8}");
     struct shell shell = {.polls_until_stop = -1};
     struct reconstruction r;
