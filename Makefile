@@ -1,7 +1,7 @@
 # The only build file. `make help` lists the targets.
 #
 # Objects, binaries and everything that a run writes go to $(B): build/ or, for the sanitizer
-# builds, build/asan and build/tsan.
+# builds, build/asan and build/tsan, and build/short/ for what `make test` has of them.
 
 B ?= build
 PREFIX ?= /usr/local
@@ -42,9 +42,9 @@ TEST_SRC = $(wildcard tests/unit/*.c tests/gradient/*.c tests/render/*.c tests/a
                       tests/soak/*.c)
 BENCH_SRC = $(wildcard tests/bench/*.c)
 FUZZ_SRC = $(wildcard tests/fuzz/test_*.c)
-# Tests that are not built, as names without .c.
-UNBUILT ?=
-built = $(filter-out $(UNBUILT:%=tests/%.c),$(1))
+# Tests that are built, as patterns of names without .c, and what is no test but belongs to some.
+TESTS ?= %
+built = $(foreach s,$(1),$(if $(filter test_%,$(notdir $(s))),$(filter $(TESTS:%=tests/%.c),$(s)),$(s)))
 # Hundreds of tests are linked with nearly all of the engine: gold, where it is, takes a third of ld's time.
 GOLD = $(if $(shell command -v ld.gold),-fuse-ld=gold)
 TEST_LDFLAGS = $(ALL_LDFLAGS) $(GOLD)
@@ -167,9 +167,9 @@ demo: deps ## make a room, reconstruct it, show where the pictures are
 	@+$(BUILD) all
 	@tests/demo.sh $(B)
 
-test: deps ## build and run all tests, the quick ones also under the sanitizers; T=name: only those (T=adam)
+test: deps ## build and run all tests, a few also under the sanitizers; T=name: only those (T=adam)
 	@+$(BUILD) tests $(if $(T),,benches)
-	@tests/run.sh "$(T)" $(B) $(if $(T),,build/asan build/tsan)
+	@tests/run.sh "$(T)" $(B) $(if $(T),,build/short/asan build/short/tsan)
 
 CHECK_BIN = $(filter $(B)/tests/unit/% $(B)/tests/gradient/% $(B)/tests/render/test_furnace \
                      $(B)/tests/render/test_principled,$(TEST_BIN))
@@ -221,15 +221,17 @@ tsan: deps ## run all tests under the thread sanitizer
 	@+$(BUILD) tsan-build
 	@tests/run.sh "$(T)" build/tsan
 
-# Lines of calls are all that a sanitizer's report wants of -g, which takes a sixth of a build's time.
-# With SANITIZED_TESTS=quick what run.sh does not run under the sanitizer every day is not built either.
-SANITIZED = CFLAGS="-O1 -g1" TEST_CFLAGS="-O0 -g1"
-unbuilt = $(if $(SANITIZED_TESTS),UNBUILT="$(shell tests/run.sh --slow $(1))")
+# Lines of calls are all that a sanitizer's report wants of -g, which takes a sixth of a build's time. Of
+# SANITIZED_TESTS=short, which run for a minute or two, the build is most of the time: all but the kernels is
+# compiled in a hurry.
+SANITIZED_B = build$(if $(SANITIZED_TESTS),/short)
+SANITIZED = CFLAGS="$(if $(SANITIZED_TESTS),-O0,-O1) -g1" TEST_CFLAGS="-O0 -g1" \
+            $(if $(SANITIZED_TESTS),TESTS="$(subst *,%,$(shell tests/run.sh --short $(1)))")
 asan-build:
-	@$(MAKE) --no-print-directory B=build/asan $(SANITIZED) $(call unbuilt,asan) \
+	@$(MAKE) --no-print-directory B=$(SANITIZED_B)/asan $(call SANITIZED,asan) \
 	    SANITIZE="-fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer" tests
 tsan-build:
-	@$(MAKE) --no-print-directory B=build/tsan $(SANITIZED) $(call unbuilt,tsan) SANITIZE="-fsanitize=thread" tests
+	@$(MAKE) --no-print-directory B=$(SANITIZED_B)/tsan $(call SANITIZED,tsan) SANITIZE="-fsanitize=thread" tests
 
 chaos: deps ## kill, cut off and mislead the daemon at length; writes build/chaos.json; T=name runs one
 	@+$(BUILD) tests
