@@ -299,19 +299,39 @@ double joint_fit_solve(struct joint_fit *f) {
     return loss;
 }
 
+/* Shares of the sources in the light of a point, the means of all points. */
+static void find_mean_shares(struct joint_fit *f) {
+    double *x = joint_fit_radiances(f);
+    for (size_t j = 0; j < f->source_count; j++)
+        f->source[j].share = 0.0;
+    for (size_t i = 0; i < f->point_count; i++) {
+        const float *row = f->response + i * f->source_max;
+        double light = joint_fit_light(f, i, x) * (double)f->point_count;
+        for (size_t j = 0; j < f->source_count; j++)
+            f->source[j].share += (double)row[j] * x[j] / light;
+    }
+    mem_free(x);
+}
+
 void joint_fit_errors(struct joint_fit *f) {
     size_t n = f->source_count;
     double *slope = mem_calloc(n + 1, sizeof *slope), *curvature = mem_calloc(n * n + 1, sizeof *curvature);
     double *column = mem_array(n + 1, sizeof *column);
     assemble(f, slope, curvature);
     bool is_positive = cholesky_factor(n, n, curvature);
+    double variance = 0.0;
+    find_mean_shares(f);
     for (size_t j = 0; j < n; j++) {
         memset(column, 0, n * sizeof *column);
         column[j] = 1.0;
         if (is_positive)
             cholesky_solve(n, n, curvature, column);
         f->source[j].error = is_positive ? sqrt(fmax(column[j], 0.0)) : f->source[j].deviation;
+        for (size_t k = 0; k < n && is_positive; k++)
+            variance += f->source[j].share * column[k] * f->source[k].share;
+        variance += is_positive ? 0.0 : square(f->source[j].share * f->source[j].deviation);
     }
+    f->light_error = sqrt(fmax(variance, 0.0));
     mem_free(column);
     mem_free(curvature);
     mem_free(slope);

@@ -38,7 +38,7 @@ double joint_fit_loss(const struct joint_fit *f);
 /* Moves the sources' values to a maximum of the posterior; returns joint_fit_loss there. */
 double joint_fit_solve(struct joint_fit *f);
 
-/* Sets the sources' errors: the curvature at their values. */
+/* Sets the sources' errors and what they come to together: the curvature at their values. */
 void joint_fit_errors(struct joint_fit *f);
 
 /* A further source of that column of R: sets its value to the best one, the others' being what they are, and returns by

@@ -21,6 +21,7 @@ struct joint_source {
     double least;           /* lower bound of theta; -INFINITY: none */
     double value;           /* theta: the estimate */
     double error;           /* standard deviation of the posterior, by joint_fit_errors */
+    double share;           /* of the light of a point, the mean of all points, by the same */
 };
 
 /* A prior on the difference of two sources: normal about `difference`. */
@@ -46,6 +47,8 @@ struct joint_fit {
     size_t block_count, patch_count;
     struct joint_block *block; /* [block_count] */
     size_t *patch;             /* [patch_count + 1] first point of each patch */
+    double light_error;        /* standard deviation of the logarithm of light, the mean of all points, by
+                                * joint_fit_errors: an error that all albedos share */
 };
 
 /* x[source_count]: the sources' radiances exp(value). The first result is the caller's. */

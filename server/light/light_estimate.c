@@ -95,30 +95,6 @@ void light_estimate_again(struct reconstruction *r, const struct views *views, c
     light_model_release(&m);
 }
 
-static bool is_lamp(const struct reconstruction *r, const struct estimated_source *s) {
-    return (s->kind == ESTIMATED_HIDDEN || s->kind == ESTIMATED_SATURATED) && r->is_emitter[s->segment];
-}
-
-float light_deviation(const struct reconstruction *r) {
-    const struct mesh *mesh = &r->scene->mesh;
-    double *power = mem_calloc(r->segments.count, sizeof *power), all = 0.0, variance = 0.0;
-    for (size_t t = 0; t < mesh->triangle_count; t++) {
-        uint32_t segment = r->segments.of_triangle[t];
-        double emitted = (double)(mesh_triangle_area(mesh, t) * rgb_mean(r->materials.emission[segment]));
-        power[segment] += emitted;
-        all += emitted;
-    }
-    if (r->environment.map.pixel || r->sun.is_there || r->openings.count > 0)
-        all = 0.0;
-    for (uint32_t i = 0; i < r->light.source_count && all > 0.0; i++) {
-        const struct estimated_source *s = &r->light.source[i];
-        double off = is_lamp(r, s) ? (double)s->deviation * power[s->segment] / all : 0.0;
-        variance += off * off;
-    }
-    mem_free(power);
-    return (float)sqrt(variance);
-}
-
 bool light_is_estimated(const struct reconstruction *r) { return r->light.source_count > 0; }
 
 void light_restore(struct reconstruction *r) {

@@ -22,12 +22,6 @@ void light_estimate_again(struct reconstruction *r, const struct views *views, c
 /* Whether there is light that was estimated. */
 bool light_is_estimated(const struct reconstruction *r);
 
-/* Standard deviation of the logarithm of all light by those of the lamps whose radiance was estimated: each one's by
- * its share of the power of all emitting segments, as if their errors were independent. An error that all base colours
- * share. Which lamp lights what is left out. 0 where sky, sun or openings light the room as well: what comes in of
- * theirs, of which a lamp's power would be a part, is not known as one figure. */
-float light_deviation(const struct reconstruction *r);
-
 /* After a resume: makes the environment what it was at the checkpoint. */
 void light_restore(struct reconstruction *r);
 

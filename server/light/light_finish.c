@@ -28,7 +28,8 @@ static void fit_channel(struct light_model *m, int channel) {
             source.least = -INFINITY;
         } else if (lamp->kind == ESTIMATED_SEEN) {
             double off = m->fit.source[lamp->source].value - m->fit.source[lamp->source].mean;
-            source = (struct joint_source){least + off, MEASURED_DEVIATION, -INFINITY, least + off, 0.0};
+            source = (struct joint_source){
+                .mean = least + off, .deviation = MEASURED_DEVIATION, .least = -INFINITY, .value = least + off};
         } else if (lamp->is_measured[channel]) {
             source.mean = least, source.value = least, source.deviation = MEASURED_DEVIATION;
         }
@@ -44,10 +45,15 @@ static void fit_channel(struct light_model *m, int channel) {
 
 void light_finish(struct light_model *m) {
     light_model_find_errors(m);
+    double all = m->fit.light_error * m->fit.light_error;
     for (size_t i = 0; i < m->lamps.count; i++) {
-        double error = m->fit.source[m->lamps.lamp[i].source].error;
-        m->lamps.lamp[i].deviation = (float)sqrt(error * error + SYSTEMATIC_DEVIATION * SYSTEMATIC_DEVIATION);
+        struct light_lamp *lamp = &m->lamps.lamp[i];
+        const struct joint_source *source = &m->fit.source[lamp->source];
+        double systematic = lamp->kind == ESTIMATED_SEEN ? 0.0 : source->share * SYSTEMATIC_DEVIATION;
+        lamp->deviation = (float)hypot(source->error, SYSTEMATIC_DEVIATION);
+        all += systematic * systematic;
     }
+    m->r->light.deviation = (float)sqrt(all);
     for (int c = 0; c < 3 && m->lamps.count > 0; c++)
         fit_channel(m, c);
 }

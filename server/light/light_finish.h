@@ -4,7 +4,7 @@
 
 #include "server/light/light_model.h"
 
-/* Radiances of the lamps by channel, and deviations, from the fit's values. */
+/* Radiances of the lamps by channel, and deviations, from the fit's values; m->r->light.deviation. */
 void light_finish(struct light_model *m);
 
 #endif

@@ -256,4 +256,5 @@ void light_model_find_errors(struct light_model *m) {
     joint_fit_errors(&m->fit);
     for (size_t j = 0; j < m->fit.source_count; j++)
         m->fit.source[j].error *= sqrt(m->patches_alike);
+    m->fit.light_error *= sqrt(m->patches_alike);
 }

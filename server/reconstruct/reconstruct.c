@@ -144,7 +144,7 @@ static struct optimiser *optimiser_of_method(struct stage_run *run) {
 static void measure_spread(struct reconstruction *r) {
     const struct surface surface = reconstruction_surface(r);
     float spread = plain_spread(&surface, &r->materials.base_color, r->fused.count, r->is_emitter);
-    r->materials.spread = hypotf(isfinite(spread) ? spread : MATERIALS_SPREAD, light_deviation(r));
+    r->materials.spread = hypotf(isfinite(spread) ? spread : MATERIALS_SPREAD, r->light.deviation);
 }
 
 /* The stages that checkpoints cover; those that are done are skipped. */

@@ -50,6 +50,7 @@ static void keep_common(struct optimiser *o) {
     optimiser_add_state(o, "environment.factor", in->sky_factor, sizeof *in->sky_factor);
     keep_since(o, 3, "light", in->light, offsetof(struct estimated_light, ground_factor));
     keep_since(o, 5, "light.ground", in->light->ground_factor, sizeof in->light->ground_factor);
+    keep_since(o, 6, "light.deviation", &in->light->deviation, sizeof in->light->deviation);
     keep_since(o, 4, "deviation", m->deviation, texels * sizeof *m->deviation);
     optimiser_add_state(o, "sun.irradiance", in->sun_irradiance, sizeof *in->sun_irradiance);
     optimiser_add_state(o, "emission.is_emitter", in->is_emitter, segments * sizeof *in->is_emitter);

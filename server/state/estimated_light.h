@@ -33,6 +33,8 @@ struct estimated_light {
     struct estimated_source source[ESTIMATED_MAX];
     rgb sky_factor[ESTIMATED_FACTORS];    /* by which solve brightened the saturated sky, one after another */
     rgb ground_factor[ESTIMATED_FACTORS]; /* the same of the ground; 0: as the sky, in checkpoints before format 5 */
+    float deviation; /* standard deviation of the logarithm of all light, an error that all base colours share; 0: all
+                      * light was measured, or the checkpoint is of a format before 6 */
 };
 
 #endif

@@ -10,8 +10,9 @@
  *   2: adds "plan", the planned and done amounts of each part of the work, and STATE_SURFACE.
  *   3: adds "light", the estimated sources of light.
  *   4: adds "deviation", of base colour.
- *   5: adds "light.ground", by what saturated ground was brightened: before, as the sky was. */
-#define STATE_FORMAT 5
+ *   5: adds "light.ground", by what saturated ground was brightened: before, as the sky was.
+ *   6: adds "light.deviation", of all light. */
+#define STATE_FORMAT 6
 
 /* Name of an array of eight bytes: a hash of the surface parametrisation. A checkpoint with another one cannot be used
  * (each attempt makes the atlas again, and versions of the program may differ in it). */

@@ -76,7 +76,7 @@ static double fit_sky(const struct rig *g, const struct light_points *points) {
         lit[i] = p->escaping;
     }
     joint_fit_init(&fit, joint, points->count, 2, g->pool);
-    joint_fit_add(&fit, &(struct joint_source){log(1.0), 2.0, -INFINITY, log(1.0), 0.0}, lit);
+    joint_fit_add(&fit, &(struct joint_source){.deviation = 2.0, .least = -INFINITY}, lit);
     joint_fit_solve(&fit);
     double found = exp(fit.source[1].value);
     joint_fit_release(&fit);

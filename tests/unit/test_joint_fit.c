@@ -50,7 +50,7 @@ static void make_floor(uint64_t seed, float known, const float x[2], float sprea
 }
 
 static struct joint_source source_about(double mean, double deviation) {
-    return (struct joint_source){mean, deviation, -INFINITY, mean, 0.0};
+    return (struct joint_source){.mean = mean, .deviation = deviation, .least = -INFINITY, .value = mean};
 }
 
 static void start(struct joint_fit *f, struct parallel *pool) { joint_fit_init(f, point, POINTS, 4, pool); }
@@ -69,10 +69,19 @@ static void test_recovers(struct parallel *pool) {
     joint_fit_release(&f);
 }
 
-/* Of 40 floors: 60 to 80 % of the errors within one deviation would be 24 to 32; binomial chance widens it by 9. */
+/* Mean logarithm of the light over all points, of sources of radiances x. */
+static double mean_light(double known, const double x[2]) {
+    double sum = 0.0;
+    for (size_t i = 0; i < POINTS; i++)
+        sum += log(known + x[0] * (double)lit[0][i] + x[1] * (double)lit[1][i]) / POINTS;
+    return sum;
+}
+
+/* Of 40 floors: 60 to 80 % of the errors within one deviation would be 24 to 32; binomial chance widens it by 9. Of the light
+ * of 20 floors it is 12 to 16, and 7. */
 static void test_deviations(struct parallel *pool) {
     const float x[2] = {60.0f, 25.0f};
-    int one = 0, two = 0, all = 0;
+    int one = 0, two = 0, all = 0, light_one = 0;
     struct joint_source prior = source_about(log(30.0), 1.5);
     for (uint64_t seed = 1; seed <= 20; seed++) {
         struct joint_fit f;
@@ -87,12 +96,16 @@ static void test_deviations(struct parallel *pool) {
             one += off < 1.0;
             two += off < 2.0;
         }
+        const double found[2] = {exp(f.source[1].value), exp(f.source[2].value)};
+        double off = mean_light(0.5, found) - mean_light(0.5, (const double[2]){(double)x[0], (double)x[1]});
+        light_one += fabs(off) < f.light_error;
         joint_fit_release(&f);
     }
     CHECK_THAT(one > 15 && one < 38 && two > 33, "%d and %d of %d within one and two deviations", one, two, all);
+    CHECK_THAT(light_one > 5 && light_one < 20, "the light of %d of 20 within one deviation", light_one);
 }
 
-/* Two sources of the same light: their sum is known, which of them it is is not. */
+/* Two sources of the same light: their sum is known, and so is what all points get; which of them it is is not. */
 static void test_alike(struct parallel *pool) {
     const float x[2] = {60.0f, 0.0f};
     struct joint_fit f;
@@ -105,6 +118,10 @@ static void test_alike(struct parallel *pool) {
     joint_fit_errors(&f);
     CHECK_NEAR(exp(f.source[1].value) + exp(f.source[2].value), 60.0, 6.0);
     CHECK(f.source[1].error > 0.5 && f.source[2].error > 0.5);
+    CHECK_NEAR(f.source[0].share, 0.0, 1e-9);
+    double share = f.source[1].share + f.source[2].share;
+    CHECK(share > 0.1 && share < 1.0);
+    CHECK_THAT(f.light_error < 0.15 * share, "%g of sources that are %g of all light", f.light_error, share);
     joint_fit_release(&f);
 }
 
@@ -130,7 +147,7 @@ static void test_equal_lamps(struct parallel *pool) {
     const float x[2] = {0.0f, 0.0f};
     static float column[3][POINTS];
     struct joint_fit f;
-    struct joint_source lamp = {log(15.0), 2.0, log(15.0), log(15.0), 0.0};
+    struct joint_source lamp = {.mean = log(15.0), .deviation = 2.0, .least = log(15.0), .value = log(15.0)};
     double most = 0.0;
     for (uint64_t seed = 1; seed <= 8; seed++) {
         make_floor(seed, 0.5f, x, 0.25f);
@@ -163,7 +180,8 @@ static void test_bound(struct parallel *pool) {
     struct joint_fit f;
     make_floor(4, 0.5f, x, 0.1f);
     start(&f, pool);
-    struct joint_source loose = {log(40.0), 2.0, log(40.0), log(40.0), 0.0}, tight = loose;
+    struct joint_source loose = {.mean = log(40.0), .deviation = 2.0, .least = log(40.0), .value = log(40.0)},
+                        tight = loose;
     tight.mean = tight.least = tight.value = log(90.0);
     joint_fit_add(&f, &loose, lit[0]);
     joint_fit_solve(&f);

@@ -94,7 +94,9 @@ static void fit_cells(const struct unseen_point *point, size_t count, struct par
         double even = log_radiance[k];
         for (size_t i = 0; i < count; i++)
             column[i] = point[i].share[k];
-        joint_fit_add(&fit, &(struct joint_source){even, LIGHT_UNKNOWN_DEVIATION, -INFINITY, even, 0.0}, column);
+        const struct joint_source cell = {
+            .mean = even, .deviation = LIGHT_UNKNOWN_DEVIATION, .least = -INFINITY, .value = even};
+        joint_fit_add(&fit, &cell, column);
     }
     joint_fit_solve(&fit);
     for (size_t k = 0; k < CELLS; k++)
