@@ -5,6 +5,7 @@
 #include "server/light/added_surface.h"
 #include "server/light/emitters.h"
 #include "server/light/hidden_lamps.h"
+#include "server/scene/adjacency.h"
 
 /* Parts of the border that are lamps; their number is the result. */
 static size_t choose(struct reconstruction *r, const struct views *views, const struct unseen_space *space,
@@ -17,6 +18,14 @@ static size_t choose(struct reconstruction *r, const struct views *views, const 
     size_t count = hidden_lamps_find_parts(&m, space, part);
     light_model_release(&m);
     return count;
+}
+
+static bool is_closed(const struct mesh *mesh) {
+    struct adjacency adjacency;
+    adjacency_make(&adjacency, mesh);
+    bool closed = adjacency_is_closed(&adjacency, mesh);
+    adjacency_release(&adjacency);
+    return closed;
 }
 
 /* Returns the number of quads. */
@@ -34,7 +43,7 @@ size_t unseen_lamps_find(struct reconstruction *r, const struct views *views) {
     struct unseen_space space;
     uint32_t part[LIGHT_MAX];
     size_t quads = 0;
-    if (r->scene->mesh.object_id || settings_is(r->settings, "holes", "keep"))
+    if (r->scene->mesh.object_id || settings_is(r->settings, "holes", "keep") || is_closed(&r->scene->mesh))
         return 0;
     unseen_space_find(&space, views, r->pool);
     size_t count = space.part_count > 0 ? choose(r, views, &space, part) : 0;

@@ -73,6 +73,14 @@ void adjacency_release(struct adjacency *adjacency) {
     *adjacency = (struct adjacency){0};
 }
 
+bool adjacency_is_closed(const struct adjacency *adjacency, const struct mesh *mesh) {
+    for (uint32_t h = 0; h < 3 * mesh->triangle_count; h++) {
+        if (adjacency->next[h] == h)
+            return false;
+    }
+    return true;
+}
+
 vec3 *adjacency_smooth_normals(const struct adjacency *adjacency, const struct mesh *mesh) {
     size_t n = mesh->triangle_count;
     vec3 *normal = mem_array(n, sizeof *normal), *next = mem_array(n, sizeof *next);

@@ -6,6 +6,7 @@
 #ifndef UNBAKE_SCENE_ADJACENCY_H
 #define UNBAKE_SCENE_ADJACENCY_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "server/scene/mesh.h"
@@ -18,6 +19,9 @@ struct adjacency {
 
 void adjacency_make(struct adjacency *adjacency, const struct mesh *mesh);
 void adjacency_release(struct adjacency *adjacency);
+
+/* Whether at each edge of the mesh two triangles meet or more: it has no border, so that no surface is missing. */
+bool adjacency_is_closed(const struct adjacency *adjacency, const struct mesh *mesh);
 
 /* Unit normals of the triangles, averaged over a few rings of neighbours but not across creases:
  * the noise of a scan goes, the shape of a model stays. [triangle_count], the caller's
