@@ -1,7 +1,7 @@
 #!/bin/bash
 # There is no memory for the n-th allocation: see fault_daemon.c and fault_worker.c. Most end the
 # process, which then has to be started again, so UNBAKE_STEP is larger than that of the disk (257, and of a
-# worker that reconstructs every 600th stack of calls, of one that checks a scene every 29th, once or for good in turn; in
+# worker that reconstructs every 600th stack of calls, of one that checks a scene every 86th, once or for good in turn; in
 # the long form all, in both ways).
 set -u
 . tests/api/client.sh "$@"
