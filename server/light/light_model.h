@@ -40,8 +40,8 @@ void light_model_respond_hidden(const struct light_model *m, uint32_t segment, f
 /* How many patches are worth one to the source that was added last, at the fit's values (joint_alike.h). */
 double light_model_alike_last(const struct light_model *m);
 
-/* Sets the errors of the fit's sources at their values, and that of all light: standard deviations by patches of which so many are worth one,
- * which is measured first. */
+/* Sets the errors of the fit's sources at their values, and that of all light: standard deviations by patches of which
+ * so many are worth one, which is measured first. */
 void light_model_find_errors(struct light_model *m);
 
 #endif

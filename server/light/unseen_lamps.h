@@ -10,9 +10,9 @@
 #include "server/state/reconstruction.h"
 
 /* Needs fused radiance, and a world lit by r->environment if that has a map. Does nothing to meshes that tell objects
- * apart, where what is modelled is meant, or that are closed, and lack nothing; nor with holes=keep. Returns the number of quads that were added
- * (added_surface.h); if there are any, what was made of mesh and segments must be made again. The same for any number of
- * threads. */
+ * apart, where what is modelled is meant, or that are closed, and lack nothing; nor with holes=keep. Returns the number
+ * of quads that were added (added_surface.h); if there are any, what was made of mesh and segments must be made again.
+ * The same for any number of threads. */
 size_t unseen_lamps_find(struct reconstruction *r, const struct views *views);
 
 #endif

@@ -107,6 +107,7 @@ static void check_resumes(struct scene *scene, const struct reconstruction *whol
     CHECK(memcmp(r.environment.map.pixel, whole->environment.map.pixel, bytes) == 0);
     CHECK(memcmp(r.materials.base_color.texel, whole->materials.base_color.texel,
                  sizeof *r.materials.base_color.texel * r.atlas.width * r.atlas.height) == 0);
+    CHECK(r.light.deviation > 0.0f && r.light.deviation == whole->light.deviation);
     reconstruct_release(&r);
     shell_release(&shell);
     settings_release(&s);
