@@ -323,13 +323,12 @@ void joint_fit_errors(struct joint_fit *f) {
     find_mean_shares(f);
     for (size_t j = 0; j < n; j++) {
         memset(column, 0, n * sizeof *column);
-        column[j] = 1.0;
+        column[j] = is_positive ? 1.0 : square(f->source[j].deviation); /* of the priors' covariance */
         if (is_positive)
             cholesky_solve(n, n, curvature, column);
-        f->source[j].error = is_positive ? sqrt(fmax(column[j], 0.0)) : f->source[j].deviation;
-        for (size_t k = 0; k < n && is_positive; k++)
+        f->source[j].error = sqrt(fmax(column[j], 0.0));
+        for (size_t k = 0; k < n; k++)
             variance += f->source[j].share * column[k] * f->source[k].share;
-        variance += is_positive ? 0.0 : square(f->source[j].share * f->source[j].deviation);
     }
     f->light_error = sqrt(fmax(variance, 0.0));
     mem_free(column);

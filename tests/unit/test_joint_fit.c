@@ -77,8 +77,8 @@ static double mean_light(double known, const double x[2]) {
     return sum;
 }
 
-/* Of 40 floors: 60 to 80 % of the errors within one deviation would be 24 to 32; binomial chance widens it by 9. Of the light
- * of 20 floors it is 12 to 16, and 7. */
+/* Of 40 floors: 60 to 80 % of the errors within one deviation would be 24 to 32; binomial chance widens it by 9. Of the
+ * light of 20 floors it is 12 to 16, and 7. */
 static void test_deviations(struct parallel *pool) {
     const float x[2] = {60.0f, 25.0f};
     int one = 0, two = 0, all = 0, light_one = 0;
