@@ -10,6 +10,9 @@
  * scale is two of them, as light_fit.h has it; each residual is clamped to so many scales. */
 #define SCALE_PER_MEAN 2.5 /* +25 %: no change */
 #define RESIDUAL_CLAMP 2.0 /* +25 %: no change */
+/* Observations, of the mean residual of all frames, beside a frame's own: as many as it has unknowns of pose and offset,
+ * by which its own are made small. */
+#define SCALE_PRIOR (POSE_UNKNOWNS + POSE_CELLS)
 #define CONSENSUS_ROUNDS 4 /* of reweighting, of the mean of eleven at most; +25 %: no change */
 #define MIN_CONSENSUS 3    /* observations: of two that differ neither is known to be wrong; to 4: no change */
 /* Of log residuals, until the first round has measured them: 10 %; +25 %: no change. */
@@ -271,17 +274,23 @@ struct reweighting {
     double *sum, *count; /* [frames] */
 };
 
-/* Weighs a track's observations; their absolute residuals, NAN where there is none, into the result. */
+/* Weighs a track's observations; their absolute residuals, NAN where there is none, into the result. An observation has
+ * its share in the consensus: of the variance of its error only 1 - share is left in the residual, which is scaled up to
+ * it. Else a frame that happens to agree is trusted more, makes up the consensus by itself, and agrees all the more. */
 static void weigh_observations(void *user, size_t track, void *result) {
     const struct reweighting *r = user;
     struct pose_solver *s = r->solver;
     struct pose_observation *observation = s->observation + track * POSE_OBSERVATIONS_MAX;
-    double consensus, weight[POSE_OBSERVATIONS_MAX], *residual = result;
+    double consensus, weight[POSE_OBSERVATIONS_MAX], total = 0.0, *residual = result;
     pose_weigh_track(s, track, &consensus, weight);
+    for (size_t k = 0; k < pose_observation_count(s->track[track]); k++)
+        total += weight[k];
     for (size_t k = 0; k < pose_observation_count(s->track[track]); k++) {
         observation[k].weight = pose_is_held_out(track) ? 0.0f : (float)weight[k];
-        residual[k] = weight[k] <= 0.0 ? (double)NAN
-                                       : fabs((double)observation[k].value - s->x[observation[k].offset] - consensus);
+        residual[k] = weight[k] <= 0.0
+                          ? (double)NAN
+                          : fabs((double)observation[k].value - s->x[observation[k].offset] - consensus) /
+                                sqrt(1.0 - weight[k] / total);
     }
 }
 
@@ -302,10 +311,16 @@ static void add_residuals(void *user, size_t track, const void *result) {
 void pose_reweight(struct pose_solver *s) {
     double *sum = mem_calloc(2 * s->frames + 1, sizeof *sum), *count = sum + s->frames;
     struct reweighting r = {s, sum, count};
+    double all = 0.0, all_count = 0.0;
     ordered_for(s->pool, s->track_count, POSE_OBSERVATIONS_MAX * sizeof(double), weigh_observations, add_residuals, &r);
     for (size_t f = 0; f < s->frames; f++) {
+        all += sum[f];
+        all_count += count[f];
+    }
+    for (size_t f = 0; f < s->frames; f++) {
+        double mean = (sum[f] + SCALE_PRIOR * all / fmax(all_count, 1.0)) / (count[f] + SCALE_PRIOR);
         if (count[f] > 0.0)
-            s->frame[f].scale = fmax(POSE_MIN_SCALE, SCALE_PER_MEAN * sum[f] / count[f]);
+            s->frame[f].scale = fmax(POSE_MIN_SCALE, SCALE_PER_MEAN * mean);
     }
     mem_free(sum);
 }
