@@ -81,14 +81,9 @@ static void displace(struct camera *camera, const double turn[3], const double m
     camera->camera_from_world = rigid_inverse(m);
 }
 
-/* Tracker's drift, in photographs every third of which shows little: a window of a ninth, the rest masked. Those follow
- * their neighbours, and so does one that is held out. */
-static void test_drift(struct painted *room) {
-    double turn[3] = {0.0}, move[3] = {0.0}, before = 0.0, after = 0.0;
-    uint8_t *mask = mem_array(PAINTED_WIDTH * PAINTED_HEIGHT, 1);
-    for (size_t i = 0; i < PAINTED_WIDTH * PAINTED_HEIGHT; i++)
-        mask[i] = i % PAINTED_WIDTH / (PAINTED_WIDTH / 3) == 1 && i / PAINTED_WIDTH / (PAINTED_HEIGHT / 3) == 1;
-    painted_reset(room);
+/* Tracker's drift: a random walk of all frames, from a first turn that they share. */
+static void drift(struct painted *room) {
+    double turn[3] = {0.0}, move[3] = {0.0};
     for (uint32_t f = 0; f < room->scene.photograph_count; f++) {
         for (uint64_t k = 0; k < 3; k++) {
             turn[k] += 0.006 * (double)painted_random(f, 300 + k);
@@ -96,6 +91,19 @@ static void test_drift(struct painted *room) {
         }
         const double shared[3] = {turn[0] + 0.012, turn[1] - 0.012, turn[2]};
         displace(&room->scene.photograph[f].camera, shared, move);
+    }
+}
+
+/* Tracker's drift, in photographs every third of which shows little: a window of a ninth, the rest masked. Those follow
+ * their neighbours, and so does one that is held out. */
+static void test_drift(struct painted *room) {
+    double before = 0.0, after = 0.0;
+    uint8_t *mask = mem_array(PAINTED_WIDTH * PAINTED_HEIGHT, 1);
+    for (size_t i = 0; i < PAINTED_WIDTH * PAINTED_HEIGHT; i++)
+        mask[i] = i % PAINTED_WIDTH / (PAINTED_WIDTH / 3) == 1 && i / PAINTED_WIDTH / (PAINTED_HEIGHT / 3) == 1;
+    painted_reset(room);
+    drift(room);
+    for (uint32_t f = 0; f < room->scene.photograph_count; f++) {
         room->scene.photograph[f].mask = f % 3 == 1 ? mask : NULL;
         before += f % 3 == 1 ? painted_frame_shift(room, f) / 8.0 : 0.0;
     }
@@ -109,6 +117,23 @@ static void test_drift(struct painted *room) {
     CHECK(after < 0.3 * before);
     poses_found_release(&found);
     mem_free(mask);
+}
+
+/* The same drift under noise of .6 of each channel: few frames are surely moved by themselves, all together are. */
+static void test_noisy_drift(struct painted *room) {
+    painted_reset(room);
+    painted_noise = 1.05f;
+    for (int f = 0; f < PAINTED_FRAMES; f++)
+        painted_take(room, f);
+    painted_noise = PAINTED_NOISE;
+    drift(room);
+    double before = painted_shift(room);
+    struct poses_found found = run(room, room->pool);
+    double after = painted_shift(room);
+    printf("drift of noisy photographs: %zu moved, off by %.3f px -> %.3f px\n", found.moved_count, before, after);
+    CHECK(found.is_drift);
+    CHECK(after < 0.3 * before);
+    poses_found_release(&found);
 }
 
 /* After all frames were misplaced and found: what a held-out photograph shows moved its own camera, and moves no other,
@@ -165,6 +190,7 @@ int main(void) {
     take_frames(&room, PAINTED_FRAMES);
     test_misplaced(&room, 0.06f, 0.06f, 2);
     test_drift(&room);
+    test_noisy_drift(&room);
     if (getenv("UNBAKE_LONG")) {
         test_misplaced(&room, 0.03f, 0.03f, 4);
         test_threads(&room);

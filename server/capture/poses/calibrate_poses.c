@@ -17,7 +17,8 @@
 /* Pixels: least width of a pyramid level that is used. Coarser ones have few gradients for six unknowns, and mislead; a
  * picture of 640 pixels is used from 80 on. */
 #define COARSEST_PX 75 /* +25 %: no change */
-/* Photographs that are surely moved, at least, for a drift to be looked for: two an unknown of a pose. */
+/* Photographs that are surely moved by themselves, at least, for a drift to be looked for where all together are not
+ * surely better: two an unknown of a pose. */
 #define MIN_SURE 12
 /* Of corrections that follow a walk: independent ones have 1 +- .12 in 72 photographs, drifts of simulated phones
  * .2. */
@@ -178,9 +179,10 @@ static double shift_along_walk(const struct pose_solver *s, size_t f) {
     return shift_px > 0.0 ? shift_px : sqrt(squares);
 }
 
-/* Where photographs were surely moved the tracker may drift: then those that are not sure follow their neighbours. */
-static void add_drift(struct pose_solver *s, size_t held_out_count, int coarsest) {
-    if (free_count(s) < MIN_SURE)
+/* Where photographs were surely moved, or all together, the tracker may drift: then those that are not sure follow their
+ * neighbours. */
+static void add_drift(struct pose_solver *s, bool convincing, size_t held_out_count, int coarsest) {
+    if (!convincing && free_count(s) < MIN_SURE)
         return;
     double *before = mem_calloc(2 * held_out_count + 1, sizeof *before), *now = before + held_out_count;
     double *x = mem_array(s->unknowns + 1, sizeof *x);
@@ -232,7 +234,7 @@ void calibrate_poses(struct scene *scene, const struct tracks *tracks, struct pa
     judge(&s);
     run_rounds(&s, 0, LAST_ROUNDS);
     judge(&s);
-    add_drift(&s, held_out_count, coarsest_level(tracks));
+    add_drift(&s, convincing, held_out_count, coarsest_level(tracks));
     *found = (struct poses_found){.is_drift = s.walk.is_known, .shift = mem_calloc(s.frames + 1, sizeof *found->shift)};
     double squares = 0.0;
     for (size_t f = 0; f < s.frames; f++) {

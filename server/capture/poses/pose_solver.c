@@ -287,10 +287,9 @@ static void weigh_observations(void *user, size_t track, void *result) {
         total += weight[k];
     for (size_t k = 0; k < pose_observation_count(s->track[track]); k++) {
         observation[k].weight = pose_is_held_out(track) ? 0.0f : (float)weight[k];
-        residual[k] = weight[k] <= 0.0
-                          ? (double)NAN
-                          : fabs((double)observation[k].value - s->x[observation[k].offset] - consensus) /
-                                sqrt(1.0 - weight[k] / total);
+        residual[k] = weight[k] <= 0.0 ? (double)NAN
+                                       : fabs((double)observation[k].value - s->x[observation[k].offset] - consensus) /
+                                             sqrt(1.0 - weight[k] / total);
     }
 }
 
