@@ -128,6 +128,29 @@ static void test_screen(struct parallel *pool) {
     scene_release(&scene);
 }
 
+/* Screen and lamp saturate. How bright the lamp is nobody knows, nor, then, what white paint would show at the screen; but
+ * the screen may be as much brighter than it seems. */
+static void test_saturated(struct parallel *pool) {
+    struct scene scene = {0};
+    make_room(&scene.mesh, screen, true);
+    photograph_mesh(&scene, lamp_radiance, NULL, look_at_wall, pool);
+    for (size_t f = 0; f < scene.photograph_count; f++)
+        saturate_photograph(&scene.photograph[f], 2.0f);
+    struct reconstruction r;
+    join_wall(&scene.mesh);
+    CHECK(reconstruct(&scene, 0, PREPARED, &r) == STATUS_CANCELLED);
+    CHECK_THAT(part_count(&r) == 1, "%zu parts", part_count(&r));
+    size_t wrong = 0;
+    for (size_t t = 2 * COLUMNS * ROWS; t < 4 * COLUMNS * ROWS; t++) {
+        size_t cell = t / 2 - COLUMNS * ROWS;
+        bool shines = screen((int)(cell % COLUMNS), (int)(cell / COLUMNS)) == LAMP;
+        wrong += (r.segments.of_triangle[t] == r.segments.count - 1) != shines;
+    }
+    CHECK_THAT(wrong == 0, "%zu triangles", wrong);
+    reconstruct_release(&r);
+    scene_release(&scene);
+}
+
 static void test_tiles(struct parallel *pool) {
     struct scene scene = {0};
     make_room(&scene.mesh, tiles, true);
@@ -196,6 +219,7 @@ int main(void) {
     wall_color[WHITE] = rgb_gray(0.85f);
     wall_color[BLACK] = rgb_gray(0.04f);
     test_screen(pool);
+    test_saturated(pool);
     test_tiles(pool);
     test_sun(pool);
     test_lit(pool);

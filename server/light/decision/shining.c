@@ -16,9 +16,6 @@
 #define KEY_PLACES 31 /* keep these random numbers apart from others of the triangle */
 #define KEY_RAYS 37
 #define KEY_SUN 41
-/* Assumed ratio of true to observed radiance where all photographs saturate. High, since overestimated light only makes
- * fewer splits. */
-#define SATURATED_FACTOR 16.0f
 /* Directions in which the sun is looked for, some 3 degrees apart. */
 #define SUN_DIRECTIONS 2048
 /* It is found where it reaches this much more of the part than of what is beside it. */
@@ -63,7 +60,7 @@ static void trace_rays(const struct shining *s, const struct surface_point *plac
 static float radiance_of(const struct shining *s, uint32_t triangle) {
     float mean = s->light->mean[triangle];
     if (s->light->is_bound[triangle])
-        return SATURATED_FACTOR * mean;
+        return SHINING_SATURATED * mean;
     return mean >= 0.0f ? mean : s->segment_mean[s->r->segments.of_triangle[triangle]];
 }
 
@@ -76,7 +73,7 @@ static float distant_radiance(const struct shining *s, vec3 direction) {
     float radiance = rgb_mean(lights_environment(s->r->world.lights, direction));
     bool seen = is_seen(s, direction);
     if (seen && !environment_is_measured(&s->r->environment, direction))
-        return SATURATED_FACTOR * radiance;
+        return SHINING_SATURATED * radiance;
     if (!s->has_unseen || seen)
         return radiance;
     return fmaxf(radiance, (float)sky_cells_radiance(s->log_unseen, direction));

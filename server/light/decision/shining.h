@@ -15,6 +15,10 @@
 #include "server/light/sky/unseen_fit.h"
 #include "server/state/reconstruction.h"
 
+/* Assumed ratio of true to observed radiance where all photographs saturate, of what may shine and of what lights it.
+ * High, since overestimated light only makes fewer splits. */
+#define SHINING_SATURATED 16.0f
+
 struct shining {
     const struct reconstruction *r; /* borrowed, both; needs world and environment */
     const struct triangle_light *light;

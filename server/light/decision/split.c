@@ -98,15 +98,19 @@ static void connect(const struct split_level *l) {
 
 struct split_measure {
     float pixels, radiance; /* that they fill together; the median of their observed radiances */
+    bool is_bound;          /* most are saturated in all photographs */
 };
 
 static struct split_measure measure(const struct split_level *l, const uint32_t *triangle, size_t count) {
-    struct split_measure m = {0.0f, 0.0f};
+    struct split_measure m = {0};
+    size_t bound = 0;
     for (size_t i = 0; i < count; i++) {
         m.pixels += l->job->light.pixels[triangle[i]];
+        bound += l->job->light.is_bound[triangle[i]];
         l->value[i] = l->job->light.observed[triangle[i]];
     }
     m.radiance = quantile(l->value, count, 0.5);
+    m.is_bound = 2 * bound > count;
     return m;
 }
 
@@ -120,13 +124,13 @@ static size_t collect_darker(const struct split_level *l) {
     return count;
 }
 
-/* Keeps those of the part's triangles that show it alone. All of them are settled. */
-static size_t settle(const struct split_level *l, size_t part_size, float radiance) {
+/* Keeps those of the part's triangles that show it alone, of a saturated one those that are. All of them are settled. */
+static size_t settle(const struct split_level *l, size_t part_size, const struct split_measure *part) {
     size_t kept = 0;
     for (size_t i = 0; i < part_size; i++) {
         uint32_t t = l->part[i];
         l->job->settled[t] = true;
-        if (l->job->light.observed[t] >= PURE * radiance)
+        if (part->is_bound ? l->job->light.is_bound[t] : l->job->light.observed[t] >= PURE * part->radiance)
             l->part[kept++] = t;
     }
     return kept;
@@ -153,13 +157,13 @@ static void try_part(const struct split_level *l, size_t part_size, const struct
     if (part.pixels < MIN_PIXELS || l->radiance < job->needed[l->part[0]])
         return;
     float lambert = shining_lambert(&job->shining, l->part, part_size);
-    float needed = lambert * reflection_limit(job->shining.unseen_share);
+    float needed = lambert * reflection_limit(job->shining.unseen_share) / (part.is_bound ? SHINING_SATURATED : 1.0f);
     if (l->radiance < needed) {
         for (size_t i = 0; i < part_size; i++)
             job->needed[l->part[i]] = NEAR * needed;
         return;
     }
-    part_size = settle(l, part_size, part.radiance);
+    part_size = settle(l, part_size, &part);
     if (darker->pixels >= fmaxf(MIN_PIXELS, MIN_SHARE * part.pixels) &&
         part.radiance >= MIN_CONTRAST * darker->radiance && has_sharp_rim(l, part_size, part.pixels) &&
         !shining_is_sunlit(&job->shining, l->part, part_size, l->darker, darker_count))
