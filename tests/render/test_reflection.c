@@ -57,7 +57,24 @@ static void check_board(bool emits, struct parallel *pool) {
     scene_release(&scene);
 }
 
+/* In a room whose median is .2, light of .01 is not modelled: what shows 1.7 times white's .006 in a dark corner may
+ * reflect, what shows as much where white shows .6 may not, nor what shows 10 where white would show .0001. */
+static void test_dark(void) {
+    const double dark = (double)DARK_DEVIATION * 0.2;
+    const struct {
+        double radiance, lambert;
+        bool emits;
+    } place[] = {{0.0103, 0.0061, false}, {1.03, 0.61, true}, {10.0, 1e-4, true}};
+    for (size_t i = 0; i < sizeof place / sizeof *place; i++) {
+        double deviation = reflection_light_deviation(place[i].lambert, 0.0, FILL_DEVIATION, dark);
+        double beyond = log(place[i].radiance / (ALBEDO_WHITE * place[i].lambert)) / deviation;
+        CHECK_THAT((beyond > (double)REFLECTION_DEVIATIONS) == place[i].emits, "place %zu: %g deviations", i, beyond);
+    }
+    CHECK_NEAR(reflection_light_deviation(1.0, 0.5, 0.7, 0.0), hypot(ALBEDO_WHITE_DEVIATION, 0.35), 1e-9);
+}
+
 int main(void) {
+    test_dark();
     struct parallel *pool = parallel_new(0);
     for (int i = 0; i < BOARD; i++)
         wall_color[i] = rgb_scale(wall_color[i], 0.3f);

@@ -63,12 +63,6 @@ static void find_highlights(const struct reconstruction *r, const struct divide 
         add_place(d, chosen[i], thread, f);
 }
 
-/* Standard deviation of log W: of known light, and of what unobserved sky has in it. */
-static double light_deviation(const struct reconstruction *r, const struct emitter_evidence *e) {
-    double share = fmin((double)e->sky_lambert / fmax((double)rgb_mean(e->lambert), 1e-30), 1.0);
-    return hypot(ALBEDO_WHITE_DEVIATION, share * (r->sky_is_fitted ? FIT_DEVIATION : FILL_DEVIATION));
-}
-
 void reflection_find(struct reconstruction *r, const struct divide *d, uint32_t segment, const uint32_t *texel,
                      size_t count, int thread) {
     struct emitter_evidence *e = &r->evidence[segment];
@@ -78,7 +72,9 @@ void reflection_find(struct reconstruction *r, const struct divide *d, uint32_t 
     if (!(shown > (double)reflection_limit(0.0f)))
         return;
     e->sky_lambert = sky_doubt(r, texel, count);
-    double deviation = light_deviation(r, e);
+    double deviation = reflection_light_deviation((double)rgb_mean(e->lambert), (double)e->sky_lambert,
+                                                  r->sky_is_fitted ? FIT_DEVIATION : FILL_DEVIATION,
+                                                  (double)(DARK_DEVIATION * d->views->median_radiance));
     double sum = tail(log(shown / ALBEDO_WHITE) / deviation);
     e->reflection = (float)sum;
     if (!reflection_is_unlikely(e))
