@@ -26,8 +26,8 @@ struct triangle_light_job {
 /* Observations of one triangle. */
 struct triangle_observations {
     struct censored value[MAX_POINTS * OBSERVATIONS_PER_POINT];
-    size_t count;
-    float pixels; /* sum over observations of the pixels that the whole triangle fills */
+    size_t count, clipped_count; /* in all channels */
+    float pixels;                /* sum over observations of the pixels that the whole triangle fills */
 };
 
 /* The i-th point: the centroid, then points evenly distributed by area. */
@@ -52,6 +52,7 @@ static void observe_point(const struct views *views, uint32_t triangle, vec3 poi
         bool saturated = photograph_sample_saturates(&s);
         observations->value[observations->count++] =
             (struct censored){fmaxf(rgb_mean(s.radiance), 0.0f), 1.0f, saturated};
+        observations->clipped_count += s.saturated[0] && s.saturated[1] && s.saturated[2];
         observations->pixels += area * view[k].weight * photo->camera.fx * photo->camera.fy;
     }
 }
@@ -90,6 +91,7 @@ static void measure(void *user, size_t index, int thread) {
     light->observed[triangle] =
         censored_quantile(observations.value, observations.count, 1.0f - BRIGHTER_SHARE, &is_bound);
     light->pixels[triangle] = observations.pixels / (float)observations.count;
+    light->is_clipped[triangle] = light->is_bound[triangle] && 2 * observations.clipped_count > observations.count;
 }
 
 void triangle_light_measure(struct triangle_light *light, const struct views *views, struct parallel *pool) {
@@ -98,6 +100,7 @@ void triangle_light_measure(struct triangle_light *light, const struct views *vi
     light->mean = mem_array(count, sizeof *light->mean);
     light->pixels = mem_array(count, sizeof *light->pixels);
     light->is_bound = mem_calloc(count, sizeof *light->is_bound);
+    light->is_clipped = mem_calloc(count, sizeof *light->is_clipped);
     struct triangle_light_job job = {views, light};
     parallel_for(pool, count, measure, &job);
 }
@@ -106,6 +109,7 @@ void triangle_light_release(struct triangle_light *light) {
     mem_free(light->observed);
     mem_free(light->mean);
     mem_free(light->pixels);
+    mem_free(light->is_clipped);
     mem_free(light->is_bound);
     *light = (struct triangle_light){0};
 }

@@ -10,11 +10,12 @@
 #include "server/capture/views.h"
 
 struct triangle_light {
-    float *observed; /* [triangle_count] radiance (mean of the channels) that most observations reach: emission is seen
+    float *observed;  /* [triangle_count] radiance (mean of the channels) that most observations reach: emission is seen
                        * from everywhere, a highlight is not; negative: no clean observation; owned */
-    float *mean;     /* [triangle_count] mean over observations; negative as above; owned */
-    bool *is_bound;  /* [triangle_count] all are saturated: a lower bound; owned */
-    float *pixels;   /* [triangle_count] pixels that it fills in a photograph, mean; owned */
+    float *mean;      /* [triangle_count] mean over observations; negative as above; owned */
+    bool *is_bound;   /* [triangle_count] all are saturated: a lower bound; owned */
+    bool *is_clipped; /* [triangle_count] and most in all channels; owned */
+    float *pixels;    /* [triangle_count] pixels that it fills in a photograph, mean; owned */
 };
 
 /* The same for any number of threads. */

@@ -98,19 +98,19 @@ static void connect(const struct split_level *l) {
 
 struct split_measure {
     float pixels, radiance; /* that they fill together; the median of their observed radiances */
-    bool is_bound;          /* most are saturated in all photographs */
+    bool is_clipped;        /* most are, in all photographs and channels */
 };
 
 static struct split_measure measure(const struct split_level *l, const uint32_t *triangle, size_t count) {
     struct split_measure m = {0};
-    size_t bound = 0;
+    size_t clipped = 0;
     for (size_t i = 0; i < count; i++) {
         m.pixels += l->job->light.pixels[triangle[i]];
-        bound += l->job->light.is_bound[triangle[i]];
+        clipped += l->job->light.is_clipped[triangle[i]];
         l->value[i] = l->job->light.observed[triangle[i]];
     }
     m.radiance = quantile(l->value, count, 0.5);
-    m.is_bound = 2 * bound > count;
+    m.is_clipped = 2 * clipped > count;
     return m;
 }
 
@@ -124,13 +124,13 @@ static size_t collect_darker(const struct split_level *l) {
     return count;
 }
 
-/* Keeps those of the part's triangles that show it alone, of a saturated one those that are. All of them are settled. */
+/* Keeps those of the part's triangles that show it alone, of a clipped one those that are. All of them are settled. */
 static size_t settle(const struct split_level *l, size_t part_size, const struct split_measure *part) {
     size_t kept = 0;
     for (size_t i = 0; i < part_size; i++) {
         uint32_t t = l->part[i];
         l->job->settled[t] = true;
-        if (part->is_bound ? l->job->light.is_bound[t] : l->job->light.observed[t] >= PURE * part->radiance)
+        if (part->is_clipped ? l->job->light.is_clipped[t] : l->job->light.observed[t] >= PURE * part->radiance)
             l->part[kept++] = t;
     }
     return kept;
@@ -157,7 +157,7 @@ static void try_part(const struct split_level *l, size_t part_size, const struct
     if (part.pixels < MIN_PIXELS || l->radiance < job->needed[l->part[0]])
         return;
     float lambert = shining_lambert(&job->shining, l->part, part_size);
-    float needed = lambert * reflection_limit(job->shining.unseen_share) / (part.is_bound ? SHINING_SATURATED : 1.0f);
+    float needed = lambert * reflection_limit(job->shining.unseen_share) / (part.is_clipped ? SHINING_SATURATED : 1.0f);
     if (l->radiance < needed) {
         for (size_t i = 0; i < part_size; i++)
             job->needed[l->part[i]] = NEAR * needed;
