@@ -3,12 +3,13 @@
  * L observed radiance, W what a white Lambertian surface of albedo 1 would send. A segment that reflects has, with the
  * lobe c,
  *
- *   log L <= log(g W (a + h_c)) + e,   a = ALBEDO_WHITE,   e ~ N(0, s),   s^2 = ALBEDO_WHITE_DEVIATION^2 + (f u)^2 + log(1 + (D / W)^2).
+ *   log L <= log(g W (a + h_c)) + e,   a = ALBEDO_WHITE,   e ~ N(0, s),
+ *   s^2 = ALBEDO_WHITE_DEVIATION^2 + (f u)^2 + log(1 + (D / W)^2).
  *
  * h_c is the albedo that the lobe's highlight feigns: what it would reflect towards the photographs over W, their
  * median, since L is one. Each lobe is as likely as the prior of gloss says (specular_posterior.h). u is the share of W
- * that comes from unobserved sky, f the deviation of that, D that of light that is not modelled, lognormal about W. g is what arrives around the edges of a scan over what
- * arrives here (edge_light.h). */
+ * that comes from unobserved sky, f the deviation of that, D that of light that is not modelled, lognormal about W. g is
+ * what arrives around the edges of a scan over what arrives here (edge_light.h). */
 #ifndef UNBAKE_LIGHT_DECISION_REFLECTION_H
 #define UNBAKE_LIGHT_DECISION_REFLECTION_H
 
