@@ -3,8 +3,9 @@
  * A photograph is moved (six degrees of freedom) so that at places of strong texture it shows what the other
  * photographs show there (Lucas & Kanade 1981; robust Gauss-Newton over all photographs at once, coarse to fine). The
  * mesh stays fixed. A correction is kept only when it is large enough to matter and the photograph agrees significantly
- * better at held-out tracks; otherwise the pose stays exactly as it was. Where many are moved and their corrections are
- * common to neighbours in the order of the photographs, those that show too little follow (pose_walk.h). */
+ * better at held-out tracks; otherwise the pose stays exactly as it was. Where many are moved, or all together agree
+ * significantly better, and corrections are common to neighbours in the order of the photographs, those that show too
+ * little follow (pose_walk.h). */
 #ifndef UNBAKE_CAPTURE_POSES_CALIBRATE_POSES_H
 #define UNBAKE_CAPTURE_POSES_CALIBRATE_POSES_H
 
