@@ -42,9 +42,9 @@ TEST_SRC = $(wildcard tests/unit/*.c tests/gradient/*.c tests/render/*.c tests/a
                       tests/soak/*.c)
 BENCH_SRC = $(wildcard tests/bench/*.c)
 FUZZ_SRC = $(wildcard tests/fuzz/test_*.c)
-# Tests that are built, as patterns of names without .c, and what is no test but belongs to some.
+# Tests that are built, as patterns of names without .c, and of what is no test what lies in their folders.
 TESTS ?= %
-built = $(foreach s,$(1),$(if $(filter test_%,$(notdir $(s))),$(filter $(TESTS:%=tests/%.c),$(s)),$(s)))
+built = $(foreach s,$(1),$(filter $(if $(filter test_%,$(notdir $(s))),$(TESTS:%=tests/%.c),$(addsuffix %,$(dir $(TESTS:%=tests/%)))),$(s)))
 # Hundreds of tests are linked with nearly all of the engine: gold, where it is, takes a third of ld's time.
 GOLD = $(if $(shell command -v ld.gold),-fuse-ld=gold)
 TEST_LDFLAGS = $(ALL_LDFLAGS) $(GOLD)
