@@ -15,6 +15,7 @@
 struct sun {
     bool is_there;
     bool is_measured; /* photographs show it, and how bright it is */
+    bool is_clipped;  /* photographs saturate in its light: how bright it is comes from the joint fit (sun_clipped.h) */
     vec3 direction;   /* unit, towards its middle */
     float radius_rad; /* angular radius */
     rgb irradiance;   /* of a surface that faces it */

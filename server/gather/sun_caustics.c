@@ -41,13 +41,6 @@ struct caustics {
     struct photon *photon;   /* [count][rays] */
 };
 
-/* Square metres that a texel of a triangle covers. */
-static float texel_area(const struct caustics *m, uint32_t triangle) {
-    const vec2 *c = m->world->atlas->corner[triangle];
-    float texels = fabsf((c[1].x - c[0].x) * (c[2].y - c[0].y) - (c[1].y - c[0].y) * (c[2].x - c[0].x));
-    return texels > 0.0f ? vec3_length(mesh_cross(m->mesh, triangle)) / texels : 0.0f;
-}
-
 /* --- from the sun ---------------------------------------------------------------------------------- */
 
 static bool find_point(const struct caustics *m, uint32_t texel, struct surface_point *at) {
@@ -106,7 +99,8 @@ static void trace_texel(void *user, size_t index, int thread) {
     const struct world *world = m->world;
     uint32_t texel = m->texel[index], key = sampler_key(m->seed, texel, KEY_CAUSTICS);
     uint32_t triangle = m->inverse->triangle[texel], segment = world->triangle[triangle].segment;
-    rgb sent = rgb_scale(m->sun->irradiance, texel_area(m, triangle) * m->texels_per_source / (float)m->rays);
+    rgb sent = rgb_scale(m->sun->irradiance,
+                         surface_texel_m2(m->mesh, m->world->atlas, triangle) * m->texels_per_source / (float)m->rays);
     struct surface_point at;
     find_point(m, texel, &at);
     for (uint32_t i = 0; i < m->rays; i++) {
@@ -135,7 +129,8 @@ static float *probe_areas(const struct caustics *m) {
     for (size_t i = 0; i < m->inverse->valid_count; i++) {
         uint32_t texel = m->inverse->valid[i], triangle = m->inverse->triangle[texel];
         area[probes_at(m->probes, texel % m->inverse->width, texel / m->inverse->width,
-                       m->world->atlas->chart_of_triangle[triangle])] += texel_area(m, triangle);
+                       m->world->atlas->chart_of_triangle[triangle])] +=
+            surface_texel_m2(m->mesh, m->world->atlas, triangle);
     }
     return area;
 }

@@ -200,7 +200,7 @@ void emitters_light_bright(struct reconstruction *r, const struct views *views,
     for (size_t i = 0; i < r->segments.count; i++) {
         rgb radiance = evidence[i].radiance;
         bool emits = evidence[i].is_hidden || evidence[i].is_unbounded ||
-                     emitters_outshine(rgb_mean(radiance), views->median_radiance);
+                     (!evidence[i].is_sunlit && emitters_outshine(rgb_mean(radiance), views->median_radiance));
         r->materials.emission[i] = emits ? radiance : rgb_gray(0.0f);
     }
     world_update_lights(&r->world);

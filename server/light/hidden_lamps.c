@@ -14,8 +14,6 @@
 #define LIKELIEST 8
 /* Candidates that are tried again once there is a further lamp, for time: it takes from what most of them gain. */
 #define AGAIN 32
-/* Odds that are asked of a lamp: a false one costs more than a missed one. */
-#define SURE 20.0
 
 struct lamp_candidate {
     bool is_segment; /* else a part of the border of unseen space */
@@ -40,7 +38,8 @@ struct lamp_search {
 /* No photograph shows it, and it has a surface. */
 static bool may_be_lamp(const struct light_model *m, size_t segment) {
     const struct emitter_evidence *e = &m->r->evidence[segment];
-    return !e->is_seen && !e->is_outshone && !m->lamps.is_lamp[segment] && m->lamps.light.area_m2[segment] > 0.0f;
+    return !e->is_seen && !e->is_outshone && !m->lamps.is_lamp[segment] && m->lamps.light.area_m2[segment] > 0.0f &&
+           settings_emitter(m->r->settings, (uint32_t)segment, true);
 }
 
 bool hidden_lamps_any(const struct light_model *m) {

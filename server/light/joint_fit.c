@@ -143,8 +143,10 @@ static void add_patch(const struct assembly *a, struct joint_chunk *c, const str
     size_t n = f->source_count;
     double base = 0.0, weights = add_patch_points(a, c, b, s, d, patch);
     double stiffness = s->stiffness[patch - b->first_patch];
+    if (!(weights > 0.0))
+        return;
     for (size_t i = f->patch[patch]; i < f->patch[patch + 1]; i++)
-        base += s->weight[i - b->first] * s->base[i - b->first] / weights;
+        base += s->weight[i - b->first] * s->effective[i - b->first] / weights;
     struct joint_white_bound white = joint_white_bound(base - f->source[0].value, 1.0 / weights);
     for (size_t j = 0; j < n; j++) {
         c->slope[j] -= white.slope * d->patch[j] / weights;
@@ -304,10 +306,13 @@ static void find_mean_shares(struct joint_fit *f) {
     double *x = joint_fit_radiances(f);
     for (size_t j = 0; j < f->source_count; j++)
         f->source[j].share = 0.0;
+    double count = 0.0;
+    for (size_t i = 0; i < f->point_count; i++)
+        count += f->point[i].is_lamp ? 0.0 : 1.0;
     for (size_t i = 0; i < f->point_count; i++) {
         const float *row = f->response + i * f->source_max;
-        double light = joint_fit_light(f, i, x) * (double)f->point_count;
-        for (size_t j = 0; j < f->source_count; j++)
+        double light = joint_fit_light(f, i, x) * count;
+        for (size_t j = 0; j < f->source_count && !f->point[i].is_lamp; j++)
             f->source[j].share += (double)row[j] * x[j] / light;
     }
     mem_free(x);

@@ -16,6 +16,9 @@
  * with iterative reweighting; mu and eta are eliminated by Schur complements. Its curvature gives the sources'
  * variances.
  *
+ * Of a point that saturates in all photographs O_i is a lower bound: it takes part with the probability that its b_i
+ * exceeds that (Tobin 1958).
+ *
  * Lange, Little and Taylor 1989 (Student's t by reweighting). */
 #ifndef UNBAKE_LIGHT_JOINT_FIT_H
 #define UNBAKE_LIGHT_JOINT_FIT_H

@@ -20,6 +20,7 @@ void joint_scratch_init(struct joint_scratch *s, const struct joint_fit *f) {
         patches = b->end_patch - b->first_patch > patches ? b->end_patch - b->first_patch : patches;
     }
     s->base = mem_array(points, sizeof *s->base);
+    s->effective = mem_array(points, sizeof *s->effective);
     s->residual = mem_array(points, sizeof *s->residual);
     s->weight = mem_array(points, sizeof *s->weight);
     s->sorted = mem_array(points, sizeof *s->sorted);
@@ -30,6 +31,7 @@ void joint_scratch_init(struct joint_scratch *s, const struct joint_fit *f) {
 
 void joint_scratch_release(struct joint_scratch *s) {
     mem_free(s->base);
+    mem_free(s->effective);
     mem_free(s->residual);
     mem_free(s->weight);
     mem_free(s->sorted);
@@ -69,13 +71,39 @@ struct joint_white_bound joint_white_bound(double beyond, double variance) {
     return (struct joint_white_bound){t_loss(e), weight * beyond, weight};
 }
 
+/* What a point contributes, for a residual in deviations: to the loss, its derivative, and a curvature that is positive. */
+struct pull {
+    double loss, slope, weight;
+};
+
+/* Of a lower bound: the logarithm of the probability that a value of Student's t of four degrees of freedom exceeds it
+ * (Tobin 1958). The weight is the true curvature where that is not small. */
+static struct pull bound_pull(double e) {
+    double square_e = e * e, scale = 1.0 + square_e / 4.0;
+    double below = 0.5 + 0.375 * e / sqrt(scale) * (1.0 - square_e / (12.0 * scale));
+    double above = fmax(1.0 - below, 1e-12), hazard = 0.375 * pow(scale, -2.5) / above;
+    double curvature = fmax(hazard - 5.0 * e / (4.0 + square_e), 1.0 / (1.0 + fmax(e, 0.0)));
+    return (struct pull){-log(above), hazard, hazard * curvature};
+}
+
+static struct pull pull_of(const struct joint_point *p, double e) {
+    if (p->is_lamp)
+        return (struct pull){0.0, 0.0, 0.0};
+    if (p->is_bound)
+        return bound_pull(e);
+    return (struct pull){t_loss(e), t_weight(e) * e, t_weight(e)};
+}
+
 static double variance_of(const struct joint_point *p) { return square(ALBEDO_POINT) + square((double)p->deviation); }
 
-static double median_of(const struct joint_block *b, struct joint_scratch *s) {
-    size_t count = b->end - b->first;
-    for (size_t i = 0; i < count; i++)
-        s->sorted[i] = (float)s->base[i];
-    return (double)quantile(s->sorted, count, 0.5);
+/* Of what is measured. */
+static double median_of(const struct joint_fit *f, const struct joint_block *b, struct joint_scratch *s) {
+    size_t count = 0;
+    for (size_t i = b->first; i < b->end; i++) {
+        if (!f->point[i].is_bound && !f->point[i].is_lamp)
+            s->sorted[count++] = (float)s->base[i - b->first];
+    }
+    return count > 0 ? (double)quantile(s->sorted, count, 0.5) : log(ALBEDO_MEAN);
 }
 
 /* Weighted sums over the points of a patch. */
@@ -88,11 +116,14 @@ static struct patch_sums weigh_patch(const struct joint_fit *f, const struct joi
     struct patch_sums sum = {0.0, 0.0};
     double expected = s->mean + s->offset[patch - b->first_patch];
     for (size_t i = f->patch[patch]; i < f->patch[patch + 1]; i++) {
-        double variance = variance_of(&f->point[i]);
-        double weight = t_weight((s->base[i - b->first] - expected) / sqrt(variance)) / variance;
-        s->weight[i - b->first] = weight;
-        sum.weight += weight;
-        sum.base += weight * s->base[i - b->first];
+        size_t k = i - b->first;
+        double variance = variance_of(&f->point[i]), deviation = sqrt(variance);
+        struct pull pull = pull_of(&f->point[i], (s->base[k] - expected) / deviation);
+        s->weight[k] = pull.weight / variance;
+        s->effective[k] =
+            f->point[i].is_bound && pull.weight > 0.0 ? expected + deviation * pull.slope / pull.weight : s->base[k];
+        sum.weight += s->weight[k];
+        sum.base += s->weight[k] * s->effective[k];
     }
     s->stiffness[patch - b->first_patch] =
         t_weight(s->offset[patch - b->first_patch] / ALBEDO_PATCH) / square(ALBEDO_PATCH);
@@ -106,7 +137,7 @@ static void settle_round(const struct joint_fit *f, const struct joint_block *b,
         struct patch_sums patch = weigh_patch(f, b, s, p);
         double stiffness = s->stiffness[p - b->first_patch];
         double weight = patch.weight * stiffness / (patch.weight + stiffness);
-        sum += weight * patch.base / patch.weight;
+        sum += patch.weight > 0.0 ? weight * patch.base / patch.weight : 0.0;
         weights += weight;
     }
     s->mean = sum / weights;
@@ -114,7 +145,7 @@ static void settle_round(const struct joint_fit *f, const struct joint_block *b,
         struct patch_sums patch = {0.0, 0.0};
         for (size_t i = f->patch[p]; i < f->patch[p + 1]; i++) {
             patch.weight += s->weight[i - b->first];
-            patch.base += s->weight[i - b->first] * (s->base[i - b->first] - s->mean);
+            patch.base += s->weight[i - b->first] * (s->effective[i - b->first] - s->mean);
         }
         s->offset[p - b->first_patch] = patch.base / (patch.weight + s->stiffness[p - b->first_patch]);
     }
@@ -125,19 +156,21 @@ static double loss_of(const struct joint_fit *f, const struct joint_block *b, st
     for (size_t p = b->first_patch; p < b->end_patch; p++) {
         struct patch_sums patch = weigh_patch(f, b, s, p);
         double offset = s->offset[p - b->first_patch];
-        loss += t_loss(offset / ALBEDO_PATCH) +
-                joint_white_bound(patch.base / patch.weight - f->source[0].value, 1.0 / patch.weight).loss;
+        loss += t_loss(offset / ALBEDO_PATCH);
+        if (patch.weight > 0.0)
+            loss += joint_white_bound(patch.base / patch.weight - f->source[0].value, 1.0 / patch.weight).loss;
         for (size_t i = f->patch[p]; i < f->patch[p + 1]; i++) {
+            size_t k = i - b->first;
             double deviation = sqrt(variance_of(&f->point[i]));
-            s->residual[i - b->first] = s->base[i - b->first] - s->mean - offset;
-            loss += t_loss(s->residual[i - b->first] / deviation);
+            s->residual[k] = s->effective[k] - s->mean - offset;
+            loss += pull_of(&f->point[i], (s->base[k] - s->mean - offset) / deviation).loss;
         }
     }
     return loss;
 }
 
 double joint_settle(const struct joint_fit *f, const struct joint_block *b, struct joint_scratch *s) {
-    s->mean = median_of(b, s);
+    s->mean = median_of(f, b, s);
     for (size_t p = b->first_patch; p < b->end_patch; p++)
         s->offset[p - b->first_patch] = 0.0;
     for (int i = 0; i < SETTLE_ROUNDS; i++)

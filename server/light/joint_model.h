@@ -13,6 +13,8 @@ struct joint_point {
     uint32_t segment, patch; /* points of a segment are adjacent, and in it those of a patch */
     float observed, known;   /* radiances > 0: O_i, E_i */
     float deviation;         /* standard deviation of b_i by noise of E_i and by highlights */
+    bool is_bound;           /* O_i is a lower bound */
+    bool is_lamp;            /* it has none at all; what it gets of light is asked for */
 };
 
 /* A source. The prior of theta is normal, cut at `least`. */
@@ -59,6 +61,7 @@ double joint_fit_light(const struct joint_fit *f, size_t point, const double *x)
 /* Scratch for the points of the largest block. */
 struct joint_scratch {
     double *base;      /* [points] b */
+    double *effective; /* [points] the same, but of lower bounds what would pull as they do */
     double *residual;  /* [points] epsilon */
     double *weight;    /* [points] of residual^2 / 2 in the reweighted problem */
     float *sorted;     /* [points] */

@@ -7,6 +7,9 @@
 #include "server/light/emitters.h"
 #include "server/light/hidden_lamps.h"
 #include "server/light/light_finish.h"
+#include "server/light/light_solve.h"
+#include "server/light/sun/sun_clipped.h"
+#include "server/render/bsdf.h"
 #include "server/state/evidence.h"
 
 /* --- handing over ------------------------------------------------------------------------------------------ */
@@ -29,6 +32,11 @@ static void hand_over_segment(struct reconstruction *r, const struct light_lamp 
     /* Of openings that others make superfluous no more is known than before: they are no sources any more. */
     if (lamp->kind != ESTIMATED_OPENING || (double)lamp->deviation < LIGHT_UNKNOWN_DEVIATION)
         keep_source(r, lamp->kind, segment, radiance, lamp->deviation);
+}
+
+static void hand_over_sun(struct reconstruction *r, const struct light_lamp *sun) {
+    r->sun.irradiance = rgb_scale(sun->radiance, BSDF_PI);
+    keep_source(r, ESTIMATED_SUN, 0, sun->radiance, sun->deviation);
 }
 
 /* Takes the factors of sky and ground over, and what they come to. */
@@ -59,15 +67,18 @@ static void hand_over(struct light_model *m) {
     }
     if (m->sky.estimates_bounds)
         hand_over_sky(m);
+    const struct light_lamp *sun = light_lamps_sun(&m->lamps);
+    if (sun)
+        hand_over_sun(r, sun);
 }
 
 /* --- the whole --------------------------------------------------------------------------------------------- */
 
 static void estimate(struct light_model *m, const struct views *views) {
     light_model_survey(m, views, NULL, NULL);
-    joint_fit_solve(&m->fit);
+    light_solve_deciding(m);
     hidden_lamps_find(m);
-    joint_fit_solve(&m->fit);
+    light_solve(m);
     light_finish(m);
     hand_over(m);
 }
@@ -75,6 +86,8 @@ static void estimate(struct light_model *m, const struct views *views) {
 void light_estimate(struct reconstruction *r, const struct views *views) {
     struct light_model m;
     emitters_observe(r, views, r->evidence);
+    if (!r->sun.is_there)
+        sun_clipped_find(r);
     light_model_init(&m, r, views, false);
     if (light_lamps_has_unknown(&m.lamps) || hidden_lamps_any(&m))
         estimate(&m, views);
@@ -89,7 +102,7 @@ void light_estimate_again(struct reconstruction *r, const struct views *views, c
         return;
     light_model_init(&m, r, views, true);
     light_model_survey(&m, views, field, diffuse);
-    joint_fit_solve(&m.fit);
+    light_solve(&m);
     light_finish(&m);
     hand_over(&m);
     light_model_release(&m);
@@ -129,7 +142,8 @@ static void report_place(const struct reconstruction *r, cJSON *entry, uint32_t 
 }
 
 void light_report(const struct reconstruction *r) {
-    static const char *const names[] = {"hidden", "saturated", "saturated_sky", "seen", "saturated_ground", "opening"};
+    static const char *const names[] = {"hidden",  "saturated", "saturated_sky", "seen", "saturated_ground",
+                                        "opening", "sun"};
     cJSON *list = cJSON_AddArrayToObject(r->report, "lights");
     for (uint32_t i = 0; i < r->light.source_count; i++) {
         const struct estimated_source *s = &r->light.source[i];

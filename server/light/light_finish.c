@@ -17,7 +17,8 @@ static void fit_channel(struct light_model *m, int channel) {
             known += p->sky[k] * (float)exp(m->fit.source[m->first_cell + k].value);
         for (size_t k = 0; k < LIGHT_REGIONS && p->unobserved; k++)
             known += p->unobserved[3 * k + (size_t)channel] * (float)exp(m->fit.source[m->first_region + k].value);
-        joint[i] = (struct joint_point){p->segment, p->patch, (&p->observed.r)[channel], known, m->joint[i].deviation};
+        joint[i] = (struct joint_point){p->segment,  p->patch,  (&p->observed.r)[channel], known, m->joint[i].deviation,
+                                        p->is_bound, p->is_lamp};
     }
     joint_fit_init(&fit, joint, m->points.count, 1 + m->lamps.count, m->r->pool);
     for (size_t i = 0; i < m->lamps.count; i++) {

@@ -69,12 +69,24 @@ void light_lamps_add_half(struct light_lamps *l, size_t half) {
                                               .least = rgb_make(1.0f / by.r, 1.0f / by.g, 1.0f / by.b)};
 }
 
-const struct light_lamp *light_lamps_half(const struct light_lamps *l, size_t half) {
+static const struct light_lamp *first_of_kind(const struct light_lamps *l, enum estimated_kind kind) {
     for (size_t i = 0; i < l->count; i++) {
-        if (l->lamp[i].kind == kind_of_half[half])
+        if (l->lamp[i].kind == kind)
             return &l->lamp[i];
     }
     return NULL;
+}
+
+const struct light_lamp *light_lamps_half(const struct light_lamps *l, size_t half) {
+    return first_of_kind(l, kind_of_half[half]);
+}
+
+void light_lamps_add_sun(struct light_lamps *l, rgb least, rgb strength) {
+    l->lamp[l->count++] = (struct light_lamp){ESTIMATED_SUN, .least = least, .radiance = strength};
+}
+
+struct light_lamp *light_lamps_sun(struct light_lamps *l) {
+    return (struct light_lamp *)first_of_kind(l, ESTIMATED_SUN);
 }
 
 struct light_lamp *light_lamps_add_hidden(struct light_lamps *l, uint32_t segment) {
@@ -111,7 +123,8 @@ static size_t sort_bright(const struct light_lamps *l, bool saturated, struct br
     for (size_t i = 0; i < r->segments.count; i++) {
         const struct emitter_evidence *e = &r->evidence[i];
         bool is_bright = saturated || (e->is_seen && emitters_outshine(rgb_mean(e->radiance), l->median_radiance));
-        if (is_saturated(e) == saturated && is_bright && !l->is_lamp[i])
+        bool may_shine = settings_emitter(r->settings, (uint32_t)i, !e->is_sunlit);
+        if (is_saturated(e) == saturated && is_bright && !l->is_lamp[i] && may_shine)
             (*found)[count++] = (struct bright){(uint32_t)i, (double)(rgb_mean(e->radiance) * l->light.area_m2[i])};
     }
     qsort(*found, count, sizeof **found, by_power);

@@ -10,12 +10,12 @@
 #define LIGHT_MAX 16      /* saturated lamps; hidden ones; segments that are one lamp */
 #define LIGHT_SEEN_MAX 24 /* lamps that are seen */
 #define LIGHT_OPENINGS_MAX 14
-#define LIGHT_LAMPS_MAX (2 * LIGHT_MAX + LIGHT_SEEN_MAX + LIGHT_OPENINGS_MAX + ENVIRONMENT_HALVES)
+#define LIGHT_LAMPS_MAX (2 * LIGHT_MAX + LIGHT_SEEN_MAX + LIGHT_OPENINGS_MAX + ENVIRONMENT_HALVES + 1)
 _Static_assert(LIGHT_MAX *LIGHT_MAX + LIGHT_MAX + LIGHT_OPENINGS_MAX + ENVIRONMENT_HALVES <= ESTIMATED_MAX,
                "all lamps and the sky are reported");
 
-/* A segment, several that look alike, or the saturated part of sky or ground, whose radiance is then a factor of the
- * map's. */
+/* A segment, several that look alike, the saturated part of sky or ground, whose radiance is then a factor of the
+ * map's, or the sun, of its strength. */
 struct light_lamp {
     enum estimated_kind kind;
     size_t segment_count;
@@ -43,6 +43,11 @@ void light_lamps_release(struct light_lamps *l);
 /* The saturated part of a half of the environment: adds it; the one that there is, or NULL. */
 void light_lamps_add_half(struct light_lamps *l, size_t half);
 const struct light_lamp *light_lamps_half(const struct light_lamps *l, size_t half);
+
+/* Adds the sun, of at least a strength (sunlit.h), and of the strength that it has by now; the one that there is, or
+ * NULL. */
+void light_lamps_add_sun(struct light_lamps *l, rgb least, rgb strength);
+struct light_lamp *light_lamps_sun(struct light_lamps *l);
 
 /* Adds the lamps at which photographs saturate, by r->evidence (emitters_observe); with `again` those of r->light, and
  * the hidden ones, instead. And those that photographs measure. */

@@ -9,6 +9,7 @@
 #include "server/light/bounced_light.h"
 #include "server/light/joint_alike.h"
 #include "server/light/light_priors.h"
+#include "server/render/bsdf.h"
 
 /* Errors of patches agree up to this distance, in edges of patches: about 1 m, as far as a lamp near a surface
  * lights. */
@@ -26,6 +27,11 @@ void light_model_init(struct light_model *m, struct reconstruction *r, const str
         }
     }
     m->sky.is_dark = r->is_surrounded;
+    if (r->sun.is_clipped) {
+        sunlit_init(&m->sunlit, r);
+        sunlit_mark(&m->sunlit);
+        light_lamps_add_sun(&m->lamps, sunlit_least(&m->sunlit), rgb_scale(r->sun.irradiance, 1.0f / BSDF_PI));
+    }
     light_lamps_choose(&m->lamps, again);
 }
 
@@ -34,6 +40,7 @@ void light_model_release(struct light_model *m) {
     mem_free(m->joint);
     mem_free(m->albedo);
     light_points_release(&m->points);
+    sunlit_release(&m->sunlit);
     light_sky_release(&m->sky);
     light_lamps_release(&m->lamps);
     *m = (struct light_model){0};
@@ -109,20 +116,29 @@ static void add_regions(struct light_model *m) {
     mem_free(column);
 }
 
-void light_model_allow_for_highlights(struct light_model *m) {
-    struct joint_point *p = m->joint;
-    float *albedo = mem_array(m->points.count + 1, sizeof *albedo);
+void light_model_find_albedos(const struct light_model *m, float *albedo) {
+    const struct joint_point *p = m->joint;
+    float *sorted = mem_array(m->points.count + 1, sizeof *sorted);
     double *x = joint_fit_radiances(&m->fit);
     for (size_t first = 0, end; first < m->points.count; first = end) {
-        for (end = first; end < m->points.count && p[end].segment == p[first].segment; end++)
-            albedo[end - first] = p[end].observed / (float)joint_fit_light(&m->fit, end, x);
-        float median = quantile(albedo, end - first, 0.5);
-        for (size_t i = first; i < end; i++)
-            p[i].deviation = hypotf(p[i].deviation, ALBEDO_HIGHLIGHT / median);
-        m->albedo[p[first].segment] = fminf(median, (float)ALBEDO_WHITE);
+        size_t measured = 0;
+        for (end = first; end < m->points.count && p[end].segment == p[first].segment; end++) {
+            if (!p[end].is_bound && !p[end].is_lamp)
+                sorted[measured++] = p[end].observed / (float)joint_fit_light(&m->fit, end, x);
+        }
+        if (measured > 0)
+            albedo[p[first].segment] = quantile(sorted, measured, 0.5);
     }
     mem_free(x);
-    mem_free(albedo);
+    mem_free(sorted);
+}
+
+void light_model_allow_for_highlights(struct light_model *m) {
+    light_model_find_albedos(m, m->albedo);
+    for (size_t i = 0; i < m->points.count; i++)
+        m->joint[i].deviation = hypotf(m->joint[i].deviation, ALBEDO_HIGHLIGHT / m->albedo[m->joint[i].segment]);
+    for (size_t i = 0; i < m->points.count; i++)
+        m->albedo[m->joint[i].segment] = fminf(m->albedo[m->joint[i].segment], (float)ALBEDO_WHITE);
 }
 
 /* Discs of what unseen surfaces reflect of a hidden lamp; the first result is the caller's. */
@@ -177,22 +193,27 @@ static void take_bounced_off(struct light_model *m, const struct light_lamp *lam
     mem_free(disc);
 }
 
-/* A lamp's column of the response. */
+/* A lamp's column of the response: of hidden ones and of the sun by albedos. */
 static void respond(struct light_model *m, struct light_lamp *lamp) {
-    if (lamp->kind != ESTIMATED_HIDDEN) {
+    if (lamp->kind != ESTIMATED_HIDDEN && lamp->kind != ESTIMATED_SUN) {
         light_lamps_respond(&m->lamps, lamp, &m->points);
         return;
     }
     lamp->column = mem_calloc(m->points.count + 1, sizeof *lamp->column);
+    if (lamp->kind == ESTIMATED_SUN) {
+        sunlit_respond(&m->sunlit, &m->lamps.light, m->points.point, m->points.count, m->albedo, lamp->column);
+        return;
+    }
     light_model_respond_hidden(m, lamp->segment[0], lamp->column);
     take_bounced_off(m, lamp);
 }
 
-static void add_lamps(struct light_model *m, bool hidden) {
+/* Adds those whose response takes albedos, or the others. */
+static void add_lamps(struct light_model *m, bool by_albedo) {
     for (size_t i = 0; i < m->lamps.count; i++) {
         struct light_lamp *lamp = &m->lamps.lamp[i];
         struct joint_source source = light_lamps_prior(&m->lamps, lamp);
-        if ((lamp->kind == ESTIMATED_HIDDEN) != hidden)
+        if ((lamp->kind == ESTIMATED_HIDDEN || lamp->kind == ESTIMATED_SUN) != by_albedo)
             continue;
         respond(m, lamp);
         lamp->source = m->fit.source_count;
@@ -207,8 +228,8 @@ static void make_fit(struct light_model *m) {
     m->joint = mem_array(m->points.count + 1, sizeof *m->joint);
     for (size_t i = 0; i < m->points.count; i++) {
         const struct light_point *p = &m->points.point[i];
-        m->joint[i] =
-            (struct joint_point){p->segment, p->patch, rgb_mean(p->observed), rgb_mean(p->known), p->deviation};
+        m->joint[i] = (struct joint_point){
+            p->segment, p->patch, rgb_mean(p->observed), rgb_mean(p->known), p->deviation, p->is_bound, p->is_lamp};
         any_escapes = any_escapes || p->escaping > 0.0f;
     }
     joint_fit_init(&m->fit, m->joint, m->points.count, 1 + LIGHT_LAMPS_MAX + LIGHT_CELLS + LIGHT_REGIONS, m->r->pool);
@@ -227,12 +248,17 @@ void light_model_survey(struct light_model *m, const struct views *views, const 
     struct reconstruction *r = m->r;
     struct survey survey;
     struct image known;
+    const struct sun sun = r->sun;
+    if (sun.is_clipped)
+        r->sun.irradiance = rgb_gray(0.0f); /* a source */
     bool has_sky = light_sky_known(&m->sky, &known);
     if (has_sky)
         world_set_environment(&r->world, &known, r->pool);
-    survey_init(&survey, r, views, field, m->lamps.is_lamp, LIGHT_POINTS);
+    survey_init(&survey, r, views, field, m->lamps.is_lamp, true, LIGHT_POINTS);
+    sunlit_shade(&m->sunlit, survey.radiance);
     light_points_init(&m->points, &survey, &m->sky, observed, m->lamps.median_radiance);
     survey_release(&survey);
+    r->sun = sun;
     if (has_sky) {
         world_set_environment(&r->world, &r->environment.map, r->pool);
         image_release(&known);

@@ -5,11 +5,13 @@
 #include "server/capture/views.h"
 #include "server/light/joint_fit.h"
 #include "server/light/light_lamp.h"
+#include "server/light/sun/sunlit.h"
 
 struct light_model {
     struct reconstruction *r; /* borrowed */
     struct light_lamps lamps;
     struct light_sky sky;
+    struct sunlit sunlit; /* empty unless the sun is clipped */
     struct light_points points;
     struct joint_point *joint; /* [points.count] means of the channels; owned */
     float *albedo;             /* [segment_count] of what points show of a segment, at the priors; owned */
@@ -21,7 +23,7 @@ struct light_model {
     struct joint_tie tie[SKY_CELLS + 1]; /* of them to saturated sky and ground, and between these */
 };
 
-/* Chooses the lamps (light_lamps_choose), and sky and ground where they saturate. */
+/* Chooses the lamps (light_lamps_choose), sky and ground where they saturate, and a sun that is clipped. */
 void light_model_init(struct light_model *m, struct reconstruction *r, const struct views *views, bool again);
 void light_model_release(struct light_model *m);
 
@@ -36,6 +38,10 @@ void light_model_allow_for_highlights(struct light_model *m);
 
 /* Adds to column[points.count] the response of a hidden lamp: its own light and what unseen surfaces reflect of it. */
 void light_model_respond_hidden(const struct light_model *m, uint32_t segment, float *column);
+
+/* The median albedo of what is measured of each segment, at the fit's values. albedo[segment_count] stays as it is where
+ * nothing is. */
+void light_model_find_albedos(const struct light_model *m, float *albedo);
 
 /* How many patches are worth one to the source that was added last, at the fit's values (joint_alike.h). */
 double light_model_alike_last(const struct light_model *m);

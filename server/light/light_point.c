@@ -28,8 +28,10 @@ static rgb observed_at(const struct gathering *g, uint32_t texel) {
     return rgb_is_black(own) ? survey_observed(g->survey, &r->fused, texel) : own;
 }
 
-static uint32_t patch_of(const struct gathering *g, const struct surface_point *at) {
-    vec3 from = vec3_scale(vec3_sub(at->position, g->points->least), 1.0f / g->points->edge_m);
+float light_patch_edge(const struct mesh *mesh) { return PATCH_PART * (float)sqrt(mesh_area(mesh)); }
+
+uint32_t light_patch(const struct surface_point *at, vec3 least, float edge_m) {
+    vec3 from = vec3_scale(vec3_sub(at->position, least), 1.0f / edge_m);
     const float along[3] = {from.x, from.y, from.z};
     uint32_t patch =
         (at->normal.x > 0.0f) | (uint32_t)(at->normal.y > 0.0f) << 1 | (uint32_t)(at->normal.z > 0.0f) << 2;
@@ -115,10 +117,12 @@ static void gather_point(void *user, size_t index, int thread) {
     struct light_point *p = &g->points->point[index];
     uint32_t texel = g->survey->texel[index];
     struct irradiance light;
-    *p = (struct light_point){.segment = reconstruction_segment(r, texel), .observed = observed_at(g, texel)};
+    *p = (struct light_point){.segment = reconstruction_segment(r, texel), .is_bound = r->fused.is_bound[texel]};
+    p->is_lamp = g->survey->field.specular_only && g->survey->field.specular_only[p->segment];
+    p->observed = p->is_bound ? fused_radiance(&r->fused, texel) : observed_at(g, texel);
     if (!survey_gather(g->survey, texel, SURVEY_RAYS, thread, &p->at, &light))
         return;
-    p->patch = patch_of(g, &p->at);
+    p->patch = light_patch(&p->at, g->points->least, g->points->edge_m);
     p->known = survey_lambert(&p->at, &light);
     look_at_sky(g, in, p, sampler_key(KEY_SKY, texel, 0));
     float all = light.moment[0][0] + light.moment[0][1] + light.moment[0][2];
@@ -199,7 +203,7 @@ void light_points_init(struct light_points *p, const struct survey *survey, cons
     const struct mesh *mesh = &survey->r->scene->mesh;
     struct gathering g = {survey, sky, observed, p};
     *p = (struct light_points){.count = survey->count, .point = mem_array(survey->count + 1, sizeof *p->point)};
-    p->edge_m = PATCH_PART * (float)sqrt(mesh_area(mesh));
+    p->edge_m = light_patch_edge(mesh);
     mesh_bounds(mesh, &p->least, &p->most);
     parallel_for(survey->r->pool, survey->count, gather_point, &g);
     qsort(p->point, p->count, sizeof *p->point, by_patch);

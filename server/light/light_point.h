@@ -15,6 +15,8 @@ struct light_point {
     struct surface_point at;
     rgb observed, known; /* outgoing radiance; that of a surface of albedo 1 by known light */
     float deviation;     /* standard deviation of log `known` by noise and by light that is not modelled */
+    bool is_bound;       /* `observed` is a lower bound */
+    bool is_lamp;        /* of a segment that may be a lamp */
     float escaping;      /* part of its cosine-distributed rays that leave the room in unseen directions */
     float *unobserved;   /* [LIGHT_REGIONS][3] the same by surfaces of each region that no photograph shows, which
                                  * `known` goes without; NULL: none; owned, as the next */
@@ -28,6 +30,11 @@ struct light_points {
     float edge_m;              /* of a patch */
     vec3 least, most;          /* corners of the room */
 };
+
+/* The edge of patches in a room, and the patch of a place: a cube of that edge, from the corner `least` of the room, and
+ * which way its surface faces. */
+float light_patch_edge(const struct mesh *mesh);
+uint32_t light_patch(const struct surface_point *at, vec3 least, float edge_m);
 
 /* The region of a place. */
 size_t light_points_region(const struct light_points *p, vec3 place);

@@ -53,6 +53,10 @@
 #define COLOR_DEVIATION 1.0
 #define MEASURED_DEVIATION 0.02
 
+/* Odds that are asked of a lamp, or of a sun, that is found by what it lights: a false one costs more than a missed
+ * one. */
+#define SURE 20.0
+
 /* --- what the model lacks ---------------------------------------------------------------------------------- */
 
 /* Light that is not modelled, a standard deviation as a part of the room: dim places say less. */

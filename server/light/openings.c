@@ -11,7 +11,7 @@
 #include "server/light/sky/unseen_light.h"
 
 /* Standard deviations by which an opening is brighter than the mean of its prior. */
-#define SURE 2.0
+#define SURE_DEVIATIONS 2.0
 
 struct opening_candidate {
     size_t cell;
@@ -31,7 +31,7 @@ static size_t choose(struct light_model *m, struct opening_candidate chosen[SURR
     light_model_find_errors(m);
     for (size_t k = 0; k < SURROUND_CELLS && m->has_sky; k++) {
         const struct joint_source *source = &m->fit.source[m->first_cell + k];
-        if (!m->sky.surround->is_seen[k] && source->value - source->mean > SURE * source->error)
+        if (!m->sky.surround->is_seen[k] && source->value - source->mean > SURE_DEVIATIONS * source->error)
             chosen[count++] = (struct opening_candidate){k, exp(source->value), source->error};
     }
     qsort(chosen, count, sizeof *chosen, by_error);

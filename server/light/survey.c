@@ -65,29 +65,29 @@ static void leave_out(struct survey *s, const bool *without) {
     }
 }
 
-/* Observed, by more than a lower bound, and no lamp. */
-static bool is_usable(const struct reconstruction *r, const bool *without, uint32_t texel) {
+/* Observed, by more than a lower bound, and no lamp; with bounds any that has one. */
+static bool is_usable(const struct reconstruction *r, const bool *without, bool with_bounds, uint32_t texel) {
     uint32_t segment = reconstruction_segment(r, texel);
-    return r->fused.count[texel] > 0.0f && !r->fused.is_bound[texel] && rgb_is_black(r->materials.emission[segment]) &&
-           !(without && without[segment]);
+    bool is_dark = rgb_is_black(r->materials.emission[segment]) && r->fused.count[texel] > 0.0f;
+    return is_dark && (r->fused.is_bound[texel] ? with_bounds : !(without && without[segment]));
 }
 
-static void choose_points(struct survey *s, const bool *without, size_t points) {
+static void choose_points(struct survey *s, const bool *without, bool with_bounds, size_t points) {
     const struct reconstruction *r = s->r;
     size_t seen = 0;
     for (size_t i = 0; i < r->inverse.valid_count; i++)
-        seen += is_usable(r, without, r->inverse.valid[i]);
+        seen += is_usable(r, without, with_bounds, r->inverse.valid[i]);
     struct spacing spacing = {.all = seen, .wanted = seen < points ? seen : points};
     s->texel = mem_array(spacing.wanted + 1, sizeof *s->texel);
     for (size_t i = 0; i < r->inverse.valid_count; i++) {
         uint32_t texel = r->inverse.valid[i];
-        if (is_usable(r, without, texel) && spacing_takes(&spacing))
+        if (is_usable(r, without, with_bounds, texel) && spacing_takes(&spacing))
             s->texel[s->count++] = texel;
     }
 }
 
 void survey_init(struct survey *s, struct reconstruction *r, const struct views *views, const struct light_field *field,
-                 const bool *without, size_t points) {
+                 const bool *without, bool with_bounds, size_t points) {
     size_t texels = (size_t)r->fused.width * r->fused.height;
     *s =
         (struct survey){.r = r, .has_lights = views != NULL, .radiance = mem_calloc_large(texels, sizeof *s->radiance)};
@@ -102,7 +102,7 @@ void survey_init(struct survey *s, struct reconstruction *r, const struct views 
         s->field.lobe = field->lobe;
     if (without)
         leave_out(s, without);
-    choose_points(s, without, points);
+    choose_points(s, without, with_bounds, points);
     s->scratch = mem_array((size_t)parallel_thread_count(r->pool), sizeof *s->scratch);
 }
 

@@ -29,9 +29,9 @@ struct survey {
  * segment, or of the room. Segments of without[segment_count] (NULL: none; borrowed) send out nothing, but polished
  * surfaces mirror them. All other segments that outshine the room by `views` (NULL: none) are lights of
  * the world until survey_release, since small lamps must be sampled; then all emission is 0. At most `points`
- * points. */
+ * points, of which no more than a lower bound is observed, and of lamps such, only `with_bounds`. */
 void survey_init(struct survey *s, struct reconstruction *r, const struct views *views, const struct light_field *field,
-                 const bool *without, size_t points);
+                 const bool *without, bool with_bounds, size_t points);
 void survey_release(struct survey *s);
 
 /* Light at a texel's place `at`, by `rays` rays from a little inside of its triangle: a texel whose centre lies beside it

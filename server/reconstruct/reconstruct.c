@@ -69,7 +69,7 @@ static void log_hidden_lights(const struct stage_run *run) {
     if (r->openings.count > 0)
         run->hooks->log(run->hooks->user, line);
     if (r->sun.is_there && !r->sun.is_measured)
-        run->hooks->log(run->hooks->user, "light: a sun that no photograph shows was found by what it lights");
+        run->hooks->log(run->hooks->user, "light: a sun that no photograph measures was found by what it lights");
 }
 
 static enum status prepare(struct stage_run *run, struct error *err) {

@@ -277,6 +277,14 @@ const char *segments_name(const struct segments *s, const struct mesh *mesh, siz
     return id >= 0 && (uint64_t)id < s->name_count ? s->name[id] : NULL;
 }
 
+uint32_t segments_known_part(const struct segments *s, uint32_t segment, const bool *is_known) {
+    for (uint32_t i = 0; i < s->count && !is_known[segment]; i++) {
+        if (is_known[i] && s->id[i] == s->id[segment])
+            return i;
+    }
+    return segment;
+}
+
 void segments_release(struct segments *s) {
     for (size_t i = 0; i < s->name_count; i++)
         mem_free(s->name[i]);

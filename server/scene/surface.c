@@ -26,3 +26,9 @@ bool surface_at_texel(const struct mesh *mesh, const struct atlas *atlas, const 
     return surface_at(mesh, atlas, inverse, (float)(texel % inverse->width) + 0.5f,
                       (float)(texel / inverse->width) + 0.5f, p);
 }
+
+float surface_texel_m2(const struct mesh *mesh, const struct atlas *atlas, uint32_t triangle) {
+    const vec2 *c = atlas->corner[triangle];
+    float texels = fabsf((c[1].x - c[0].x) * (c[2].y - c[0].y) - (c[1].y - c[0].y) * (c[2].x - c[0].x));
+    return texels > 0.0f ? vec3_length(mesh_cross(mesh, triangle)) / texels : 0.0f;
+}

@@ -43,6 +43,9 @@ vec3 surface_shading(const struct mesh *mesh, uint32_t triangle, float b1, float
 bool surface_at_texel(const struct mesh *mesh, const struct atlas *atlas, const struct inverse_uv *inverse,
                       uint32_t texel, struct surface_point *point);
 
+/* Square metres that a texel of a triangle covers; 0 where the triangle has no area in the atlas. */
+float surface_texel_m2(const struct mesh *mesh, const struct atlas *atlas, uint32_t triangle);
+
 /* Surface point at (x, y), in texels, inside a valid texel. */
 bool surface_at(const struct mesh *mesh, const struct atlas *atlas, const struct inverse_uv *inverse, float x, float y,
                 struct surface_point *point);

@@ -19,12 +19,13 @@ enum estimated_kind {
     ESTIMATED_SATURATED_SKY,    /* the directions above the horizon at which they do */
     ESTIMATED_SEEN,             /* a segment whose radiance is measured, but for its error */
     ESTIMATED_SATURATED_GROUND, /* the directions below the horizon at which they do */
-    ESTIMATED_OPENING           /* a segment around a scan, from where light comes in (openings.h) */
+    ESTIMATED_OPENING,          /* a segment around a scan, from where light comes in (openings.h) */
+    ESTIMATED_SUN               /* a sun in whose light photographs saturate (sun_clipped.h) */
 };
 
 struct estimated_source {
     uint32_t kind, segment; /* segment: of hidden, saturated and opening */
-    rgb radiance;           /* of sky and ground: the mean */
+    rgb radiance;           /* of sky and ground: the mean; of the sun: irradiance over pi */
     float deviation;        /* standard deviation of its logarithm */
 };
 

@@ -72,7 +72,7 @@ static double fit_sky(const struct rig *g, const struct light_points *points) {
         const struct light_point *p = &points->point[i];
         double cell[SKY_CELLS] = {0};
         float light = p->at.position.x > WALL_AT ? 0.0f : SKY * (float)hole_factors(p->at.position, cell);
-        joint[i] = (struct joint_point){p->segment, p->patch, 0.5f * (0.1f + light), 0.1f, 0.05f};
+        joint[i] = (struct joint_point){p->segment, p->patch, 0.5f * (0.1f + light), 0.1f, 0.05f, false, false};
         lit[i] = p->escaping;
     }
     joint_fit_init(&fit, joint, points->count, 2, g->pool);
@@ -113,7 +113,7 @@ static void test_sky(void) {
     make_room_with_hole(&g.scene.mesh);
     rig_init(&g);
     light_sky_init(&sky, &g.r.environment);
-    survey_init(&survey, &g.r, NULL, NULL, NULL, 1600);
+    survey_init(&survey, &g.r, NULL, NULL, NULL, false, 1600);
     light_points_init(&points, &survey, &sky, NULL, 0.1f);
     survey_release(&survey);
     CHECK(points.count > 300);
@@ -210,7 +210,7 @@ static void test_surround(void) {
     surround_init(&surround, &views);
     light_sky_init(&sky, &g.r.environment);
     sky.surround = &surround;
-    survey_init(&survey, &g.r, NULL, NULL, NULL, 1600);
+    survey_init(&survey, &g.r, NULL, NULL, NULL, false, 1600);
     light_points_init(&points, &survey, &sky, NULL, 0.1f);
     survey_release(&survey);
     double found[SURROUND_CELLS] = {0}, wanted[SURROUND_CELLS] = {0}, sum = 0.0;

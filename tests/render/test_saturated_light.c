@@ -127,6 +127,7 @@ static void test_sky(struct parallel *pool, float above, float below) {
     saturate(&scene, CLIP);
     struct reconstruction r;
     shell_solve(&scene, 1, &r);
+    CHECK(!r.sun.is_there); /* what saturates does so by the sky */
     float sky_found = seen_sky(&r.environment, 0), ground_found = seen_sky(&r.environment, 1);
     printf("sky of %g, ground of %g: %.2f, %.2f\n", (double)above, (double)below, (double)sky_found,
            (double)ground_found);

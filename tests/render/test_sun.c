@@ -1,8 +1,10 @@
 /* sun.h, sun_find.h: a sun that shines through a window onto the floor, and that no photograph shows, is found where
  * it is and as strong as it is, its patch is gone from the floor's base colour and it is in the environment's map;
- * a lamp, a dim screen and a sky without a sun are none. The same for any number of threads. */
+ * a lamp, a dim screen and a sky without a sun are none. In the long form (UNBAKE_LONG) by several numbers of threads.
+ * sun_clipped.h: one in whose light all photographs saturate is found as well, its strength about. */
 #include "server/reconstruct/reconstruct.h"
 #include "server/scene/latlong.h"
+#include "server/state/evidence.h"
 #include "tests/check.h"
 #include "tests/render/shell.h"
 #include "tests/render/small_room.h"
@@ -74,7 +76,7 @@ static void test_sun(struct parallel *pool) {
     vec3 truth = {0.0f, cosf(sun_theta()), -sinf(sun_theta())};
     const int threads[] = {1, 3};
     struct sun found[2] = {{0}};
-    for (int i = 0; i < 2; i++) {
+    for (int i = !IS_LONG; i < 2; i++) {
         struct reconstruction r;
         shell_solve(&scene, threads[i], &r);
         found[i] = r.sun;
@@ -93,7 +95,64 @@ static void test_sun(struct parallel *pool) {
             CHECK_THAT(!r.is_emitter[s] || r.segments.id[s] == LAMP, "segment %zu", s);
         reconstruct_release(&r);
     }
-    CHECK(memcmp(&found[0], &found[1], sizeof found[0]) == 0);
+    CHECK(!IS_LONG || memcmp(&found[0], &found[1], sizeof found[0]) == 0);
+    image_release(&sky);
+    scene_release(&scene);
+}
+
+/* At one exposure the lamp, the sky and what the sun lights saturate. Where these patches lie tells where the sun is, and
+ * what they send on how strong it is. */
+static void test_clipped(struct parallel *pool) {
+    struct scene scene = {0};
+    struct image sky;
+    make_mesh_with_window(&scene.mesh);
+    make_sky(&sky, SUN_RADIANCE);
+    photograph_samples = 64; /* as in test_sun */
+    photograph_mesh(&scene, rgb_scale(lamp_radiance, 0.2f), &sky, look_anywhere, pool);
+    photograph_samples = 16;
+    for (size_t f = 0; f < scene.photograph_count; f++)
+        saturate_photograph(&scene.photograph[f], 0.375f); /* exact as a half */
+    struct reconstruction r;
+    shell_solve_with(SHELL_FINE, &scene, 0, &r);
+    float expected = sun_irradiance(), found = rgb_mean(r.sun.irradiance);
+    rgb floor = shell_mean_color(&r, FLOOR);
+    printf("a sun at one exposure: %.3g of %.3g, floor %.3f of %.3f\n", (double)found, (double)expected,
+           (double)rgb_mean(floor), (double)rgb_mean(wall_color[FLOOR]));
+    CHECK(r.sun.is_there && r.sun.is_clipped);
+    CHECK_THAT(vec3_dot(r.sun.direction, (vec3){0.0f, cosf(sun_theta()), -sinf(sun_theta())}) > cosf(0.05f), "%g %g %g",
+               (double)r.sun.direction.x, (double)r.sun.direction.y, (double)r.sun.direction.z);
+    CHECK_THAT(found > 0.7f * expected && found < 1.4f * expected, "%g of %g", (double)found, (double)expected);
+    CHECK_NEAR(rgb_mean(floor), rgb_mean(wall_color[FLOOR]), 0.2f * rgb_mean(wall_color[FLOOR]));
+    for (size_t s = 0; s < r.segments.count; s++)
+        CHECK_THAT(r.is_emitter[s] == (r.segments.id[s] == LAMP), "segment %zu", s);
+    reconstruct_release(&r);
+    image_release(&sky);
+    scene_release(&scene);
+}
+
+/* A bright sky saturates, too, and so do walls and what lies in patches with the edges of the window: it is no sun, and
+ * they are no lamps. */
+static void test_overcast(struct parallel *pool) {
+    struct scene scene = {0};
+    struct image sky;
+    make_mesh_with_window(&scene.mesh);
+    image_init_rgb(&sky, SKY_WIDTH, SKY_HEIGHT);
+    for (size_t i = 0; i < 3 * SKY_WIDTH * SKY_HEIGHT; i++)
+        sky.pixel[i] = 8.0f;
+    photograph_mesh(&scene, rgb_gray(0.0f), &sky, look_anywhere, pool);
+    for (size_t f = 0; f < scene.photograph_count; f++)
+        saturate_photograph(&scene.photograph[f], 0.75f);
+    struct reconstruction r;
+    shell_solve(&scene, 0, &r);
+    CHECK(!r.sun.is_there);
+    size_t saturated = 0;
+    for (size_t s = 0; s < r.segments.count; s++) {
+        const struct emitter_evidence *e = &r.evidence[s];
+        saturated += e->is_seen && e->saturated[0] && e->saturated[1] && e->saturated[2];
+        CHECK_THAT(!e->is_unbounded && !e->is_hidden && !r.is_emitter[s], "segment %zu", s);
+    }
+    CHECK(saturated > 0);
+    reconstruct_release(&r);
     image_release(&sky);
     scene_release(&scene);
 }
@@ -192,6 +251,8 @@ static void test_dim_screen(struct parallel *pool) {
 int main(void) {
     struct parallel *pool = parallel_new(0);
     test_sun(pool);
+    test_clipped(pool);
+    test_overcast(pool);
     test_without_sky(pool);
     test_polished_floor(pool);
     test_no_sun(pool);

@@ -142,6 +142,9 @@ static void test_names(void) {
                                  sizeof *s.id); /* a part is split off the last one, as light/decision/split.c does */
         s.id[s.count++] = s.id[2];
         CHECK(segments_name(&s, &mesh, 3) == segments_name(&s, &mesh, 2));
+        CHECK(segments_known_part(&s, 3, (bool[]){true, true, true, false}) == 2);
+        CHECK(segments_known_part(&s, 3, (bool[]){true, true, false, false}) == 3);
+        CHECK(segments_known_part(&s, 0, (bool[]){true, true, false, false}) == 0);
         segments_release(&s);
         for (int k = 0; k < 2; k++)
             mem_free(mesh.name[k]);

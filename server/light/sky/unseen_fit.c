@@ -87,8 +87,13 @@ static void fit_cells(const struct unseen_point *point, size_t count, struct par
     float *column = mem_array(count + 1, sizeof *column);
     struct joint_fit fit;
     for (size_t i = 0; i < count; i++)
-        joint[i] = (struct joint_point){point[i].segment, (uint32_t)i, fmaxf(point[i].observed, (float)FAINTEST),
-                                        fmaxf(point[i].known, (float)FAINTEST), 0.0f};
+        joint[i] = (struct joint_point){point[i].segment,
+                                        (uint32_t)i,
+                                        fmaxf(point[i].observed, (float)FAINTEST),
+                                        fmaxf(point[i].known, (float)FAINTEST),
+                                        0.0f,
+                                        false,
+                                        false};
     joint_fit_init(&fit, joint, count, 1 + CELLS, pool);
     for (size_t k = 0; k < CELLS; k++) {
         double even = log_radiance[k];

@@ -71,7 +71,7 @@ static void fill_in(const struct unseen *u) {
 /* Fills the points: what they show, and what is around them. */
 static void gather_points(struct unseen *u, const struct views *views) {
     struct survey survey;
-    survey_init(&survey, u->r, views, NULL, NULL, POINTS);
+    survey_init(&survey, u->r, views, NULL, NULL, false, POINTS);
     u->survey = &survey;
     u->count = survey.count;
     u->point = mem_array(u->count + 1, sizeof *u->point);

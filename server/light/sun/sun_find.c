@@ -8,14 +8,12 @@
 #include "common/mem.h"
 #include "common/spaced.h"
 #include "server/light/sun/missing_light.h"
+#include "server/light/sun/sun_directions.h"
 #include "server/render/bsdf.h"
-#include "server/scene/latlong.h"
 
 /* Least number of bright places, in the room and of those that the sun reaches. */
 #define MIN_BRIGHT 12
-/* Directions are screened so far apart, in degrees, by up to so many bright places and as many others; the likeliest
- * ones are fitted. */
-#define SCREEN_DEGREES 3.0
+/* Directions are screened by up to so many bright places and as many others; the likeliest ones are fitted. */
 #define SCREEN_PLACES 768
 #define CANDIDATES 24
 /* Half the angles of discs tried, in degrees: first the sun's own; in haze it is wider. What is best explained by
@@ -30,7 +28,6 @@ static const float radius_degrees[] = {0.27f, 0.6f, 1.2f, 2.0f, 3.0f, 4.5f, 6.0f
 #define HOPEFUL 0.25
 /* Greatest credible ratio of sunlit white paper to the room's median: 100,000 lux over 10. */
 #define BRIGHTEST 1e4f
-#define STEPS 24 /* to better directions, or to smaller steps */
 
 struct sun_search {
     struct reconstruction *r;
@@ -39,12 +36,6 @@ struct sun_search {
     struct missing_light missing;
     struct sun sun; /* that is tried */
     int rays;       /* a place, for the visible part of the disc */
-};
-
-/* A direction and the misfit of the places that it lights. */
-struct sun_candidate {
-    vec3 direction;
-    double score;
 };
 
 /* --- directions ------------------------------------------------------------------------------------ */
@@ -85,27 +76,12 @@ static void choose_places(struct screening *a, bool bright) {
     }
 }
 
-static int by_score(const void *a, const void *b) {
-    const struct sun_candidate *first = a, *second = b;
-    return (first->score < second->score) - (first->score > second->score);
-}
-
 /* Fills candidate[CANDIDATES] with the likeliest unseen directions; returns their number. */
 static size_t screen_directions(const struct sun_search *s, struct sun_candidate candidate[CANDIDATES]) {
     struct screening a = {.s = s};
-    size_t rows = (size_t)(180.0 / SCREEN_DEGREES), count = 0;
     a.place = mem_array(2 * SCREEN_PLACES, sizeof *a.place);
     a.weight = mem_array(2 * SCREEN_PLACES, sizeof *a.weight);
-    a.candidate = mem_array(2 * rows * rows, sizeof *a.candidate);
-    for (size_t row = 0; row < rows; row++) {
-        double down = ((double)row + 0.5) / (double)rows;
-        size_t columns = (size_t)ceil(2.0 * (double)rows * sin(PI * down));
-        for (size_t column = 0; column < columns; column++) {
-            vec3 d = latlong_direction(((double)column + 0.5) / (double)columns, down);
-            if (!s->r->environment.map.pixel || !environment_is_seen(&s->r->environment, d))
-                a.candidate[count++].direction = d;
-        }
-    }
+    size_t count = sun_directions_spread(&s->r->environment, environment_is_seen, &a.candidate);
     double squares = 0.0;
     for (size_t i = 0; i < s->places.count; i++) {
         a.mean += (double)s->places.place[i].residual / (double)s->places.count;
@@ -115,7 +91,7 @@ static size_t screen_directions(const struct sun_search *s, struct sun_candidate
     choose_places(&a, true);
     choose_places(&a, false);
     parallel_for(s->r->pool, count, score_direction, &a);
-    qsort(a.candidate, count, sizeof *a.candidate, by_score);
+    sun_directions_sort(a.candidate, count);
     count = count < CANDIDATES ? count : CANDIDATES;
     memcpy(candidate, a.candidate, count * sizeof *candidate);
     mem_free(a.candidate);
@@ -136,32 +112,13 @@ static void find_response(void *user, size_t index, int thread) {
 }
 
 /* Reduction of misfit by a sun in a direction. */
-static double try_direction(struct sun_search *s, vec3 direction) {
+static double try_direction(void *user, vec3 direction) {
+    struct sun_search *s = user;
     double explained;
     s->sun.direction = direction;
     parallel_for(s->r->pool, s->places.count, find_response, s);
     missing_light_strength(&s->missing, MISSING_MEAN, &explained);
     return explained;
-}
-
-/* Moves the best direction by ever smaller steps for as long as more is explained. */
-static void walk(struct sun_search *s, struct sun_candidate *best, double degrees, double least_degrees) {
-    for (int i = 0; i < STEPS && degrees >= least_degrees; i++) {
-        bool moved = false;
-        vec3 middle = best->direction, across, up;
-        float step = (float)tan(degrees * PI / 180.0);
-        vec3_frame(middle, &across, &up);
-        for (int k = 0; k < 8; k++) {
-            float angle = (float)k * 0.25f * BSDF_PI;
-            vec3 d = vec3_mad(vec3_mad(middle, step * cosf(angle), across), step * sinf(angle), up);
-            struct sun_candidate other = {vec3_normalize(d), 0.0};
-            other.score = try_direction(s, other.direction);
-            if (other.score > best->score)
-                *best = other, moved = true;
-        }
-        if (!moved)
-            degrees *= 0.5;
-    }
 }
 
 /* Sunlit places of a greater residual, each weighted by the visible part of the disc. */
@@ -186,7 +143,7 @@ static struct sun_candidate best_direction(struct sun_search *s) {
     if (best.score <= HOPEFUL * EXPLAINS * count_reached(s, -INFINITY))
         best.score = 0.0;
     else
-        walk(s, &best, 2.0, 0.25);
+        sun_directions_walk(&best, 2.0, 0.25, try_direction, s);
     return best;
 }
 
@@ -202,7 +159,7 @@ static bool find_radius(struct sun_search *s, struct sun_candidate *best) {
             best->score = explained, radius = i;
     }
     s->sun.radius_rad = radius_degrees[radius] * BSDF_PI / 180.0f;
-    walk(s, best, 0.5, 0.1);
+    sun_directions_walk(best, 0.5, 0.1, try_direction, s);
     return radius + 1 < RADII;
 }
 
@@ -250,11 +207,11 @@ void sun_find(struct reconstruction *r, const struct views *views) {
     struct sun_search s = {.r = r, .median_radiance = views->median_radiance};
     double explains = 0.0;
     struct survey survey;
-    if (r->sun.is_measured) {
+    if (r->sun.is_there) {
         report_found(r);
         return;
     }
-    survey_init(&survey, r, views, NULL, NULL, LIGHT_PLACES);
+    survey_init(&survey, r, views, NULL, NULL, false, LIGHT_PLACES);
     light_places_init(&s.places, &survey);
     survey_release(&survey);
     light_places_leave_out_lamps(&s.places);

@@ -1,4 +1,4 @@
-/* sun_find.h -- looks for a sun that no photograph shows, by the patches that it lights.
+/* sun_find.h -- looks for a sun that no photograph shows, by the patches that it lights, unless there is one already.
  *
  * Photographs of a room seldom look into the sun, yet its light on a floor is the brightest thing in many. Without it
  * the patch would be taken for white paint, or for a lamp. At some thousand places observed radiance is base colour

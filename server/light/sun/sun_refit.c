@@ -80,7 +80,7 @@ static void find_places(struct divide *d, struct light_places *places) {
 void sun_refit(struct divide *d, struct sun *sun) {
     struct light_places places;
     struct missing_light missing;
-    if (!sun->is_there || sun->is_measured)
+    if (!sun->is_there || sun->is_measured || sun->is_clipped)
         return;
     find_places(d, &places);
     missing_light_init(&missing, &places, d->pool);

@@ -115,6 +115,6 @@ bool sun_seen_take(struct environment *e, struct sun *sun) {
         return false;
     take_excess(&s, &e->map);
     environment_update_figures(e);
-    *sun = (struct sun){true, true, s.middle, (float)s.radius_rad, irradiance};
+    *sun = (struct sun){true, true, false, s.middle, (float)s.radius_rad, irradiance};
     return true;
 }
