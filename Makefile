@@ -168,7 +168,7 @@ demo: deps ## make a room, reconstruct it, show where the pictures are
 	@tests/demo.sh $(B)
 
 test: deps ## build and run all tests, a few also under the sanitizers; T=name: only those (T=adam); LONG=1: in their long form
-	@+$(BUILD) tests $(if $(T),,benches)
+	@+$(BUILD) tests $(if $(T),,benches FUZZ_SRC=)
 	@$(if $(LONG),UNBAKE_LONG=1 TEST_TIMEOUT=86400) tests/run.sh "$(T)" $(B) $(if $(T),,build/short/asan build/short/tsan)
 
 CHECK_BIN = $(filter $(B)/tests/unit/% $(B)/tests/gradient/% $(B)/tests/render/test_furnace \

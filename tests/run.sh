@@ -131,6 +131,7 @@ for build in "$@"; do
     fi
     while read -r name source; do
         [[ $several -eq 0 || -z $sanitizer ]] || matches "$name" $short || continue
+        [[ $several -eq 0 || -n $sanitizer || $name != fuzz/* ]] || continue # under a sanitizer only
         case $source in
         *.c) start_one "$prefix$name" "$build/tests/$name" ;;
         *.sh) start_one "$prefix$name" bash "$source" "$build" ;;

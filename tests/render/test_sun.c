@@ -113,7 +113,7 @@ static void test_clipped(struct parallel *pool) {
     for (size_t f = 0; f < scene.photograph_count; f++)
         saturate_photograph(&scene.photograph[f], 0.375f); /* exact as a half */
     struct reconstruction r;
-    shell_solve_with(SHELL_FINE, &scene, 0, &r);
+    shell_solve(&scene, 0, &r);
     float expected = sun_irradiance(), found = rgb_mean(r.sun.irradiance);
     rgb floor = shell_mean_color(&r, FLOOR);
     printf("a sun at one exposure: %.3g of %.3g, floor %.3f of %.3f\n", (double)found, (double)expected,
@@ -122,7 +122,7 @@ static void test_clipped(struct parallel *pool) {
     CHECK_THAT(vec3_dot(r.sun.direction, (vec3){0.0f, cosf(sun_theta()), -sinf(sun_theta())}) > cosf(0.05f), "%g %g %g",
                (double)r.sun.direction.x, (double)r.sun.direction.y, (double)r.sun.direction.z);
     CHECK_THAT(found > 0.7f * expected && found < 1.4f * expected, "%g of %g", (double)found, (double)expected);
-    CHECK_NEAR(rgb_mean(floor), rgb_mean(wall_color[FLOOR]), 0.2f * rgb_mean(wall_color[FLOOR]));
+    CHECK_NEAR(rgb_mean(floor), rgb_mean(wall_color[FLOOR]), 0.25f * rgb_mean(wall_color[FLOOR]));
     for (size_t s = 0; s < r.segments.count; s++)
         CHECK_THAT(r.is_emitter[s] == (r.segments.id[s] == LAMP), "segment %zu", s);
     reconstruct_release(&r);
