@@ -2,8 +2,9 @@
 # run.sh NAME BUILD...: runs the tests that were built under each BUILD, all of them or those with
 # NAME in their names, TEST_LANES (processors + 2) at a time. One line a test; a failing test's output follows its line.
 # Last: "N passed, N failed, N skipped". Tests under a sanitizer have asan/ or tsan/ before their names. Of
-# several builds those run a short list only, and are built here, beside the tests of the first. With TEST_SET=check
-# only what a change needs while it is written: unit, gradient and closed forms, and one small job.
+# several builds the first leaves the fuzz targets to the sanitizers; those run a short list only, and are built here,
+# beside the tests of the first. With TEST_SET=check only what a change needs while it is written: unit, gradient and
+# closed forms, and one small job.
 #
 # run.sh --short asan|tsan: that short list, as patterns of names.
 set -u

@@ -85,9 +85,7 @@ void light_lamps_add_sun(struct light_lamps *l, rgb least, rgb strength) {
     l->lamp[l->count++] = (struct light_lamp){ESTIMATED_SUN, .least = least, .radiance = strength};
 }
 
-struct light_lamp *light_lamps_sun(struct light_lamps *l) {
-    return (struct light_lamp *)first_of_kind(l, ESTIMATED_SUN);
-}
+const struct light_lamp *light_lamps_sun(const struct light_lamps *l) { return first_of_kind(l, ESTIMATED_SUN); }
 
 struct light_lamp *light_lamps_add_hidden(struct light_lamps *l, uint32_t segment) {
     assert(l->count < LIGHT_LAMPS_MAX);

@@ -47,7 +47,7 @@ const struct light_lamp *light_lamps_half(const struct light_lamps *l, size_t ha
 /* Adds the sun, of at least a strength (sunlit.h), and of the strength that it has by now; the one that there is, or
  * NULL. */
 void light_lamps_add_sun(struct light_lamps *l, rgb least, rgb strength);
-struct light_lamp *light_lamps_sun(struct light_lamps *l);
+const struct light_lamp *light_lamps_sun(const struct light_lamps *l);
 
 /* Adds the lamps at which photographs saturate, by r->evidence (emitters_observe); with `again` those of r->light, and
  * the hidden ones, instead. And those that photographs measure. */

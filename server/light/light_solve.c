@@ -31,7 +31,7 @@ static float *find_albedos(const struct light_model *m) {
 }
 
 /* What sunlit surfaces send depends on their albedos, which are lower the more light there is. */
-static void renew_sun(struct light_model *m, struct light_lamp *sun) {
+static void renew_sun(struct light_model *m, const struct light_lamp *sun) {
     float *albedo = find_albedos(m);
     memset(sun->column, 0, m->points.count * sizeof *sun->column);
     sunlit_respond(&m->sunlit, &m->lamps.light, m->points.point, m->points.count, albedo, sun->column);
@@ -98,7 +98,7 @@ static size_t drop_reflecting(struct light_model *m) {
 /* --- the whole ---------------------------------------------------------------------------------------------- */
 
 void light_solve(struct light_model *m) {
-    struct light_lamp *sun = light_lamps_sun(&m->lamps);
+    const struct light_lamp *sun = light_lamps_sun(&m->lamps);
     joint_fit_solve(&m->fit);
     for (int i = 0; i < SUN_ROUNDS && sun; i++) {
         renew_sun(m, sun);

@@ -2,6 +2,7 @@
  * it is and as strong as it is, its patch is gone from the floor's base colour and it is in the environment's map;
  * a lamp, a dim screen and a sky without a sun are none. In the long form (UNBAKE_LONG) by several numbers of threads.
  * sun_clipped.h: one in whose light all photographs saturate is found as well, its strength about. */
+#include "server/light/sun/sun_clipped.h"
 #include "server/reconstruct/reconstruct.h"
 #include "server/scene/latlong.h"
 #include "server/state/evidence.h"
@@ -212,6 +213,36 @@ static void test_polished_floor(struct parallel *pool) {
     wall_specular[FLOOR] = 0.0f;
 }
 
+/* Has all photographs saturate where at least `least` of the suns in these directions reach. */
+static void saturate_where_lit(struct reconstruction *r, const vec3 *direction, int count, int least) {
+    for (size_t i = 0; i < r->inverse.valid_count; i++) {
+        uint32_t texel = r->inverse.valid[i];
+        struct surface_point at;
+        int lit = 0;
+        if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at))
+            continue;
+        for (int k = 0; k < count; k++) {
+            const struct sun sun = {.direction = direction[k]};
+            lit += sun_visibility(&sun, r->world.accel, &at, 1) > 0.0f;
+        }
+        r->fused.count[texel] = 1.0f;
+        r->fused.is_bound[texel] = lit >= least;
+    }
+}
+
+/* A bright part of the sky, 40 degrees wide, of which half makes saturate what it reaches: patches have edges that suit a
+ * direction in it, but others as well. */
+static void check_bright_sky(struct reconstruction *r, struct parallel *pool) {
+    vec3 direction[9];
+    for (int k = 0; k < 9; k++)
+        direction[k] = vec3_normalize((vec3){0.4f * (float)(k % 3 - 1), 0.7f + 0.4f * (float)(k / 3 - 1), -1.0f});
+    r->pool = pool;
+    saturate_where_lit(r, direction, 9, 5);
+    sun_clipped_find(r);
+    CHECK(!r->sun.is_there);
+    r->pool = NULL;
+}
+
 static void test_no_sun(struct parallel *pool) {
     struct scene scene = {0};
     struct image sky;
@@ -221,6 +252,7 @@ static void test_no_sun(struct parallel *pool) {
     struct reconstruction r;
     shell_solve_with(SHELL_COARSE, &scene, 0, &r);
     CHECK(!r.sun.is_there);
+    check_bright_sky(&r, pool);
     reconstruct_release(&r);
     image_release(&sky);
     scene_release(&scene);

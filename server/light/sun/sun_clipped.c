@@ -16,7 +16,7 @@
 #define EDGES 2.0f       /* of a patch, in those of the joint fit: some .6 m */
 #define PLACES_ALIKE 6.0 /* independent draws that a patch's places are worth, at most */
 #define RADIUS_DEGREES 0.27f
-#define NEAR_DEGREES 7.0 /* within which a wrong direction is likely since the right one is: two that are tried */
+#define NEAR_DEGREES 7.0 /* so near to the right direction a wrong one is likely, too */
 
 struct clipped_place {
     int64_t object; /* parts that shine are segments of their own (split.h) */
@@ -164,15 +164,14 @@ static struct sun_candidate find_likeliest(struct clipped_search *s, double *bey
     return best;
 }
 
-bool sun_clipped_find(struct reconstruction *r) {
+void sun_clipped_find(struct reconstruction *r) {
     struct clipped_search s = {.r = r};
     double beyond;
     size_t count = 0;
     find_places(&s);
     find_patches(&s);
     struct sun_candidate best = find_likeliest(&s, &beyond, &count);
-    bool is_found = best.score > log(SURE * (double)(count + 1)) && beyond > log(SURE);
-    if (is_found) {
+    if (best.score > log(SURE * (double)(count + 1)) && beyond > log(SURE)) {
         sun_directions_walk(&best, 1.5, 0.1, score_of, &s);
         r->sun = (struct sun){.is_there = true, .is_clipped = true, .direction = best.direction};
         r->sun.radius_rad = RADIUS_DEGREES * BSDF_PI / 180.0f;
@@ -181,5 +180,4 @@ bool sun_clipped_find(struct reconstruction *r) {
     mem_free(s.log_factorial);
     mem_free(s.patch);
     mem_free(s.place);
-    return is_found;
 }

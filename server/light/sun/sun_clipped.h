@@ -24,8 +24,8 @@
 
 #include "server/state/reconstruction.h"
 
-/* Needs fused radiance, and the environment. Where there is such a sun it sets r->sun, of irradiance 0, and returns true.
- * The same for any number of threads. */
-bool sun_clipped_find(struct reconstruction *r);
+/* Needs fused radiance, and the environment. Where there is such a sun it sets r->sun, of irradiance 0. The same for any
+ * number of threads. */
+void sun_clipped_find(struct reconstruction *r);
 
 #endif

@@ -3,7 +3,7 @@
  * sun_find.h compares what the sun lights with the rest of its segment, before anything is known of gloss. A polished
  * floor mirrors walls and windows; that makes its shade look lighter, and bluer, than its wood is, and the sun that
  * lights the rest of it weaker and yellower than it is. Whether there is a sun, where and how wide, stays as it was
- * found. */
+ * found. A sun in whose light photographs saturate is not changed: the joint fit finds its strength anew. */
 #ifndef UNBAKE_LIGHT_SUN_SUN_REFIT_H
 #define UNBAKE_LIGHT_SUN_SUN_REFIT_H
 
