@@ -140,7 +140,7 @@ static void put_lights(struct buf *out, const cJSON *report, int *reasons) {
         double deviation = number_at(light, "deviation", NULL);
         const char *kind = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(light, "kind"));
         hidden += kind && strcmp(kind, "hidden") == 0;
-        saturated += kind && strncmp(kind, "saturated", 9) == 0;
+        saturated += kind && (strncmp(kind, "saturated", 9) == 0 || strcmp(kind, "sun") == 0);
         uncertain += deviation > UNCERTAIN_LIGHT;
         most = fmax(most, isfinite(deviation) ? deviation : 0.0);
     }

@@ -31,7 +31,8 @@ int main(void) {
         "{\"metrics\": {\"held_out_views\": 1, \"psnr_db\": 18, \"msre\": 0.86, \"msre_noise_left\": 0.80},"
         "\"seen_surface_share\": 0.59, \"prepare\": {\"training_photographs\": 5},"
         "\"unseen_light\": {\"share_of_rays\": 0.2}, \"sun\": {\"found\": true},"
-        "\"lights\": [{\"kind\": \"hidden\", \"deviation\": 0.5}, {\"kind\": \"hidden\", \"deviation\": 0.1}]}";
+        "\"lights\": [{\"kind\": \"hidden\", \"deviation\": 0.5}, {\"kind\": \"hidden\", \"deviation\": 0.1}, "
+        "{\"kind\": \"saturated_sky\", \"deviation\": 0.1}, {\"kind\": \"sun\", \"deviation\": 0.1}]}";
     CHECK(says(bad, "no segment shines; the sun shines in"));
     CHECK(says(bad, "1 held-out view is far from the photograph: 18.0 dB"));
     CHECK(says(bad, "squared relative error uncertain: 0.86, give or take 0.8"));
@@ -39,6 +40,7 @@ int main(void) {
     CHECK(says(bad, "Few photographs: 5."));
     CHECK(says(bad, "20 % of the light's directions"));
     CHECK(says(bad, "2 sources of light in no photograph"));
+    CHECK(says(bad, "2 sources of light too bright for every photograph")); /* the sun is one */
     CHECK(says(bad, "brightness of 1 source of light is uncertain: the standard deviation is up to 50 %"));
     CHECK(!says(bad, "No weakness is known"));
     CHECK(says("{\"calibration\": {\"contrast_unknown\": true}}", "The exposures of the photographs are not told"));
