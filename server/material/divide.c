@@ -33,8 +33,6 @@
 /* Base colour assumed for the noise weights. With a texel's own, bright texels would outweigh dark ones wherever
  * neighbours are averaged, and dark tiles between white joints would turn grey. */
 #define TYPICAL_BASE_COLOR 0.5f /* +25 %: +0.02 dB */
-/* Base colour of white paint: of a texel that saturates it lies between its lower bound and this. */
-#define WHITE_BASE_COLOR 0.85f
 /* Lower bounds of Lambert radiance, parts of the median radiance: of the divisor, and for use by detail.h. */
 #define MIN_LAMBERT 1e-4f        /* +25 %: no change */
 #define MIN_LAMBERT_DETAIL 1e-3f /* +25 %: no change */
@@ -167,16 +165,6 @@ static struct robust_sample observation_of(const struct divide *d, uint32_t texe
                                   .mixing = c->mixing * rgb_dot(base, base)};
 }
 
-/* Base colour of a surface that is at least as bright as an observation says: the middle of the range up to white. */
-static struct robust_sample above_bound(struct robust_sample sample, const bool saturated[3]) {
-    for (int c = 0; c < 3; c++) {
-        float *value = &(&sample.value.r)[c];
-        if (saturated[c])
-            *value = sqrtf(fmaxf(*value, 0.0f) * fmaxf(*value, WHITE_BASE_COLOR));
-    }
-    return sample;
-}
-
 /* Whether most of the observations of a texel say no more than a lower bound, by the median of their brightness. */
 static bool is_bound(const struct divide_candidates *of, const struct measurement_observations *observations) {
     struct bounded gray[MEASUREMENT_OBSERVATIONS];
@@ -190,37 +178,43 @@ static bool is_bound(const struct divide_candidates *of, const struct measuremen
 }
 
 /* Leaves out the observations that saturate. But if the median is a lower bound those that do not are what noise or a
- * shadow has left below, and would say that white is grey: then only the greatest bound is kept. */
-static void settle_bounds(const struct divide_candidates *of, struct measurement_observations *observations) {
+ * shadow has left below, and would say that white is grey: then only the greatest bound is kept. Returns which channels
+ * of it are one (measurement.bounds). */
+static uint8_t settle_bounds(const struct divide_candidates *of, struct measurement_observations *observations) {
     bool bound = is_bound(of, observations);
+    uint8_t bounds = 0;
     struct robust_sample *observation = observations->observation, greatest = {.gray = -INFINITY};
     size_t kept = 0, count = observations->count;
     for (size_t i = 0; i < count; i++) {
         const struct divide_candidate *c = &of->candidate[i];
-        if (bound && is_saturated(c) && observation[i].gray > greatest.gray)
-            greatest = above_bound(observation[i], c->saturated);
-        else if (!bound && !is_saturated(c))
+        if (bound && is_saturated(c) && observation[i].gray > greatest.gray) {
+            greatest = observation[i];
+            bounds = (uint8_t)(c->saturated[0] | c->saturated[1] << 1 | c->saturated[2] << 2);
+        } else if (!bound && !is_saturated(c)) {
             observation[kept++] = observation[i];
+        }
     }
     if (bound)
         observation[kept++] = greatest;
     observations->count = kept;
+    return bounds;
 }
 
-static void observe_all(const struct divide *d, uint32_t texel, struct incident *scratch, struct irradiance *light,
-                        struct measurement_observations *observations) {
+/* Returns measurement.bounds of what is observed. */
+static uint8_t observe_all(const struct divide *d, uint32_t texel, struct incident *scratch, struct irradiance *light,
+                           struct measurement_observations *observations) {
     struct surface_point at;
     struct divide_candidates candidates;
     observations->count = 0;
     if (!light_at(d, texel, &at, light))
-        return;
+        return 0;
     top_k_init(&candidates.best, candidates.item, MEASUREMENT_OBSERVATIONS);
     for (uint32_t t = 0; t < d->views->train_count; t++)
         add_candidate(d, surface_segment(&d->surface, texel), &at, light, t, &candidates);
     for (; observations->count < candidates.best.count; observations->count++)
         observations->observation[observations->count] =
             observation_of(d, texel, &at, &candidates.candidate[observations->count], scratch);
-    settle_bounds(&candidates, observations);
+    return settle_bounds(&candidates, observations);
 }
 
 rgb divide_color(const struct divide *d, uint32_t texel) {
@@ -245,10 +239,12 @@ static uint32_t source_texel(const struct divide *d, uint32_t texel) {
 static void divide_texel(struct divide *d, uint32_t texel, struct incident *scratch) {
     struct measurement_observations observations;
     struct irradiance light;
-    observe_all(d, texel, scratch, &light, &observations);
+    uint8_t bounds = observe_all(d, texel, scratch, &light, &observations);
     d->measured[texel] = (struct measurement){0};
-    if (observations.count > 0 && !d->is_emitter[surface_segment(&d->surface, texel)])
+    if (observations.count > 0 && !d->is_emitter[surface_segment(&d->surface, texel)]) {
         d->measured[texel] = mean_of(&observations, &light);
+        d->measured[texel].bounds = bounds;
+    }
 }
 
 struct divide_list {

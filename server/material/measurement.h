@@ -14,7 +14,8 @@ struct measurement {
     float weight; /* inverse variance, up to a factor of the capture; 0: not measured */
     uint16_t value[3];
     uint16_t noise[3]; /* a sample of the value's noise */
-    uint16_t mixing;   /* variance by light of other surfaces; correlated between neighbours */
+    uint16_t mixing;   /* variance by light of other surfaces, and of what is bounded; correlated between neighbours */
+    uint8_t bounds;    /* bit c: of channel c `value` is a lower bound, or since bound_color_settle what that tells */
 };
 
 static inline rgb measurement_value(const struct measurement *m) { return rgb_from_half(m->value); }

@@ -11,6 +11,7 @@
 #include "server/light/emitters.h"
 #include "server/light/light_estimate.h"
 #include "server/light/sun/sun_refit.h"
+#include "server/material/bound_color.h"
 #include "server/material/detail.h"
 #include "server/material/divide_outgoing.h"
 #include "server/material/specular_fit.h"
@@ -254,6 +255,8 @@ static enum status solve_pass(struct solve *s, int pass, struct error *err) {
         status = fit(s, pass, err);
     if (status == STATUS_OK)
         status = divide_all(s, pass, err);
+    if (status == STATUS_OK)
+        bound_color_settle(&s->divide.surface, s->divide.measured);
     bool sharpens = s->divide.stride == 1 && finds_detail(s) && !plan_is_cut(&s->r->plan, PLAN_DETAIL);
     if (status == STATUS_OK && sharpens)
         status = find_detail(s, err);

@@ -50,7 +50,7 @@ static void place_texel(void *user, size_t index, int thread) {
     struct irradiance light = {0};
     rgb lambert;
     *p = (struct light_place){.segment = surface_segment(s, job->texel[index])};
-    if (!(m->weight > 0.0f) || !divide_lambert(d, job->texel[index], &lambert) ||
+    if (!(m->weight > 0.0f) || m->bounds != 0 || !divide_lambert(d, job->texel[index], &lambert) ||
         !surface_at_texel(s->mesh, s->atlas, s->inverse, job->texel[index], &p->at))
         return;
     sun_add_light(d->sun, d->accel, &p->at, &light);
