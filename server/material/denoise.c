@@ -1,24 +1,21 @@
 /* denoise.c -- see denoise.h.
  *
- * The fine scales of a chart are filtered in tiles with a margin for the filters. The low-pass that they leave is
- * sampled at every GRID-th texel a side, and the coarse scales of the whole chart are filtered on that grid. */
+ * The finest band of a chart's scales is filtered in tiles with a margin for the filters. The low-pass that it leaves is
+ * sampled at every GRID-th texel a side, and the coarser bands of the whole chart are filtered on that grid. */
 #include "server/material/denoise.h"
 
 #include <math.h>
 #include <string.h>
 
 #include "common/mem.h"
+#include "server/material/patch_spectrum.h"
+#include "server/material/texture_variance.h"
 #include "server/material/wiener.h"
 
 #define TILE 512      /* texels a side; does not change results */
-#define FINE_LEVELS 5 /* scales of 1 to 16 texels, filtered by tiles; the rest on the grid; to 6: 0 dB */
-/* Largest radius of the window over which power is averaged, texels; +25 %: no change. */
-#define FINE_WINDOW 80 /* +25 %: no change */
-/* Texels between samples of the coarse scales: a quarter of the finest one's step; +25 %: 0 dB. */
-#define GRID 8           /* +25 %: 0 dB */
-#define COARSE_WINDOW 24 /* the same radius on the coarse scales, samples of the grid; +25 %: no change */
-#define COARSE_STEP ((1 << FINE_LEVELS) / GRID) /* samples: step of the first coarse level */
-
+#define FINE_STEP 1   /* texels: of the first band, filtered by tiles; the rest on the grid */
+#define GRID 4        /* texels between samples of the coarse scales: a quarter of their finest octave's step */
+#define COARSE_STEP 2 /* samples of the grid: step of the first coarse band */
 enum { SMOOTH_ERROR = 3, SMOOTH };
 
 struct box {
@@ -46,8 +43,9 @@ struct denoise_job {
     const struct color_prior *prior;
     struct texture *out;
     uint32_t stride;
-    uint16_t *deviation; /* NULL: not wanted; meanwhile squared errors of the fine scales */
-    struct layer *layer; /* [chart_count] */
+    uint16_t *deviation;               /* NULL: not wanted; meanwhile squared errors of the fine scales */
+    struct texture_variance *variance; /* [chart_count] */
+    struct layer *layer;               /* [chart_count] */
     struct item *item;
     struct wiener *tile; /* [threads] */
 };
@@ -73,12 +71,20 @@ static void tile_read(struct wiener *t, const struct denoise_job *job, const str
             t->inside[at] = is_inside(job, item->chart, x, y);
             if (t->inside[at])
                 m = job->measured[(size_t)y * job->inverse->width + (size_t)x];
+            float weight = texture_variance_weight(&job->variance[item->chart], m.weight);
             rgb value = measurement_value(&m);
             rgb noise = rgb_from_half(m.noise);
-            const float plane[WIENER_PLANES] = {
-                value.r, value.g, value.b, noise.r, noise.g, noise.b, image_float_from_half(m.mixing), 1.0f};
+            const float plane[WIENER_PLANES] = {value.r,
+                                                value.g,
+                                                value.b,
+                                                noise.r,
+                                                noise.g,
+                                                noise.b,
+                                                image_float_from_half(m.mixing),
+                                                m.weight > 0.0f ? weight / m.weight : 0.0f,
+                                                1.0f};
             for (int p = 0; p < WIENER_PLANES; p++)
-                t->plane[p][at] = m.weight * plane[p];
+                t->plane[p][at] = weight * plane[p];
             for (int c = 0; c < 3; c++)
                 t->kept[c][at] = 0.0f;
             t->error[at] = 0.0f;
@@ -110,7 +116,7 @@ static void filter_fine(void *user, size_t index, int thread) {
     const struct denoise_job *job = user;
     struct wiener *t = &job->tile[thread];
     tile_read(t, job, &job->item[index]);
-    wiener_levels(t, 1, FINE_LEVELS, FINE_WINDOW, job->stride);
+    wiener_band(t, FINE_STEP, WIENER_OCTAVES, job->stride);
     tile_write(t, job, &job->item[index]);
 }
 
@@ -130,13 +136,14 @@ static void layer_release(struct layer *l) {
     mem_free(l->smooth);
 }
 
-/* Levels until a step is as long as the layer. */
-static int coarse_levels(const struct layer *l) {
-    size_t side = l->width > l->height ? l->width : l->height;
-    int levels = 0;
-    while ((size_t)COARSE_STEP << levels < side)
-        levels++;
-    return levels;
+/* Bands until a step is as long as the layer. */
+static void filter_bands(struct wiener *w, size_t side, size_t resolution) {
+    for (size_t step = COARSE_STEP; step < side; step <<= WIENER_OCTAVES) {
+        int octaves = 1;
+        while (octaves < WIENER_OCTAVES && step << octaves < side)
+            octaves++;
+        wiener_band(w, step, octaves, resolution);
+    }
 }
 
 /* Sum of the scales kept and of the final low-pass, which is shrunk to the prior by the variance from light of other
@@ -173,7 +180,7 @@ static void filter_coarse(void *user, size_t chart, int thread) {
     memset(w.error, 0, samples * sizeof *w.error);
     for (size_t i = 0; i < samples; i++)
         w.inside[i] = true;
-    wiener_levels(&w, COARSE_STEP, coarse_levels(l), COARSE_WINDOW, 0);
+    filter_bands(&w, l->width > l->height ? l->width : l->height, job->stride / GRID);
     for (size_t i = 0; i < samples; i++)
         add_mean(l->smooth[i], &w, i, &job->prior[chart]);
     wiener_release(&w);
@@ -257,9 +264,14 @@ static void make_layers(struct denoise_job *job, size_t triangle_count, const bo
     mem_free(chart);
 }
 
+/* What a tile's filters read beyond it: whole shifts of a patch, so that patches lie the same in all tiles. */
+static size_t tile_margin(void) {
+    return (wiener_reach(FINE_STEP) + PATCH_SPECTRUM_SHIFT - 1) / PATCH_SPECTRUM_SHIFT * PATCH_SPECTRUM_SHIFT;
+}
+
 /* The tiles of all layers; item may be NULL to count them. */
 static size_t list_items(const struct denoise_job *job, struct item *item) {
-    const long margin = (long)wiener_reach(1, FINE_LEVELS, FINE_WINDOW);
+    const long margin = (long)tile_margin();
     size_t count = 0;
     for (size_t i = 0; i < job->atlas->chart_count; i++) {
         struct box own = job->layer[i].box;
@@ -286,7 +298,8 @@ void denoise(const struct atlas *atlas, const struct inverse_uv *inverse, size_t
                               .stride = stride,
                               .deviation = deviation};
     const size_t threads = (size_t)parallel_thread_count(pool);
-    const size_t side = TILE + 2 * wiener_reach(1, FINE_LEVELS, FINE_WINDOW);
+    const size_t side = TILE + 2 * tile_margin();
+    job.variance = texture_variances(atlas, inverse, measured);
     make_layers(&job, triangle_count, wanted);
     size_t count = list_items(&job, NULL);
     job.item = mem_array(count + 1, sizeof *job.item);
@@ -303,5 +316,6 @@ void denoise(const struct atlas *atlas, const struct inverse_uv *inverse, size_t
     for (size_t i = 0; i < atlas->chart_count; i++)
         layer_release(&job.layer[i]);
     mem_free(job.layer);
+    mem_free(job.variance);
     mem_free(job.item);
 }

@@ -4,8 +4,9 @@
  * from a sample of it: half of a texel's photographs less the other half (split_half.h), which preserves the
  * correlation of noise between neighbouring texels. Where there is a single photograph, the sample is read from a
  * picture of pure noise (noise.h). Detail is kept by its share of texture: walls become flat, wood keeps its grain. A
- * texel's weight is its inverse noise variance; texels of weight 0 are filled in from their neighbours, and charts
- * without measurements from their prior. Nothing crosses the border of a chart, hence none of a segment. */
+ * texel's weight is its inverse noise variance, but in means no greater than texture allows (texture_variance.h); texels
+ * of weight 0 are filled in from their neighbours, and charts without measurements from their prior. Nothing crosses the
+ * border of a chart, hence none of a segment. */
 #ifndef UNBAKE_MATERIAL_DENOISE_H
 #define UNBAKE_MATERIAL_DENOISE_H
 

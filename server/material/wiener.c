@@ -5,32 +5,42 @@
 #include <string.h>
 
 #include "common/mem.h"
+#include "server/material/patch_spectrum.h"
 
-/* Radius of the square over which power is averaged, in steps of the level's filter. */
+/* Radius of the square over which power is averaged, in steps of the coarsest octave, and at most in samples. */
 #define WINDOW_STEPS 5 /* to 6: 0 dB */
+#define MAX_WINDOW 48  /* of the coarse bands; +25 %: no change */
 /* Factor on the noise power: noise of rare, far outliers locally exceeds that of its sample. */
-#define NOISE_SAFETY 2.0f /* +25 %: -0.03 dB */
-/* Squared error beside an edge over the mean power of its details in 3 x 3 steps, of levels finer than what was
- * resolved; of the finest level that was resolved half of that. For scale: an ideal step of height 1 has .07 of that
+#define NOISE_SAFETY 2.0f
+/* Squared error beside an edge over the mean power of its details in 3 x 3 steps, of octaves finer than what was
+ * resolved; of the finest octave that was resolved half of that. For scale: an ideal step of height 1 has .07 of that
  * power, and a place that is off by half a sample has it wrong by .25 in the mean. Chosen on the demo room and
  * staircase2 among 2, 1 and .6: of the demo room's errors (256 texels, all measured) 81, 77 and 74 % are within one
  * deviation. No other room has judged it. */
 #define UNRESOLVED 0.6f
 /* Clipped power over noise power from which samples above POWER_BOUND count as texture, not as outliers. */
-#define TEXTURE_CERTAIN 2.0f /* +25 %: -0.02 dB */
-/* Clip of a sample's power, in variances of its noise: 3 standard deviations. */
-#define POWER_BOUND 9.0f /* +25 %: +0.04 dB */
+#define TEXTURE_CERTAIN 2.0f
+/* Clip of a sample's power, in variances of its noise: 3 standard deviations; 4: within .05 dB, passage's specks 1.04 %
+ * for .84. */
+#define POWER_BOUND 9.0f
+
+/* The planes of scratch that have one value a sample. */
+#define WIENER_SCRATCH(w)                                                                                              \
+    {                                                                                                                  \
+        &(w)->error, &(w)->power, &(w)->bounded_power, &(w)->noise_power, &(w)->relative_noise, &(w)->weight_sum,      \
+            &(w)->count, &(w)->trust, &(w)->variance, &(w)->mixing, &(w)->scratch                                      \
+    }
 
 void wiener_init(struct wiener *w, size_t samples) {
     *w = (struct wiener){.inside = mem_array(samples, sizeof *w->inside)};
     for (int p = 0; p < WIENER_PLANES; p++) {
         w->plane[p] = mem_array(samples, sizeof(float));
+        w->fine[p] = mem_array(samples, sizeof(float));
         w->coarse[p] = mem_array(samples, sizeof(float));
     }
     for (int c = 0; c < 3; c++)
         w->kept[c] = mem_array(samples, sizeof(float));
-    float **plane[] = {&w->error,      &w->power, &w->bounded_power, &w->noise_power,
-                       &w->weight_sum, &w->count, &w->scratch};
+    float **plane[] = WIENER_SCRATCH(w);
     for (size_t i = 0; i < sizeof plane / sizeof *plane; i++)
         *plane[i] = mem_array(samples, sizeof(float));
 }
@@ -39,13 +49,14 @@ void wiener_release(struct wiener *w) {
     mem_free(w->inside);
     for (int p = 0; p < WIENER_PLANES; p++) {
         mem_free(w->plane[p]);
+        mem_free(w->fine[p]);
         mem_free(w->coarse[p]);
     }
     for (int c = 0; c < 3; c++)
         mem_free(w->kept[c]);
-    float *plane[] = {w->error, w->power, w->bounded_power, w->noise_power, w->weight_sum, w->count, w->scratch};
+    float **plane[] = WIENER_SCRATCH(w);
     for (size_t i = 0; i < sizeof plane / sizeof *plane; i++)
-        mem_free(plane[i]);
+        mem_free(*plane[i]);
     *w = (struct wiener){0};
 }
 
@@ -109,129 +120,182 @@ static void window_sums(float *plane, float *scratch, size_t width, size_t heigh
     }
 }
 
-/* --- one level ---------------------------------------------------------------------------------- */
+/* --- details ------------------------------------------------------------------------------------ */
 
-static float detail(const struct wiener *w, int plane, size_t at) {
-    return w->plane[plane][at] / w->plane[WIENER_WEIGHT][at] - w->coarse[plane][at] / w->coarse[WIENER_WEIGHT][at];
+/* The difference of two smoothings of the picture. */
+struct details {
+    struct wiener *w;
+    float *const *of, *const *less; /* [WIENER_PLANES] */
+};
+
+static float detail(const struct details *d, int plane, size_t at) {
+    return d->of[plane][at] / d->of[WIENER_WEIGHT][at] - d->less[plane][at] / d->less[WIENER_WEIGHT][at];
 }
 
 /* Of the three planes from `first` on. */
-static float detail_power(const struct wiener *w, int first, size_t at) {
+static float detail_power(const struct details *d, int first, size_t at) {
     float power = 0.0f;
     for (int p = first; p < first + 3; p++)
-        power += detail(w, p, at) * detail(w, p, at);
+        power += detail(d, p, at) * detail(d, p, at);
     return power;
 }
 
-static bool counts(const struct wiener *w, size_t at) { return w->inside[at] && w->plane[WIENER_WEIGHT][at] > 0.0f; }
+static bool counts(const struct details *d, size_t at) { return d->w->inside[at] && d->of[WIENER_WEIGHT][at] > 0.0f; }
 
-/* Noise variance of a sample's detail: local noise power, scaled by the sample's own weight. */
-static float noise_variance(const struct wiener *w, size_t at) {
-    return w->noise_power[at] / (w->count[at] * w->plane[WIENER_WEIGHT][at]);
+/* Of a sample's noise, up to a factor. */
+static float variance_of(const struct details *d, size_t at) {
+    float weight = d->of[WIENER_WEIGHT][at];
+    return d->of[WIENER_VARIANCE][at] / (weight * weight);
+}
+
+/* Noise variance of a sample's detail: its own, up to the factor that the noise around tells. */
+static float noise_variance(const struct details *d, size_t at) {
+    return d->w->relative_noise[at] / d->w->count[at] * variance_of(d, at);
 }
 
 /* Noise power around each sample, and the sums that normalise it. */
-static void measure_noise(struct wiener *w, size_t radius) {
-    size_t samples = w->width * w->height;
-    for (size_t at = 0; at < samples; at++) {
-        float weight = counts(w, at) ? w->plane[WIENER_WEIGHT][at] : 0.0f;
-        w->noise_power[at] = weight > 0.0f ? weight * detail_power(w, WIENER_NOISE, at) : 0.0f;
+static void measure_noise(const struct details *d, size_t radius) {
+    struct wiener *w = d->w;
+    for (size_t at = 0; at < w->width * w->height; at++) {
+        float weight = counts(d, at) ? d->of[WIENER_WEIGHT][at] : 0.0f;
+        float power = weight > 0.0f ? detail_power(d, WIENER_NOISE, at) : 0.0f;
+        w->noise_power[at] = weight * power;
+        w->relative_noise[at] = power > 0.0f ? power / variance_of(d, at) : 0.0f;
         w->weight_sum[at] = weight;
         w->count[at] = weight > 0.0f ? 1.0f : 0.0f;
     }
-    float *plane[] = {w->noise_power, w->weight_sum, w->count};
+    float *plane[] = {w->noise_power, w->relative_noise, w->weight_sum, w->count};
     for (size_t i = 0; i < sizeof plane / sizeof *plane; i++)
         window_sums(plane[i], w->scratch, w->width, w->height, radius);
 }
 
 /* Power of the value around each sample, and the same with each sample clipped. */
-static void measure_power(struct wiener *w, size_t radius) {
-    size_t samples = w->width * w->height;
-    for (size_t at = 0; at < samples; at++) {
+static void measure_power(const struct details *d, size_t radius) {
+    struct wiener *w = d->w;
+    for (size_t at = 0; at < w->width * w->height; at++) {
         float power = 0.0f, bound = 0.0f;
-        if (counts(w, at)) {
-            power = detail_power(w, WIENER_VALUE, at);
-            bound = POWER_BOUND * noise_variance(w, at);
+        if (counts(d, at)) {
+            power = detail_power(d, WIENER_VALUE, at);
+            bound = POWER_BOUND * noise_variance(d, at);
         }
-        w->power[at] = w->plane[WIENER_WEIGHT][at] * power;
-        w->bounded_power[at] = w->plane[WIENER_WEIGHT][at] * fminf(power, bound);
+        w->power[at] = d->of[WIENER_WEIGHT][at] * power;
+        w->bounded_power[at] = d->of[WIENER_WEIGHT][at] * fminf(power, bound);
     }
     window_sums(w->power, w->scratch, w->width, w->height, radius);
     window_sums(w->bounded_power, w->scratch, w->width, w->height, radius);
 }
 
-/* Power of texture around a sample: power less noise, with outliers clipped unless they are too many to be outliers. */
-static float texture_power(const struct wiener *w, size_t at) {
-    float noise = w->noise_power[at], bounded = w->bounded_power[at];
-    float power = bounded < TEXTURE_CERTAIN * noise ? bounded : w->power[at];
-    return fmaxf(power - NOISE_SAFETY * noise, 0.0f) / w->weight_sum[at];
+/* Whether what is far off around a sample is texture: then it is too much to be outliers. */
+static bool is_texture(const struct wiener *w, size_t at) {
+    return w->bounded_power[at] >= TEXTURE_CERTAIN * w->noise_power[at];
 }
 
-/* Adds this level's detail by its share of texture. Of noise the same share is kept and of
- * texture the rest is lost, which makes keep^2 noise + (1 - keep)^2 texture = keep noise. */
-static void keep_texture(struct wiener *w) {
-    size_t samples = w->width * w->height;
-    for (size_t at = 0; at < samples; at++) {
-        if (!counts(w, at))
-            continue;
-        float texture = texture_power(w, at);
-        float noise = noise_variance(w, at) + w->plane[WIENER_MIXING][at] / w->plane[WIENER_WEIGHT][at];
-        float keep = texture > 0.0f ? texture / (texture + noise) : 0.0f;
-        w->error[at] += keep * noise;
-        for (int c = 0; c < 3; c++)
-            w->kept[c][at] += keep * detail(w, WIENER_VALUE + c, at);
-    }
-}
+/* --- what was too fine ---------------------------------------------------------------------------- */
 
 /* Adds the error of detail that is too fine to be resolved: where the finest that is resolved has edges. Where there is
  * no texture there are none: peaks of noise alone, above what is subtracted, have a quarter of its power in the
  * mean. */
-static void add_unresolved(struct wiener *w, size_t step, float part) {
-    size_t samples = w->width * w->height;
-    for (size_t at = 0; at < samples; at++) {
-        bool is_there = counts(w, at);
-        float power = is_there ? detail_power(w, WIENER_VALUE, at) - NOISE_SAFETY * noise_variance(w, at) : 0.0f;
-        w->power[at] = power > 0.0f && texture_power(w, at) > 0.0f ? power : 0.0f;
-        w->bounded_power[at] = is_there ? 1.0f : 0.0f;
+static void add_unresolved(const struct details *d, size_t step, float part) {
+    struct wiener *w = d->w;
+    measure_noise(d, WINDOW_STEPS * step);
+    measure_power(d, WINDOW_STEPS * step);
+    for (size_t at = 0; at < w->width * w->height; at++) {
+        bool is_there = counts(d, at);
+        float power = is_there ? detail_power(d, WIENER_VALUE, at) - NOISE_SAFETY * noise_variance(d, at) : 0.0f;
+        float around = is_texture(w, at) ? w->power[at] : w->bounded_power[at];
+        w->trust[at] = power > 0.0f && around > NOISE_SAFETY * w->noise_power[at] ? power : 0.0f;
+        w->mixing[at] = is_there ? 1.0f : 0.0f;
     }
-    window_sums(w->power, w->scratch, w->width, w->height, step);
-    window_sums(w->bounded_power, w->scratch, w->width, w->height, step);
-    for (size_t at = 0; at < samples; at++)
-        if (counts(w, at))
-            w->error[at] += part * UNRESOLVED * w->power[at] / w->bounded_power[at];
+    window_sums(w->trust, w->scratch, w->width, w->height, step);
+    window_sums(w->mixing, w->scratch, w->width, w->height, step);
+    for (size_t at = 0; at < w->width * w->height; at++)
+        if (counts(d, at))
+            w->error[at] += part * UNRESOLVED * w->trust[at] / w->mixing[at];
 }
 
-static void take_level(struct wiener *w, size_t step, size_t radius, size_t resolution) {
+/* --- a band -------------------------------------------------------------------------------------- */
+
+static void swap_planes(float **a, float **b) {
+    for (int p = 0; p < WIENER_PLANES; p++) {
+        float *was = a[p];
+        a[p] = b[p];
+        b[p] = was;
+    }
+}
+
+/* From `plane` to `coarse`. */
+static void smooth(struct wiener *w, size_t step) {
     for (int p = 0; p < WIENER_PLANES; p++) {
         spline_rows(w->scratch, w->plane[p], w->width, w->height, step);
         spline_columns(w->coarse[p], w->scratch, w->width, w->height, step);
     }
-    measure_noise(w, radius);
-    measure_power(w, radius);
-    keep_texture(w);
-    if (step <= resolution)
-        add_unresolved(w, step, step == resolution ? 0.5f : 1.0f);
-    for (int p = 0; p < WIENER_PLANES; p++) {
-        float *was = w->plane[p];
-        w->plane[p] = w->coarse[p];
-        w->coarse[p] = was;
+}
+
+/* Leaves what was in `plane` in `fine`, and its low-pass in `plane`. */
+static void split(struct wiener *w, size_t step, int octaves, size_t resolution) {
+    for (int octave = 0; octave < octaves; octave++, step *= 2) {
+        smooth(w, step);
+        if (step <= resolution)
+            add_unresolved(&(struct details){w, w->plane, w->coarse}, step, step == resolution ? 0.5f : 1.0f);
+        swap_planes(w->plane, w->coarse);
+        if (octave == 0)
+            swap_planes(w->coarse, w->fine);
     }
 }
 
-static size_t radius_of(size_t step, size_t max_window) {
-    return WINDOW_STEPS * step < max_window ? WINDOW_STEPS * step : max_window;
+/* What is far off its surroundings by chance, as no texture is, is brought nearer. */
+static float clip_of(const struct details *d, size_t at) {
+    float power = detail_power(d, WIENER_VALUE, at), bound = POWER_BOUND * noise_variance(d, at);
+    return power > bound && !is_texture(d->w, at) ? sqrtf(bound / power) : 1.0f;
 }
 
-void wiener_levels(struct wiener *w, size_t step, int levels, size_t max_window, size_t resolution) {
-    for (int level = 0; level < levels; level++, step *= 2)
-        take_level(w, step, radius_of(step, max_window), resolution);
-}
-
-size_t wiener_reach(size_t step, int levels, size_t max_window) {
-    size_t reach = 0, widest = 0;
-    for (int level = 0; level < levels; level++, step *= 2) {
-        reach += 2 * step; /* to either side, of the spline */
-        widest = radius_of(step, max_window);
+/* Of the details, in the place of `fine`, what is kept. Samples that count for less than those around are trusted by that
+ * share. */
+static void filter_details(const struct details *d, size_t step) {
+    struct wiener *w = d->w;
+    struct patch_spectrum p = {.width = w->width,
+                               .height = w->height,
+                               .step = step,
+                               .trust = w->trust,
+                               .variance = w->variance,
+                               .mixing = w->mixing,
+                               .error = w->error};
+    for (int c = 0; c < 3; c++) {
+        p.value[c] = w->fine[WIENER_VALUE + c];
+        p.noise[c] = w->fine[WIENER_NOISE + c];
     }
-    return reach + widest;
+    for (size_t at = 0; at < w->width * w->height; at++) {
+        bool is_there = counts(d, at);
+        float weight = d->of[WIENER_WEIGHT][at], clip = is_there ? clip_of(d, at) : 0.0f;
+        w->trust[at] = is_there ? fminf(1.0f, weight * w->count[at] / w->weight_sum[at]) : 0.0f;
+        w->variance[at] = is_there ? variance_of(d, at) : 0.0f;
+        w->mixing[at] = is_there ? d->of[WIENER_MIXING][at] / weight : 0.0f;
+        for (int c = 0; c < 3; c++) {
+            float value = is_there ? detail(d, WIENER_VALUE + c, at) : 0.0f;
+            float noise = is_there ? detail(d, WIENER_NOISE + c, at) : 0.0f;
+            p.value[c][at] = clip * value;
+            p.noise[c][at] = noise;
+        }
+    }
+    patch_spectrum_filter(&p);
+}
+
+void wiener_band(struct wiener *w, size_t step, int octaves, size_t resolution) {
+    const struct details d = {w, w->fine, w->plane};
+    size_t radius = WINDOW_STEPS * (step << (WIENER_OCTAVES - 1));
+    if (radius > MAX_WINDOW)
+        radius = MAX_WINDOW;
+    split(w, step, octaves, resolution);
+    measure_noise(&d, radius);
+    measure_power(&d, radius);
+    filter_details(&d, step);
+    for (size_t at = 0; at < w->width * w->height; at++)
+        for (int c = 0; c < 3 && counts(&d, at); c++)
+            w->kept[c][at] += w->fine[WIENER_VALUE + c][at];
+}
+
+size_t wiener_reach(size_t step) {
+    size_t smoothing = 2 * ((step << WIENER_OCTAVES) - step); /* to either side, of all splines */
+    size_t window = WINDOW_STEPS * (step << (WIENER_OCTAVES - 1));
+    return smoothing + (window < MAX_WINDOW ? window : MAX_WINDOW) + PATCH_SPECTRUM_REACH * step;
 }

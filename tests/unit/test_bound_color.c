@@ -26,8 +26,8 @@ static void expect(double bound, double like, double *mean, double *variance) {
     double sum = 0.0, first = 0.0, second = 0.0;
     for (int i = 0; i < steps; i++) {
         double x = bound + (WHITE - bound) * (i + 0.5) / steps, off = (x - of) / deviation;
-        double density = like * exp(-0.5 * off * off) / (deviation * sqrt(2.0 * M_PI)) +
-                         (1.0 - like) / (x * log(WHITE / BLACK));
+        double density =
+            like * exp(-0.5 * off * off) / (deviation * sqrt(2.0 * M_PI)) + (1.0 - like) / (x * log(WHITE / BLACK));
         sum += density;
         first += density * x;
         second += density * x * x;

@@ -84,7 +84,8 @@ static double stated_over(uint32_t x0, uint32_t x1) {
 }
 
 /* The stated deviation is that of the error: its mean square over [x0, x1), and how many errors are within it.
- * Above it, since here edges fall between texels, where no measurement is off. */
+ * Above it, since here edges fall between texels, where no measurement is off: most of what is stated of stripes is
+ * that. */
 static void check_deviation(uint32_t x0, uint32_t x1) {
     double stated = stated_over(x0, x1), real = error_of(x0, x1, 0, HEIGHT);
     size_t within = 0, count = 0;
@@ -94,8 +95,8 @@ static void check_deviation(uint32_t x0, uint32_t x1) {
             within += fabs((double)(out.texel[y * WIDTH + x][1] - truth(x, y))) <= d;
         }
     double share = (double)within / (double)count;
-    CHECK_THAT(stated > 0.7 * real && stated < 2.0 * real, "%.4f is stated, the error is %.4f", stated, real);
-    CHECK_THAT(share > 0.55 && share < 0.92, "%.2f of the errors are within one deviation", share);
+    CHECK_THAT(stated > 0.7 * real && stated < 3.5 * real, "%.4f is stated, the error is %.4f", stated, real);
+    CHECK_THAT(share > 0.55 && share < 0.97, "%.2f of the errors are within one deviation", share);
 }
 
 static void test_noise_goes_and_texture_stays(void) {
@@ -103,7 +104,7 @@ static void test_noise_goes_and_texture_stays(void) {
     filter();
     double plain = error_of(0, WIDTH / 2 - 1, 0, HEIGHT), stripes = error_of(WIDTH / 2 + 1, WIDTH, 0, HEIGHT);
     CHECK_THAT(plain < 0.15 * (double)DEVIATION, "%.4f is left of %.4f", plain, (double)DEVIATION);
-    CHECK_THAT(stripes < 1.05 * (double)DEVIATION, "stripes are off by %.4f", stripes);
+    CHECK_THAT(stripes < 0.3 * (double)DEVIATION, "stripes are off by %.4f", stripes);
     check_deviation(WIDTH / 2 + 1, WIDTH);
     double stated = stated_over(0, WIDTH / 2 - 1); /* peaks of noise are no edges */
     CHECK_THAT(stated < 2.0 * plain, "%.4f is stated of a plain wall, the error is %.4f", stated, plain);
@@ -140,7 +141,23 @@ static void test_outlier(void) {
     set(60, 60, 3.5f, 0.1f, 0.0f);
     filter();
     CHECK_NEAR(out.texel[60 * WIDTH + 60][0], 0.8, 0.1);
-    CHECK_THAT(error_of(55, 66, 55, 66) < 0.3 * (double)DEVIATION, "%.4f", error_of(55, 66, 55, 66));
+    CHECK_THAT(error_of(55, 66, 55, 66) < 0.05 * (double)DEVIATION, "%.4f", error_of(55, 66, 55, 66));
+    texture_release(&out);
+}
+
+/* Texels that are a hundred times less noisy are no better examples of what is around them: here they are all in dark
+ * stripes. */
+static void test_few_certain(void) {
+    for (uint32_t y = 0; y < HEIGHT; y++)
+        for (uint32_t x = 0; x < WIDTH; x++) {
+            bool certain = x % 16 == 2 && y % 16 == 2;
+            float noise = certain ? 0.02f * DEVIATION : 2.0f * DEVIATION;
+            set(x, y, truth(x, y) + noise * normal(5, y * WIDTH + x), noise * normal(6, y * WIDTH + x), 0.0f);
+            measured[y * WIDTH + x].weight = certain ? 1e4f : 1.0f;
+        }
+    filter();
+    double stripes = error_of(WIDTH / 2 + 1, WIDTH, 0, HEIGHT);
+    CHECK_THAT(stripes < 0.8 * (double)DEVIATION, "stripes are off by %.4f", stripes);
     texture_release(&out);
 }
 
@@ -193,6 +210,7 @@ int main(void) {
     test_no_noise();
     test_blotches();
     test_outlier();
+    test_few_certain();
     test_holes();
     test_prior();
     test_threads();

@@ -1,0 +1,348 @@
+/* patch_spectrum.c -- see patch_spectrum.h.
+ *
+ * In this file a plane's samples are those of one lattice, and `power` is the sum over channels, relative to the mean
+ * variance of the patch. */
+#include "server/material/patch_spectrum.h"
+
+#include <math.h>
+#include <pthread.h>
+#include <stdbool.h>
+#include <string.h>
+
+#include "common/mem.h"
+
+#define SIDE 16 /* samples of a patch */
+#define HALF PATCH_SPECTRUM_SHIFT
+#define COEFFICIENTS (SIDE * SIDE)
+#define LENGTHS (2 * SIDE) /* of frequencies, rounded */
+/* Patches to each side over which power is averaged; 2: passage's specks .53 % for .43, else within .05 dB. */
+#define AROUND 3
+/* Power over that of noise from which it counts as texture, and what is taken off: split halves understate noise by 1.1
+ * to 1.4 (plain walls of passage and staircase2), and power around has a sampling error of a fifth. 2 in place of 3:
+ * passage's 8-bit walls have specks on 5 % of their pixels in place of .9. */
+#define TEXTURE_POWER 3.0f
+#define NOISE_TAKEN 1.5f
+/* In variances of its noise: what a patch's power is clipped to, unless that leaves TEXTURE_POWER of texture around;
+ * and from where it tells of texture by itself: 5.5 standard deviations of gray noise. 16 for 30: passage +-.05 dB, its
+ * 8-bit walls' specks 2 % for .9. */
+#define CLIPPED_POWER 9.0f
+#define CERTAIN_POWER 30.0f
+
+/* The transform, the window, and by coefficient the rounded length of its frequency and how many share its octave. */
+static struct {
+    float cosine[COEFFICIENTS], transposed[COEFFICIENTS]; /* [frequency][sample], [sample][frequency] */
+    float window[SIDE];
+    int length[COEFFICIENTS], length_count[LENGTHS];
+    float octave_count[COEFFICIENTS];
+} basis;
+
+/* Of the octave of the greater of two frequencies: 1 of 0, else 3, 12, 48, 192. */
+static float octave_count(int frequency) {
+    int first = 1;
+    while (2 * first <= frequency)
+        first *= 2;
+    return frequency == 0 ? 1.0f : 3.0f * (float)(first * first);
+}
+
+static void make_basis(void) {
+    for (int k = 0; k < SIDE; k++)
+        for (int i = 0; i < SIDE; i++)
+            basis.cosine[k * SIDE + i] = basis.transposed[i * SIDE + k] =
+                (float)(sqrt((k > 0 ? 2.0 : 1.0) / SIDE) * cos(M_PI * (i + 0.5) * k / SIDE));
+    for (int y = 0; y < SIDE; y++) {
+        basis.window[y] = (float)sin(M_PI * (y + 0.5) / SIDE);
+        for (int x = 0; x < SIDE; x++) {
+            int at = y * SIDE + x;
+            basis.length[at] = (int)lround(hypot(x, y));
+            basis.length_count[basis.length[at]]++;
+            basis.octave_count[at] = octave_count(x > y ? x : y);
+        }
+    }
+}
+
+typedef float float4 __attribute__((vector_size(16)));
+
+static float4 load4(const float *from) {
+    float4 four;
+    memcpy(&four, from, sizeof four);
+    return four;
+}
+
+/* to = a b. A row is summed in four registers, which compilers do not make of an array by themselves. */
+static void multiply(float to[COEFFICIENTS], const float a[COEFFICIENTS], const float b[COEFFICIENTS]) {
+    for (int y = 0; y < SIDE; y++) {
+        float4 first = {0.0f}, second = first, third = first, fourth = first;
+        for (int i = 0; i < SIDE; i++) {
+            float times = a[y * SIDE + i];
+            const float *row = b + i * SIDE;
+            first += times * load4(row);
+            second += times * load4(row + 4);
+            third += times * load4(row + 8);
+            fourth += times * load4(row + 12);
+        }
+        const float4 sum[] = {first, second, third, fourth};
+        memcpy(to + y * SIDE, sum, sizeof sum);
+    }
+}
+
+/* patch = a patch b. */
+static void transform(float patch[COEFFICIENTS], const float a[COEFFICIENTS], const float b[COEFFICIENTS]) {
+    float rows[COEFFICIENTS];
+    multiply(rows, patch, b);
+    multiply(patch, a, rows);
+}
+
+/* One of the step x step lattices of samples, and the patches over it: patch (i, j) begins at sample ((i - 1) HALF, (j -
+ * 1) HALF) of the lattice. */
+struct lattice {
+    const struct patch_spectrum *in;
+    size_t first;                    /* its first sample */
+    long width, height;              /* samples */
+    long columns, rows;              /* patches */
+    float *variance, *mixing;        /* [patches] means; variance is 0 of one without samples */
+    float *patch_count;              /* [patches] of those around that have some */
+    float (*noise)[LENGTHS];         /* [patches] power of noise by length of frequency, around */
+    float (*value[3])[COEFFICIENTS]; /* [patches] by channel */
+    float (*power)[COEFFICIENTS], (*around)[COEFFICIENTS], (*clipped)[COEFFICIENTS]; /* of that; sums around */
+};
+
+/* The part of a patch that lies on the picture. */
+struct extent {
+    long x0, y0, x1, y1; /* of the patch's samples */
+    size_t origin;       /* where its first sample would be, in the plane: may wrap below 0, and is used with others */
+};
+
+static struct extent extent_of(const struct lattice *l, size_t patch) {
+    long x = ((long)patch % l->columns - 1) * HALF, y = ((long)patch / l->columns - 1) * HALF;
+    long step = (long)l->in->step;
+    return (struct extent){x < 0 ? -x : 0, y < 0 ? -y : 0, x + SIDE < l->width ? SIDE : l->width - x,
+                           y + SIDE < l->height ? SIDE : l->height - y,
+                           l->first + (size_t)(step * (y * (long)l->in->width + x))};
+}
+
+static size_t sample_of(const struct lattice *l, const struct extent *e, long x, long y) {
+    return e->origin + l->in->step * ((size_t)y * l->in->width + (size_t)x);
+}
+
+/* Reads a patch under its window, and transforms it. */
+static void read_patch(const struct lattice *l, size_t patch, const float *plane, float to[COEFFICIENTS]) {
+    struct extent e = extent_of(l, patch);
+    memset(to, 0, sizeof(float) * COEFFICIENTS);
+    for (long y = e.y0; y < e.y1; y++)
+        for (long x = e.x0; x < e.x1; x++)
+            to[y * SIDE + x] = basis.window[y] * basis.window[x] * plane[sample_of(l, &e, x, y)];
+    transform(to, basis.cosine, basis.transposed);
+}
+
+/* Adds the inverse of a patch's coefficients, under its window, to a plane. */
+static void add_patch(const struct lattice *l, size_t patch, float of[COEFFICIENTS], float *plane) {
+    struct extent e = extent_of(l, patch);
+    transform(of, basis.transposed, basis.cosine);
+    for (long y = e.y0; y < e.y1; y++)
+        for (long x = e.x0; x < e.x1; x++)
+            plane[sample_of(l, &e, x, y)] += basis.window[y] * basis.window[x] * of[y * SIDE + x];
+}
+
+static float window_power(long x, long y) {
+    float w = basis.window[y] * basis.window[x];
+    return w * w;
+}
+
+/* Mean variance over the whole patch, of which missing samples have none; mean mixing of those that are there. */
+static void weigh_patch(struct lattice *l, size_t patch) {
+    struct extent e = extent_of(l, patch);
+    float variance = 0.0f, mixing = 0.0f, there = 0.0f;
+    for (long y = e.y0; y < e.y1; y++)
+        for (long x = e.x0; x < e.x1; x++) {
+            size_t at = sample_of(l, &e, x, y);
+            float trust = l->in->trust[at], w = window_power(x, y);
+            if (!(trust > 0.0f))
+                continue;
+            variance += w * trust * trust * l->in->variance[at];
+            mixing += w * trust * trust * l->in->mixing[at];
+            there += w;
+        }
+    l->variance[patch] = variance / (0.25f * COEFFICIENTS);
+    l->mixing[patch] = there > 0.0f ? mixing / there : 0.0f;
+}
+
+/* Sums of vectors [patches][length] over the square of AROUND patches to each side; in place. */
+static void sum_around(const struct lattice *l, float *vector, size_t length) {
+    size_t most = (size_t)(l->columns > l->rows ? l->columns : l->rows);
+    float *line = mem_array(most * length, sizeof *line);
+    for (int axis = 0; axis < 2; axis++) {
+        long count = axis == 0 ? l->columns : l->rows, lines = axis == 0 ? l->rows : l->columns;
+        size_t next = axis == 0 ? length : (size_t)l->columns * length;
+        size_t other = axis == 0 ? (size_t)l->columns * length : length;
+        for (long j = 0; j < lines; j++) {
+            float *first = vector + (size_t)j * other;
+            for (long i = 0; i < count; i++)
+                memcpy(line + (size_t)i * length, first + (size_t)i * next, length * sizeof *line);
+            for (long i = 0; i < count; i++) {
+                float *to = first + (size_t)i * next;
+                memset(to, 0, length * sizeof *to);
+                for (long q = i > AROUND ? i - AROUND : 0; q <= i + AROUND && q < count; q++)
+                    for (size_t k = 0; k < length; k++)
+                        to[k] += line[(size_t)q * length + k];
+            }
+        }
+    }
+    mem_free(line);
+}
+
+static size_t patches_of(const struct lattice *l) { return (size_t)(l->columns * l->rows); }
+
+static void lattice_init(struct lattice *l, const struct patch_spectrum *in, size_t x, size_t y) {
+    *l = (struct lattice){.in = in,
+                          .first = y * in->width + x,
+                          .width = (long)((in->width - x + in->step - 1) / in->step),
+                          .height = (long)((in->height - y + in->step - 1) / in->step)};
+    l->columns = (l->width + HALF - 1) / HALF + 1;
+    l->rows = (l->height + HALF - 1) / HALF + 1;
+    size_t patches = patches_of(l);
+    l->variance = mem_calloc(patches, sizeof *l->variance);
+    l->mixing = mem_calloc(patches, sizeof *l->mixing);
+    l->patch_count = mem_calloc(patches, sizeof *l->patch_count);
+    l->noise = mem_calloc(patches, sizeof *l->noise);
+    for (int c = 0; c < 3; c++)
+        l->value[c] = mem_array(patches, sizeof *l->value[c]);
+    l->power = mem_array(patches, sizeof *l->power);
+    l->around = mem_array(patches, sizeof *l->around);
+    l->clipped = mem_array(patches, sizeof *l->clipped);
+}
+
+static void lattice_release(struct lattice *l) {
+    mem_free(l->variance);
+    mem_free(l->mixing);
+    mem_free(l->patch_count);
+    mem_free(l->noise);
+    for (int c = 0; c < 3; c++)
+        mem_free(l->value[c]);
+    mem_free(l->power);
+    mem_free(l->around);
+    mem_free(l->clipped);
+}
+
+static void measure_noise(struct lattice *l) {
+    float patch[COEFFICIENTS];
+    for (size_t i = 0; i < patches_of(l); i++) {
+        weigh_patch(l, i);
+        if (!(l->variance[i] > 0.0f))
+            continue;
+        l->patch_count[i] = 1.0f;
+        for (int c = 0; c < 3; c++) {
+            read_patch(l, i, l->in->noise[c], patch);
+            for (int k = 0; k < COEFFICIENTS; k++) {
+                int length = basis.length[k];
+                l->noise[i][length] += patch[k] * patch[k] / l->variance[i] / (float)basis.length_count[length];
+            }
+        }
+    }
+    sum_around(l, l->noise[0], LENGTHS);
+    sum_around(l, l->patch_count, 1);
+}
+
+/* Coefficients of the values, their power, and that around, also with each patch's clipped. */
+static void measure_power(struct lattice *l) {
+    size_t patches = patches_of(l);
+    memset(l->power, 0, patches * sizeof *l->power);
+    memset(l->clipped, 0, patches * sizeof *l->clipped);
+    for (size_t i = 0; i < patches; i++) {
+        if (!(l->variance[i] > 0.0f))
+            continue;
+        for (int c = 0; c < 3; c++) {
+            float *value = l->value[c][i];
+            read_patch(l, i, l->in->value[c], value);
+            for (int k = 0; k < COEFFICIENTS; k++)
+                l->power[i][k] += value[k] * value[k] / l->variance[i];
+        }
+        for (int k = 0; k < COEFFICIENTS; k++)
+            l->clipped[i][k] = fminf(l->power[i][k], CLIPPED_POWER * l->noise[i][basis.length[k]] / l->patch_count[i]);
+    }
+    memcpy(l->around, l->power, patches * sizeof *l->around);
+    sum_around(l, l->around[0], COEFFICIENTS);
+    sum_around(l, l->clipped[0], COEFFICIENTS);
+}
+
+/* What is kept of a patch's coefficients; returns the expected squared error of that. All powers are sums around but for
+ * the patch's own. What neighbours share may be all in one coefficient of each octave. */
+static float shares_of(const struct lattice *l, size_t patch, float keep[COEFFICIENTS]) {
+    float count = l->patch_count[patch], error = 0.0f;
+    float mixing = l->mixing[patch] * count / l->variance[patch] * (0.25f * COEFFICIENTS);
+    for (int k = 0; k < COEFFICIENTS; k++) {
+        float noise = l->noise[patch][basis.length[k]], power = l->clipped[patch][k];
+        if (power > TEXTURE_POWER * noise)
+            power = l->around[patch][k];
+        float texture = power > TEXTURE_POWER * noise ? power - NOISE_TAKEN * noise : 0.0f;
+        float own = l->power[patch][k] * count, all = noise + mixing / basis.octave_count[k];
+        keep[k] = texture > 0.0f ? texture / (texture + all) : 0.0f;
+        if (own > CERTAIN_POWER * all)
+            keep[k] = fmaxf(keep[k], 1.0f - all / own);
+        error += keep[k] * all / count * l->variance[patch];
+    }
+    return error;
+}
+
+/* Adds what is kept to kept[channel], and what that is off to `error`, which may be NULL. */
+static void keep_texture(struct lattice *l, float *const kept[3], float *error) {
+    float keep[COEFFICIENTS];
+    for (size_t i = 0; i < patches_of(l); i++) {
+        if (!(l->variance[i] > 0.0f))
+            continue;
+        float off = shares_of(l, i, keep) / (0.25f * COEFFICIENTS);
+        for (int c = 0; c < 3; c++) {
+            for (int k = 0; k < COEFFICIENTS; k++)
+                l->value[c][i][k] *= keep[k];
+            add_patch(l, i, l->value[c][i], kept[c]);
+        }
+        struct extent e = extent_of(l, i);
+        for (long y = e.y0; error && y < e.y1; y++)
+            for (long x = e.x0; x < e.x1; x++)
+                error[sample_of(l, &e, x, y)] += window_power(x, y) * off;
+    }
+}
+
+/* What is not trusted is taken from what was kept, which is cleared. */
+static void fill_in(const struct lattice *l, float *const kept[3]) {
+    for (long y = 0; y < l->height; y++)
+        for (long x = 0; x < l->width; x++) {
+            size_t at = l->first + l->in->step * ((size_t)y * l->in->width + (size_t)x);
+            for (int c = 0; c < 3; c++) {
+                l->in->value[c][at] += (1.0f - l->in->trust[at]) * kept[c][at];
+                kept[c][at] = 0.0f;
+            }
+        }
+}
+
+static void filter_lattice(const struct patch_spectrum *p, size_t x, size_t y, float *const kept[3]) {
+    struct lattice l;
+    lattice_init(&l, p, x, y);
+    measure_noise(&l);
+    measure_power(&l);
+    keep_texture(&l, kept, NULL);
+    fill_in(&l, kept);
+    measure_power(&l);
+    keep_texture(&l, kept, p->error);
+    lattice_release(&l);
+}
+
+void patch_spectrum_filter(struct patch_spectrum *p) {
+    static pthread_once_t once = PTHREAD_ONCE_INIT;
+    size_t samples = p->width * p->height;
+    float *kept[3];
+    pthread_once(&once, make_basis);
+    for (int c = 0; c < 3; c++) {
+        kept[c] = mem_calloc(samples, sizeof *kept[c]);
+        for (size_t i = 0; i < samples; i++) {
+            p->value[c][i] *= p->trust[i];
+            p->noise[c][i] *= p->trust[i];
+        }
+    }
+    for (size_t y = 0; y < p->step && y < p->height; y++)
+        for (size_t x = 0; x < p->step && x < p->width; x++)
+            filter_lattice(p, x, y, kept);
+    for (int c = 0; c < 3; c++) {
+        memcpy(p->value[c], kept[c], samples * sizeof *kept[c]);
+        mem_free(kept[c]);
+    }
+}
