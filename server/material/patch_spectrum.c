@@ -148,22 +148,19 @@ static float window_power(long x, long y) {
     return w * w;
 }
 
-/* Mean variance over the whole patch, of which missing samples have none; mean mixing of those that are there. */
+/* Means over the whole patch, of which missing samples have none. */
 static void weigh_patch(struct lattice *l, size_t patch) {
     struct extent e = extent_of(l, patch);
-    float variance = 0.0f, mixing = 0.0f, there = 0.0f;
+    float variance = 0.0f, mixing = 0.0f;
     for (long y = e.y0; y < e.y1; y++)
         for (long x = e.x0; x < e.x1; x++) {
             size_t at = sample_of(l, &e, x, y);
-            float trust = l->in->trust[at], w = window_power(x, y);
-            if (!(trust > 0.0f))
-                continue;
-            variance += w * trust * trust * l->in->variance[at];
-            mixing += w * trust * trust * l->in->mixing[at];
-            there += w;
+            float trust = l->in->trust[at], w = window_power(x, y) * trust * trust;
+            variance += w * l->in->variance[at];
+            mixing += w * l->in->mixing[at];
         }
     l->variance[patch] = variance / (0.25f * COEFFICIENTS);
-    l->mixing[patch] = there > 0.0f ? mixing / there : 0.0f;
+    l->mixing[patch] = mixing / (0.25f * COEFFICIENTS);
 }
 
 /* Sums of vectors [patches][length] over the square of AROUND patches to each side; in place. */

@@ -28,7 +28,7 @@
 #define WIENER_SCRATCH(w)                                                                                              \
     {                                                                                                                  \
         &(w)->error, &(w)->power, &(w)->bounded_power, &(w)->noise_power, &(w)->relative_noise, &(w)->weight_sum,      \
-            &(w)->count, &(w)->trust, &(w)->variance, &(w)->mixing, &(w)->scratch                                      \
+            &(w)->count, &(w)->trust, &(w)->variance, &(w)->mixing, &(w)->filled, &(w)->scratch                        \
     }
 
 void wiener_init(struct wiener *w, size_t samples) {
@@ -62,9 +62,12 @@ void wiener_release(struct wiener *w) {
 
 /* --- smoothing ---------------------------------------------------------------------------------- */
 
-/* One row or column of the B3 spline at `step` samples between taps; `to` is not `from`. */
-static void spline_rows(float *to, const float *from, size_t width, size_t height, size_t step) {
-    static const float tap[5] = {1.0f / 16.0f, 4.0f / 16.0f, 6.0f / 16.0f, 4.0f / 16.0f, 1.0f / 16.0f};
+/* The B3 spline, and its squares, by which variances of independent noise add up. */
+static const float spline[5] = {1.0f / 16.0f, 4.0f / 16.0f, 6.0f / 16.0f, 4.0f / 16.0f, 1.0f / 16.0f};
+static const float squares[5] = {1.0f / 256.0f, 16.0f / 256.0f, 36.0f / 256.0f, 16.0f / 256.0f, 1.0f / 256.0f};
+
+/* One row or column of taps at `step` samples; `to` is not `from`. */
+static void smooth_rows(float *to, const float *from, size_t width, size_t height, size_t step, const float tap[5]) {
     for (size_t y = 0; y < height; y++) {
         const float *in = from + y * width;
         float *out = to + y * width;
@@ -79,8 +82,7 @@ static void spline_rows(float *to, const float *from, size_t width, size_t heigh
     }
 }
 
-static void spline_columns(float *to, const float *from, size_t width, size_t height, size_t step) {
-    static const float tap[5] = {1.0f / 16.0f, 4.0f / 16.0f, 6.0f / 16.0f, 4.0f / 16.0f, 1.0f / 16.0f};
+static void smooth_columns(float *to, const float *from, size_t width, size_t height, size_t step, const float tap[5]) {
     for (size_t y = 0; y < height; y++) {
         float *out = to + y * width;
         memset(out, 0, width * sizeof *out);
@@ -226,13 +228,33 @@ static void swap_planes(float **a, float **b) {
 /* From `plane` to `coarse`. */
 static void smooth(struct wiener *w, size_t step) {
     for (int p = 0; p < WIENER_PLANES; p++) {
-        spline_rows(w->scratch, w->plane[p], w->width, w->height, step);
-        spline_columns(w->coarse[p], w->scratch, w->width, w->height, step);
+        const float *tap = p == WIENER_VARIANCE ? squares : spline;
+        smooth_rows(w->scratch, w->plane[p], w->width, w->height, step, tap);
+        smooth_columns(w->coarse[p], w->scratch, w->width, w->height, step, tap);
     }
+}
+
+/* Of samples that `fine` lacks, what is in `plane`: the finest low-pass that reaches them. It is theirs once
+ * count_filled gives them the weight of it. */
+static void fill(struct wiener *w) {
+    for (size_t at = 0; at < w->width * w->height; at++) {
+        float weight = w->plane[WIENER_WEIGHT][at];
+        if (!w->inside[at] || w->fine[WIENER_WEIGHT][at] > 0.0f || w->filled[at] > 0.0f || !(weight > 0.0f))
+            continue;
+        w->filled[at] = weight;
+        for (int p = 0; p < WIENER_WEIGHT; p++)
+            w->fine[p][at] = w->plane[p][at];
+    }
+}
+
+static void count_filled(struct wiener *w) {
+    for (size_t at = 0; at < w->width * w->height; at++)
+        w->fine[WIENER_WEIGHT][at] += w->filled[at];
 }
 
 /* Leaves what was in `plane` in `fine`, and its low-pass in `plane`. */
 static void split(struct wiener *w, size_t step, int octaves, size_t resolution) {
+    memset(w->filled, 0, w->width * w->height * sizeof *w->filled);
     for (int octave = 0; octave < octaves; octave++, step *= 2) {
         smooth(w, step);
         if (step <= resolution)
@@ -240,6 +262,7 @@ static void split(struct wiener *w, size_t step, int octaves, size_t resolution)
         swap_planes(w->plane, w->coarse);
         if (octave == 0)
             swap_planes(w->coarse, w->fine);
+        fill(w);
     }
 }
 
@@ -249,8 +272,14 @@ static float clip_of(const struct details *d, size_t at) {
     return power > bound && !is_texture(d->w, at) ? sqrtf(bound / power) : 1.0f;
 }
 
-/* Of the details, in the place of `fine`, what is kept. Samples that count for less than those around are trusted by that
- * share. */
+/* Samples that count for less than those around are trusted by that share; filled ones, which are means, wholly. */
+static float trust_of(const struct details *d, size_t at) {
+    const struct wiener *w = d->w;
+    float usual = w->weight_sum[at] / w->count[at];
+    return w->filled[at] > 0.0f ? 1.0f : fminf(1.0f, d->of[WIENER_WEIGHT][at] / usual);
+}
+
+/* Of the details, in the place of `fine`, what is kept. */
 static void filter_details(const struct details *d, size_t step) {
     struct wiener *w = d->w;
     struct patch_spectrum p = {.width = w->width,
@@ -267,7 +296,7 @@ static void filter_details(const struct details *d, size_t step) {
     for (size_t at = 0; at < w->width * w->height; at++) {
         bool is_there = counts(d, at);
         float weight = d->of[WIENER_WEIGHT][at], clip = is_there ? clip_of(d, at) : 0.0f;
-        w->trust[at] = is_there ? fminf(1.0f, weight * w->count[at] / w->weight_sum[at]) : 0.0f;
+        w->trust[at] = is_there ? trust_of(d, at) : 0.0f;
         w->variance[at] = is_there ? variance_of(d, at) : 0.0f;
         w->mixing[at] = is_there ? d->of[WIENER_MIXING][at] / weight : 0.0f;
         for (int c = 0; c < 3; c++) {
@@ -288,6 +317,7 @@ void wiener_band(struct wiener *w, size_t step, int octaves, size_t resolution) 
     split(w, step, octaves, resolution);
     measure_noise(&d, radius);
     measure_power(&d, radius);
+    count_filled(w);
     filter_details(&d, step);
     for (size_t at = 0; at < w->width * w->height; at++)
         for (int c = 0; c < 3 && counts(&d, at); c++)

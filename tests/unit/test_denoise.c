@@ -171,6 +171,20 @@ static void test_holes(void) {
     texture_release(&out);
 }
 
+/* What is missing beside an edge is like its side of it, not like their mean. */
+static void test_gap(void) {
+    for (uint32_t y = 0; y < HEIGHT; y++)
+        for (uint32_t x = 0; x < WIDTH; x++) {
+            set(x, y, y < 64 ? 0.2f : 0.8f, 0.01f * normal(7, y * WIDTH + x), 0.0f);
+            if (y >= 58 && y < 62)
+                measured[y * WIDTH + x] = (struct measurement){0};
+        }
+    filter();
+    for (uint32_t y = 58; y < 60; y++)
+        CHECK_NEAR(out.texel[y * WIDTH + 60][1], 0.2f, 0.05f);
+    texture_release(&out);
+}
+
 /* A chart of which nothing was measured has its prior; so has one that may be all light of others. */
 static void test_prior(void) {
     measure();
@@ -212,6 +226,7 @@ int main(void) {
     test_outlier();
     test_few_certain();
     test_holes();
+    test_gap();
     test_prior();
     test_threads();
     parallel_free(pool);
