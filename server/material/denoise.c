@@ -81,7 +81,7 @@ static void tile_read(struct wiener *t, const struct denoise_job *job, const str
                                                 noise.g,
                                                 noise.b,
                                                 image_float_from_half(m.mixing),
-                                                m.weight > 0.0f ? weight / m.weight : 0.0f,
+                                                m.weight > 0.0f ? 1.0f / m.weight : 0.0f,
                                                 1.0f};
             for (int p = 0; p < WIENER_PLANES; p++)
                 t->plane[p][at] = weight * plane[p];

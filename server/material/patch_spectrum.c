@@ -28,11 +28,13 @@
 #define CLIPPED_POWER 9.0f
 #define CERTAIN_POWER 30.0f
 
+#define LEAST_SHAPE 0.01f /* of noise at a frequency that blocks lack, which is not all white otherwise */
+
 /* The transform, the window, and by coefficient the rounded length of its frequency and how many share its octave. */
 static struct {
     float cosine[COEFFICIENTS], transposed[COEFFICIENTS]; /* [frequency][sample], [sample][frequency] */
     float window[SIDE];
-    int length[COEFFICIENTS], length_count[LENGTHS];
+    int length[COEFFICIENTS];
     float octave_count[COEFFICIENTS];
 } basis;
 
@@ -54,10 +56,31 @@ static void make_basis(void) {
         for (int x = 0; x < SIDE; x++) {
             int at = y * SIDE + x;
             basis.length[at] = (int)lround(hypot(x, y));
-            basis.length_count[basis.length[at]]++;
             basis.octave_count[at] = octave_count(x > y ? x : y);
         }
     }
+}
+
+/* Power of noise by coefficient where that of blocks of samples is the same, up to a factor. */
+struct shape {
+    float of[COEFFICIENTS], sum[LENGTHS]; /* sums over the coefficients of a length */
+};
+
+/* Power of a block at a frequency, by that at 0: the square of Dirichlet's kernel. */
+static float block_power(size_t block, int frequency) {
+    double half = 0.5 * M_PI * frequency / SIDE;
+    double kernel = frequency == 0 ? 1.0 : sin((double)block * half) / ((double)block * sin(half));
+    return (float)(kernel * kernel);
+}
+
+static void make_shape(struct shape *shape, size_t block) {
+    *shape = (struct shape){.sum = {0.0f}};
+    for (int y = 0; y < SIDE; y++)
+        for (int x = 0; x < SIDE; x++) {
+            int at = y * SIDE + x;
+            shape->of[at] = fmaxf(block_power(block, x) * block_power(block, y), LEAST_SHAPE);
+            shape->sum[basis.length[at]] += shape->of[at];
+        }
 }
 
 typedef float float4 __attribute__((vector_size(16)));
@@ -96,12 +119,13 @@ static void transform(float patch[COEFFICIENTS], const float a[COEFFICIENTS], co
  * 1) HALF) of the lattice. */
 struct lattice {
     const struct patch_spectrum *in;
+    const struct shape *shape;
     size_t first;                    /* its first sample */
     long width, height;              /* samples */
     long columns, rows;              /* patches */
     float *variance, *mixing;        /* [patches] means; variance is 0 of one without samples */
     float *patch_count;              /* [patches] of those around that have some */
-    float (*noise)[LENGTHS];         /* [patches] power of noise by length of frequency, around */
+    float (*noise)[LENGTHS];         /* [patches] power of noise by length of frequency, over the shape; sums around */
     float (*value[3])[COEFFICIENTS]; /* [patches] by channel */
     float (*power)[COEFFICIENTS], (*around)[COEFFICIENTS], (*clipped)[COEFFICIENTS]; /* of that; sums around */
 };
@@ -189,8 +213,10 @@ static void sum_around(const struct lattice *l, float *vector, size_t length) {
 
 static size_t patches_of(const struct lattice *l) { return (size_t)(l->columns * l->rows); }
 
-static void lattice_init(struct lattice *l, const struct patch_spectrum *in, size_t x, size_t y) {
+static void lattice_init(struct lattice *l, const struct patch_spectrum *in, const struct shape *shape, size_t x,
+                         size_t y) {
     *l = (struct lattice){.in = in,
+                          .shape = shape,
                           .first = y * in->width + x,
                           .width = (long)((in->width - x + in->step - 1) / in->step),
                           .height = (long)((in->height - y + in->step - 1) / in->step)};
@@ -231,12 +257,17 @@ static void measure_noise(struct lattice *l) {
             read_patch(l, i, l->in->noise[c], patch);
             for (int k = 0; k < COEFFICIENTS; k++) {
                 int length = basis.length[k];
-                l->noise[i][length] += patch[k] * patch[k] / l->variance[i] / (float)basis.length_count[length];
+                l->noise[i][length] += patch[k] * patch[k] / l->variance[i] / l->shape->sum[length];
             }
         }
     }
     sum_around(l, l->noise[0], LENGTHS);
     sum_around(l, l->patch_count, 1);
+}
+
+/* Of a coefficient, around. */
+static float noise_of(const struct lattice *l, size_t patch, int coefficient) {
+    return l->noise[patch][basis.length[coefficient]] * l->shape->of[coefficient];
 }
 
 /* Coefficients of the values, their power, and that around, also with each patch's clipped. */
@@ -254,7 +285,7 @@ static void measure_power(struct lattice *l) {
                 l->power[i][k] += value[k] * value[k] / l->variance[i];
         }
         for (int k = 0; k < COEFFICIENTS; k++)
-            l->clipped[i][k] = fminf(l->power[i][k], CLIPPED_POWER * l->noise[i][basis.length[k]] / l->patch_count[i]);
+            l->clipped[i][k] = fminf(l->power[i][k], CLIPPED_POWER * noise_of(l, i, k) / l->patch_count[i]);
     }
     memcpy(l->around, l->power, patches * sizeof *l->around);
     sum_around(l, l->around[0], COEFFICIENTS);
@@ -267,7 +298,7 @@ static float shares_of(const struct lattice *l, size_t patch, float keep[COEFFIC
     float count = l->patch_count[patch], error = 0.0f;
     float mixing = l->mixing[patch] * count / l->variance[patch] * (0.25f * COEFFICIENTS);
     for (int k = 0; k < COEFFICIENTS; k++) {
-        float noise = l->noise[patch][basis.length[k]], power = l->clipped[patch][k];
+        float noise = noise_of(l, patch, k), power = l->clipped[patch][k];
         if (power > TEXTURE_POWER * noise)
             power = l->around[patch][k];
         float texture = power > TEXTURE_POWER * noise ? power - NOISE_TAKEN * noise : 0.0f;
@@ -311,9 +342,10 @@ static void fill_in(const struct lattice *l, float *const kept[3]) {
         }
 }
 
-static void filter_lattice(const struct patch_spectrum *p, size_t x, size_t y, float *const kept[3]) {
+static void filter_lattice(const struct patch_spectrum *p, const struct shape *shape, size_t x, size_t y,
+                           float *const kept[3]) {
     struct lattice l;
-    lattice_init(&l, p, x, y);
+    lattice_init(&l, p, shape, x, y);
     measure_noise(&l);
     measure_power(&l);
     keep_texture(&l, kept, NULL);
@@ -327,7 +359,9 @@ void patch_spectrum_filter(struct patch_spectrum *p) {
     static pthread_once_t once = PTHREAD_ONCE_INIT;
     size_t samples = p->width * p->height;
     float *kept[3];
+    struct shape shape;
     pthread_once(&once, make_basis);
+    make_shape(&shape, p->block > p->step ? p->block / p->step : 1);
     for (int c = 0; c < 3; c++) {
         kept[c] = mem_calloc(samples, sizeof *kept[c]);
         for (size_t i = 0; i < samples; i++) {
@@ -337,7 +371,7 @@ void patch_spectrum_filter(struct patch_spectrum *p) {
     }
     for (size_t y = 0; y < p->step && y < p->height; y++)
         for (size_t x = 0; x < p->step && x < p->width; x++)
-            filter_lattice(p, x, y, kept);
+            filter_lattice(p, &shape, x, y, kept);
     for (int c = 0; c < 3; c++) {
         memcpy(p->value[c], kept[c], samples * sizeof *kept[c]);
         mem_free(kept[c]);

@@ -1,8 +1,8 @@
 /* patch_spectrum.h -- Wiener filter of a picture's details, by the spectra of its patches.
  *
  * Patches of 16 x 16 samples that overlap by half are transformed by a windowed cosine transform; sine windows add up
- * to one (Princen and Bradley 1986). Noise has much the same power at all frequencies of one length, while texture has
- * its own in few: stripes, joints, weaves. So a coefficient is kept by its share of texture (Wiener 1949), whose power
+ * to one (Princen and Bradley 1986). Noise, but for blocks of samples that share it, has much the same power at all
+ * frequencies of one length, while texture has its own in few: stripes, joints, weaves. So a coefficient is kept by its share of texture (Wiener 1949), whose power
  * is that of the coefficient over the patches around less that of a sample of the noise; or, where there is much more
  * of it in this patch alone than noise explains, by that (as hard thresholds do; Yaroslavsky, Egiazarian and Astola
  * 2001).
@@ -21,6 +21,7 @@
 struct patch_spectrum {
     size_t width, height;
     size_t step;           /* between samples of a patch: each of the step x step lattices is filtered alone */
+    size_t block;          /* samples a side that share a measurement, hence its noise */
     float *value[3];       /* by channel: details, which are replaced by what is kept of them */
     float *noise[3];       /* a sample of their noise; overwritten */
     const float *trust;    /* in [0, 1] */

@@ -62,12 +62,10 @@ void wiener_release(struct wiener *w) {
 
 /* --- smoothing ---------------------------------------------------------------------------------- */
 
-/* The B3 spline, and its squares, by which variances of independent noise add up. */
-static const float spline[5] = {1.0f / 16.0f, 4.0f / 16.0f, 6.0f / 16.0f, 4.0f / 16.0f, 1.0f / 16.0f};
-static const float squares[5] = {1.0f / 256.0f, 16.0f / 256.0f, 36.0f / 256.0f, 16.0f / 256.0f, 1.0f / 256.0f};
+static const float tap[5] = {1.0f / 16.0f, 4.0f / 16.0f, 6.0f / 16.0f, 4.0f / 16.0f, 1.0f / 16.0f};
 
-/* One row or column of taps at `step` samples; `to` is not `from`. */
-static void smooth_rows(float *to, const float *from, size_t width, size_t height, size_t step, const float tap[5]) {
+/* One row or column of the B3 spline at `step` samples between taps; `to` is not `from`. */
+static void smooth_rows(float *to, const float *from, size_t width, size_t height, size_t step) {
     for (size_t y = 0; y < height; y++) {
         const float *in = from + y * width;
         float *out = to + y * width;
@@ -82,7 +80,7 @@ static void smooth_rows(float *to, const float *from, size_t width, size_t heigh
     }
 }
 
-static void smooth_columns(float *to, const float *from, size_t width, size_t height, size_t step, const float tap[5]) {
+static void smooth_columns(float *to, const float *from, size_t width, size_t height, size_t step) {
     for (size_t y = 0; y < height; y++) {
         float *out = to + y * width;
         memset(out, 0, width * sizeof *out);
@@ -144,10 +142,9 @@ static float detail_power(const struct details *d, int first, size_t at) {
 
 static bool counts(const struct details *d, size_t at) { return d->w->inside[at] && d->of[WIENER_WEIGHT][at] > 0.0f; }
 
-/* Of a sample's noise, up to a factor. */
+/* Of a sample's noise, up to a factor: after smoothing that of the samples that it is the mean of. */
 static float variance_of(const struct details *d, size_t at) {
-    float weight = d->of[WIENER_WEIGHT][at];
-    return d->of[WIENER_VARIANCE][at] / (weight * weight);
+    return d->of[WIENER_VARIANCE][at] / d->of[WIENER_WEIGHT][at];
 }
 
 /* Noise variance of a sample's detail: its own, up to the factor that the noise around tells. */
@@ -228,9 +225,8 @@ static void swap_planes(float **a, float **b) {
 /* From `plane` to `coarse`. */
 static void smooth(struct wiener *w, size_t step) {
     for (int p = 0; p < WIENER_PLANES; p++) {
-        const float *tap = p == WIENER_VARIANCE ? squares : spline;
-        smooth_rows(w->scratch, w->plane[p], w->width, w->height, step, tap);
-        smooth_columns(w->coarse[p], w->scratch, w->width, w->height, step, tap);
+        smooth_rows(w->scratch, w->plane[p], w->width, w->height, step);
+        smooth_columns(w->coarse[p], w->scratch, w->width, w->height, step);
     }
 }
 
@@ -280,11 +276,12 @@ static float trust_of(const struct details *d, size_t at) {
 }
 
 /* Of the details, in the place of `fine`, what is kept. */
-static void filter_details(const struct details *d, size_t step) {
+static void filter_details(const struct details *d, size_t step, size_t resolution) {
     struct wiener *w = d->w;
     struct patch_spectrum p = {.width = w->width,
                                .height = w->height,
                                .step = step,
+                               .block = resolution,
                                .trust = w->trust,
                                .variance = w->variance,
                                .mixing = w->mixing,
@@ -318,7 +315,7 @@ void wiener_band(struct wiener *w, size_t step, int octaves, size_t resolution) 
     measure_noise(&d, radius);
     measure_power(&d, radius);
     count_filled(w);
-    filter_details(&d, step);
+    filter_details(&d, step, resolution);
     for (size_t at = 0; at < w->width * w->height; at++)
         for (int c = 0; c < 3 && counts(&d, at); c++)
             w->kept[c][at] += w->fine[WIENER_VALUE + c][at];

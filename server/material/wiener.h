@@ -13,7 +13,7 @@
 #include <stddef.h>
 
 /* Value by channel; a sample of its noise; variance of the error that neighbours share, which that sample lacks;
- * variance of the noise up to a factor, by the weight once more; the weight, by which all others are multiplied. */
+ * variance of the noise up to a factor; the weight, by which all others are multiplied. */
 enum {
     WIENER_VALUE,
     WIENER_NOISE = WIENER_VALUE + 3,

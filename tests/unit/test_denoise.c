@@ -171,6 +171,19 @@ static void test_holes(void) {
     texture_release(&out);
 }
 
+/* One texel of hardly any weight tells all the chart. */
+static void test_lonely(void) {
+    for (uint32_t i = 0; i < TEXELS; i++)
+        measured[i] = (struct measurement){0};
+    set(10, 20, 0.7f, 0.01f, 0.0f);
+    measured[20 * WIDTH + 10].weight = 1e-12f;
+    filter();
+    for (uint32_t y = 0; y < HEIGHT; y++)
+        for (uint32_t x = 0; x < WIDTH / 2 - 1; x++)
+            CHECK_NEAR(out.texel[y * WIDTH + x][1], 0.7f, 0.05f);
+    texture_release(&out);
+}
+
 /* What is missing beside an edge is like its side of it, not like their mean. */
 static void test_gap(void) {
     for (uint32_t y = 0; y < HEIGHT; y++)
@@ -227,6 +240,7 @@ int main(void) {
     test_few_certain();
     test_holes();
     test_gap();
+    test_lonely();
     test_prior();
     test_threads();
     parallel_free(pool);

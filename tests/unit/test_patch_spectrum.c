@@ -34,10 +34,11 @@ static void set(float amplitude, float deviation) {
     }
 }
 
-static void filter(size_t step) {
+static void filter_blocks(size_t step, size_t block) {
     struct patch_spectrum p = {.width = WIDTH,
                                .height = HEIGHT,
                                .step = step,
+                               .block = block,
                                .value = {value[0], value[1], value[2]},
                                .noise = {noise[0], noise[1], noise[2]},
                                .trust = trust,
@@ -46,6 +47,8 @@ static void filter(size_t step) {
                                .error = error};
     patch_spectrum_filter(&p);
 }
+
+static void filter(size_t step) { filter_blocks(step, 1); }
 
 /* Mean squares, of a channel: what the wave is off by, what is stated, and what is kept. */
 static void sums(float amplitude, double *off, double *stated, double *kept) {
@@ -64,6 +67,22 @@ static void test_noise(void) {
     filter(1);
     sums(0.0f, &off, &stated, &kept);
     CHECK_THAT(kept < 1e-4 * (double)(NOISE * NOISE), "of noise %.2g is kept", kept / (double)(NOISE * NOISE));
+}
+
+/* Of noise that blocks of 2 x 2 samples share as little is kept. */
+static void test_blocks(void) {
+    double off, stated, kept;
+    set(0.0f, NOISE);
+    for (size_t i = 0; i < SAMPLES; i++)
+        for (size_t c = 0; c < 3; c++) {
+            size_t from = i / WIDTH / 2 * 2 * WIDTH + i % WIDTH / 2 * 2;
+            value[c][i] = value[c][from];
+            noise[c][i] = noise[c][from];
+        }
+    filter_blocks(1, 2);
+    sums(0.0f, &off, &stated, &kept);
+    CHECK_THAT(kept < 1e-4 * (double)(NOISE * NOISE), "of noise in blocks %.2g is kept",
+               kept / (double)(NOISE * NOISE));
 }
 
 /* As strong as the noise: nearly all of the wave is kept, of the noise what lies in its few coefficients. */
@@ -142,6 +161,7 @@ static void test_reach(void) {
 
 int main(void) {
     test_noise();
+    test_blocks();
     test_wave();
     test_without_noise();
     test_mark();
