@@ -62,7 +62,7 @@ static void make_basis(void) {
 }
 
 /* Power of noise by coefficient where that of blocks of samples is the same, up to a factor. */
-struct shape {
+struct noise_shape {
     float of[COEFFICIENTS], sum[LENGTHS]; /* sums over the coefficients of a length */
 };
 
@@ -73,8 +73,8 @@ static float block_power(size_t block, int frequency) {
     return (float)(kernel * kernel);
 }
 
-static void make_shape(struct shape *shape, size_t block) {
-    *shape = (struct shape){.sum = {0.0f}};
+static void make_noise_shape(struct noise_shape *shape, size_t block) {
+    *shape = (struct noise_shape){.sum = {0.0f}};
     for (int y = 0; y < SIDE; y++)
         for (int x = 0; x < SIDE; x++) {
             int at = y * SIDE + x;
@@ -119,7 +119,7 @@ static void transform(float patch[COEFFICIENTS], const float a[COEFFICIENTS], co
  * 1) HALF) of the lattice. */
 struct lattice {
     const struct patch_spectrum *in;
-    const struct shape *shape;
+    const struct noise_shape *shape;
     size_t first;                    /* its first sample */
     long width, height;              /* samples */
     long columns, rows;              /* patches */
@@ -213,7 +213,7 @@ static void sum_around(const struct lattice *l, float *vector, size_t length) {
 
 static size_t patches_of(const struct lattice *l) { return (size_t)(l->columns * l->rows); }
 
-static void lattice_init(struct lattice *l, const struct patch_spectrum *in, const struct shape *shape, size_t x,
+static void lattice_init(struct lattice *l, const struct patch_spectrum *in, const struct noise_shape *shape, size_t x,
                          size_t y) {
     *l = (struct lattice){.in = in,
                           .shape = shape,
@@ -342,7 +342,7 @@ static void fill_in(const struct lattice *l, float *const kept[3]) {
         }
 }
 
-static void filter_lattice(const struct patch_spectrum *p, const struct shape *shape, size_t x, size_t y,
+static void filter_lattice(const struct patch_spectrum *p, const struct noise_shape *shape, size_t x, size_t y,
                            float *const kept[3]) {
     struct lattice l;
     lattice_init(&l, p, shape, x, y);
@@ -359,9 +359,9 @@ void patch_spectrum_filter(struct patch_spectrum *p) {
     static pthread_once_t once = PTHREAD_ONCE_INIT;
     size_t samples = p->width * p->height;
     float *kept[3];
-    struct shape shape;
+    struct noise_shape shape;
     pthread_once(&once, make_basis);
-    make_shape(&shape, p->block > p->step ? p->block / p->step : 1);
+    make_noise_shape(&shape, p->block > p->step ? p->block / p->step : 1);
     for (int c = 0; c < 3; c++) {
         kept[c] = mem_calloc(samples, sizeof *kept[c]);
         for (size_t i = 0; i < samples; i++) {

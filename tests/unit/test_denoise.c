@@ -176,7 +176,7 @@ static void test_lonely(void) {
     for (uint32_t i = 0; i < TEXELS; i++)
         measured[i] = (struct measurement){0};
     set(10, 20, 0.7f, 0.01f, 0.0f);
-    measured[20 * WIDTH + 10].weight = 1e-12f;
+    measured[20 * WIDTH + 10].weight = 1e-20f;
     filter();
     for (uint32_t y = 0; y < HEIGHT; y++)
         for (uint32_t x = 0; x < WIDTH / 2 - 1; x++)
