@@ -8,7 +8,7 @@
 #include <string.h>
 
 #include "common/mem.h"
-#include "server/material/patch_spectrum.h"
+#include "server/material/patch_transform.h"
 #include "server/material/texture_variance.h"
 #include "server/material/wiener.h"
 
@@ -265,9 +265,7 @@ static void make_layers(struct denoise_job *job, size_t triangle_count, const bo
 }
 
 /* What a tile's filters read beyond it: whole shifts of a patch, so that patches lie the same in all tiles. */
-static size_t tile_margin(void) {
-    return (wiener_reach(FINE_STEP) + PATCH_SPECTRUM_SHIFT - 1) / PATCH_SPECTRUM_SHIFT * PATCH_SPECTRUM_SHIFT;
-}
+static size_t tile_margin(void) { return (wiener_reach(FINE_STEP) + PATCH_SHIFT - 1) / PATCH_SHIFT * PATCH_SHIFT; }
 
 /* The tiles of all layers; item may be NULL to count them. */
 static size_t list_items(const struct denoise_job *job, struct item *item) {

@@ -5,16 +5,12 @@
 #include "server/material/patch_spectrum.h"
 
 #include <math.h>
-#include <pthread.h>
 #include <stdbool.h>
 #include <string.h>
 
 #include "common/mem.h"
+#include "server/material/patch_transform.h"
 
-#define SIDE 16 /* samples of a patch */
-#define HALF PATCH_SPECTRUM_SHIFT
-#define COEFFICIENTS (SIDE * SIDE)
-#define LENGTHS (2 * SIDE) /* of frequencies, rounded */
 /* Patches to each side over which power is averaged; 2: passage's specks .53 % for .43, else within .05 dB. */
 #define AROUND 3
 /* Power over that of noise from which it counts as texture, and what is taken off: split halves understate noise by 1.1
@@ -30,104 +26,42 @@
 
 #define LEAST_SHAPE 0.01f /* of noise at a frequency that blocks lack, which is not all white otherwise */
 
-/* The transform, the window, and by coefficient the rounded length of its frequency and how many share its octave. */
-static struct {
-    float cosine[COEFFICIENTS], transposed[COEFFICIENTS]; /* [frequency][sample], [sample][frequency] */
-    float window[SIDE];
-    int length[COEFFICIENTS];
-    float octave_count[COEFFICIENTS];
-} basis;
-
-/* Of the octave of the greater of two frequencies: 1 of 0, else 3, 12, 48, 192. */
-static float octave_count(int frequency) {
-    int first = 1;
-    while (2 * first <= frequency)
-        first *= 2;
-    return frequency == 0 ? 1.0f : 3.0f * (float)(first * first);
-}
-
-static void make_basis(void) {
-    for (int k = 0; k < SIDE; k++)
-        for (int i = 0; i < SIDE; i++)
-            basis.cosine[k * SIDE + i] = basis.transposed[i * SIDE + k] =
-                (float)(sqrt((k > 0 ? 2.0 : 1.0) / SIDE) * cos(M_PI * (i + 0.5) * k / SIDE));
-    for (int y = 0; y < SIDE; y++) {
-        basis.window[y] = (float)sin(M_PI * (y + 0.5) / SIDE);
-        for (int x = 0; x < SIDE; x++) {
-            int at = y * SIDE + x;
-            basis.length[at] = (int)lround(hypot(x, y));
-            basis.octave_count[at] = octave_count(x > y ? x : y);
-        }
-    }
-}
-
 /* Power of noise by coefficient where that of blocks of samples is the same, up to a factor. */
 struct noise_shape {
-    float of[COEFFICIENTS], sum[LENGTHS]; /* sums over the coefficients of a length */
+    float of[PATCH_SIZE], sum[PATCH_LENGTHS]; /* sums over the coefficients of a length */
 };
 
 /* Power of a block at a frequency, by that at 0: the square of Dirichlet's kernel. */
 static float block_power(size_t block, int frequency) {
-    double half = 0.5 * M_PI * frequency / SIDE;
+    double half = 0.5 * M_PI * frequency / PATCH_SIDE;
     double kernel = frequency == 0 ? 1.0 : sin((double)block * half) / ((double)block * sin(half));
     return (float)(kernel * kernel);
 }
 
-static void make_noise_shape(struct noise_shape *shape, size_t block) {
+static void make_noise_shape(struct noise_shape *shape, const struct patch_basis *basis, size_t block) {
     *shape = (struct noise_shape){.sum = {0.0f}};
-    for (int y = 0; y < SIDE; y++)
-        for (int x = 0; x < SIDE; x++) {
-            int at = y * SIDE + x;
+    for (int y = 0; y < PATCH_SIDE; y++)
+        for (int x = 0; x < PATCH_SIDE; x++) {
+            int at = y * PATCH_SIDE + x;
             shape->of[at] = fmaxf(block_power(block, x) * block_power(block, y), LEAST_SHAPE);
-            shape->sum[basis.length[at]] += shape->of[at];
+            shape->sum[basis->length[at]] += shape->of[at];
         }
 }
 
-typedef float float4 __attribute__((vector_size(16)));
-
-static float4 load4(const float *from) {
-    float4 four;
-    memcpy(&four, from, sizeof four);
-    return four;
-}
-
-/* to = a b. A row is summed in four registers, which compilers do not make of an array by themselves. */
-static void multiply(float to[COEFFICIENTS], const float a[COEFFICIENTS], const float b[COEFFICIENTS]) {
-    for (int y = 0; y < SIDE; y++) {
-        float4 first = {0.0f}, second = first, third = first, fourth = first;
-        for (int i = 0; i < SIDE; i++) {
-            float times = a[y * SIDE + i];
-            const float *row = b + i * SIDE;
-            first += times * load4(row);
-            second += times * load4(row + 4);
-            third += times * load4(row + 8);
-            fourth += times * load4(row + 12);
-        }
-        const float4 sum[] = {first, second, third, fourth};
-        memcpy(to + y * SIDE, sum, sizeof sum);
-    }
-}
-
-/* patch = a patch b. */
-static void transform(float patch[COEFFICIENTS], const float a[COEFFICIENTS], const float b[COEFFICIENTS]) {
-    float rows[COEFFICIENTS];
-    multiply(rows, patch, b);
-    multiply(patch, a, rows);
-}
-
-/* One of the step x step lattices of samples, and the patches over it: patch (i, j) begins at sample ((i - 1) HALF, (j -
- * 1) HALF) of the lattice. */
+/* One of the step x step lattices of samples, and the patches over it: patch (i, j) begins at sample ((i - 1) PATCH_SHIFT, (j -
+ * 1) PATCH_SHIFT) of the lattice. */
 struct lattice {
     const struct patch_spectrum *in;
+    const struct patch_basis *basis;
     const struct noise_shape *shape;
-    size_t first;                    /* its first sample */
-    long width, height;              /* samples */
-    long columns, rows;              /* patches */
-    float *variance, *mixing;        /* [patches] means; variance is 0 of one without samples */
-    float *patch_count;              /* [patches] of those around that have some */
-    float (*noise)[LENGTHS];         /* [patches] power of noise by length of frequency, over the shape; sums around */
-    float (*value[3])[COEFFICIENTS]; /* [patches] by channel */
-    float (*power)[COEFFICIENTS], (*around)[COEFFICIENTS], (*clipped)[COEFFICIENTS]; /* of that; sums around */
+    size_t first;                  /* its first sample */
+    long width, height;            /* samples */
+    long columns, rows;            /* patches */
+    float *variance, *mixing;      /* [patches] means; variance is 0 of one without samples */
+    float *patch_count;            /* [patches] of those around that have some */
+    float (*noise)[PATCH_LENGTHS]; /* [patches] power of noise by length of frequency, over the shape; sums around */
+    float (*value[3])[PATCH_SIZE]; /* [patches] by channel */
+    float (*power)[PATCH_SIZE], (*around)[PATCH_SIZE], (*clipped)[PATCH_SIZE]; /* of that; sums around */
 };
 
 /* The part of a patch that lies on the picture. */
@@ -137,10 +71,10 @@ struct extent {
 };
 
 static struct extent extent_of(const struct lattice *l, size_t patch) {
-    long x = ((long)patch % l->columns - 1) * HALF, y = ((long)patch / l->columns - 1) * HALF;
+    long x = ((long)patch % l->columns - 1) * PATCH_SHIFT, y = ((long)patch / l->columns - 1) * PATCH_SHIFT;
     long step = (long)l->in->step;
-    return (struct extent){x < 0 ? -x : 0, y < 0 ? -y : 0, x + SIDE < l->width ? SIDE : l->width - x,
-                           y + SIDE < l->height ? SIDE : l->height - y,
+    return (struct extent){x < 0 ? -x : 0, y < 0 ? -y : 0, x + PATCH_SIDE < l->width ? PATCH_SIDE : l->width - x,
+                           y + PATCH_SIDE < l->height ? PATCH_SIDE : l->height - y,
                            l->first + (size_t)(step * (y * (long)l->in->width + x))};
 }
 
@@ -149,26 +83,26 @@ static size_t sample_of(const struct lattice *l, const struct extent *e, long x,
 }
 
 /* Reads a patch under its window, and transforms it. */
-static void read_patch(const struct lattice *l, size_t patch, const float *plane, float to[COEFFICIENTS]) {
+static void read_patch(const struct lattice *l, size_t patch, const float *plane, float to[PATCH_SIZE]) {
     struct extent e = extent_of(l, patch);
-    memset(to, 0, sizeof(float) * COEFFICIENTS);
+    memset(to, 0, sizeof(float) * PATCH_SIZE);
     for (long y = e.y0; y < e.y1; y++)
         for (long x = e.x0; x < e.x1; x++)
-            to[y * SIDE + x] = basis.window[y] * basis.window[x] * plane[sample_of(l, &e, x, y)];
-    transform(to, basis.cosine, basis.transposed);
+            to[y * PATCH_SIDE + x] = l->basis->window[y] * l->basis->window[x] * plane[sample_of(l, &e, x, y)];
+    patch_transform(l->basis, to);
 }
 
 /* Adds the inverse of a patch's coefficients, under its window, to a plane. */
-static void add_patch(const struct lattice *l, size_t patch, float of[COEFFICIENTS], float *plane) {
+static void add_patch(const struct lattice *l, size_t patch, float of[PATCH_SIZE], float *plane) {
     struct extent e = extent_of(l, patch);
-    transform(of, basis.transposed, basis.cosine);
+    patch_transform_back(l->basis, of);
     for (long y = e.y0; y < e.y1; y++)
         for (long x = e.x0; x < e.x1; x++)
-            plane[sample_of(l, &e, x, y)] += basis.window[y] * basis.window[x] * of[y * SIDE + x];
+            plane[sample_of(l, &e, x, y)] += l->basis->window[y] * l->basis->window[x] * of[y * PATCH_SIDE + x];
 }
 
-static float window_power(long x, long y) {
-    float w = basis.window[y] * basis.window[x];
+static float window_power(const struct lattice *l, long x, long y) {
+    float w = l->basis->window[y] * l->basis->window[x];
     return w * w;
 }
 
@@ -179,12 +113,12 @@ static void weigh_patch(struct lattice *l, size_t patch) {
     for (long y = e.y0; y < e.y1; y++)
         for (long x = e.x0; x < e.x1; x++) {
             size_t at = sample_of(l, &e, x, y);
-            float trust = l->in->trust[at], w = window_power(x, y) * trust * trust;
+            float trust = l->in->trust[at], w = window_power(l, x, y) * trust * trust;
             variance += w * l->in->variance[at];
             mixing += w * l->in->mixing[at];
         }
-    l->variance[patch] = variance / (0.25f * COEFFICIENTS);
-    l->mixing[patch] = mixing / (0.25f * COEFFICIENTS);
+    l->variance[patch] = variance / (0.25f * PATCH_SIZE);
+    l->mixing[patch] = mixing / (0.25f * PATCH_SIZE);
 }
 
 /* Sums of vectors [patches][length] over the square of AROUND patches to each side; in place. */
@@ -216,12 +150,13 @@ static size_t patches_of(const struct lattice *l) { return (size_t)(l->columns *
 static void lattice_init(struct lattice *l, const struct patch_spectrum *in, const struct noise_shape *shape, size_t x,
                          size_t y) {
     *l = (struct lattice){.in = in,
+                          .basis = patch_basis(),
                           .shape = shape,
                           .first = y * in->width + x,
                           .width = (long)((in->width - x + in->step - 1) / in->step),
                           .height = (long)((in->height - y + in->step - 1) / in->step)};
-    l->columns = (l->width + HALF - 1) / HALF + 1;
-    l->rows = (l->height + HALF - 1) / HALF + 1;
+    l->columns = (l->width + PATCH_SHIFT - 1) / PATCH_SHIFT + 1;
+    l->rows = (l->height + PATCH_SHIFT - 1) / PATCH_SHIFT + 1;
     size_t patches = patches_of(l);
     l->variance = mem_calloc(patches, sizeof *l->variance);
     l->mixing = mem_calloc(patches, sizeof *l->mixing);
@@ -247,7 +182,7 @@ static void lattice_release(struct lattice *l) {
 }
 
 static void measure_noise(struct lattice *l) {
-    float patch[COEFFICIENTS];
+    float patch[PATCH_SIZE];
     for (size_t i = 0; i < patches_of(l); i++) {
         weigh_patch(l, i);
         if (!(l->variance[i] > 0.0f))
@@ -255,19 +190,19 @@ static void measure_noise(struct lattice *l) {
         l->patch_count[i] = 1.0f;
         for (int c = 0; c < 3; c++) {
             read_patch(l, i, l->in->noise[c], patch);
-            for (int k = 0; k < COEFFICIENTS; k++) {
-                int length = basis.length[k];
+            for (int k = 0; k < PATCH_SIZE; k++) {
+                int length = l->basis->length[k];
                 l->noise[i][length] += patch[k] * patch[k] / l->variance[i] / l->shape->sum[length];
             }
         }
     }
-    sum_around(l, l->noise[0], LENGTHS);
+    sum_around(l, l->noise[0], PATCH_LENGTHS);
     sum_around(l, l->patch_count, 1);
 }
 
 /* Of a coefficient, around. */
 static float noise_of(const struct lattice *l, size_t patch, int coefficient) {
-    return l->noise[patch][basis.length[coefficient]] * l->shape->of[coefficient];
+    return l->noise[patch][l->basis->length[coefficient]] * l->shape->of[coefficient];
 }
 
 /* Coefficients of the values, their power, and that around, also with each patch's clipped. */
@@ -281,28 +216,28 @@ static void measure_power(struct lattice *l) {
         for (int c = 0; c < 3; c++) {
             float *value = l->value[c][i];
             read_patch(l, i, l->in->value[c], value);
-            for (int k = 0; k < COEFFICIENTS; k++)
+            for (int k = 0; k < PATCH_SIZE; k++)
                 l->power[i][k] += value[k] * value[k] / l->variance[i];
         }
-        for (int k = 0; k < COEFFICIENTS; k++)
+        for (int k = 0; k < PATCH_SIZE; k++)
             l->clipped[i][k] = fminf(l->power[i][k], CLIPPED_POWER * noise_of(l, i, k) / l->patch_count[i]);
     }
     memcpy(l->around, l->power, patches * sizeof *l->around);
-    sum_around(l, l->around[0], COEFFICIENTS);
-    sum_around(l, l->clipped[0], COEFFICIENTS);
+    sum_around(l, l->around[0], PATCH_SIZE);
+    sum_around(l, l->clipped[0], PATCH_SIZE);
 }
 
 /* What is kept of a patch's coefficients; returns the expected squared error of that. All powers are sums around but for
  * the patch's own. What neighbours share may be all in one coefficient of each octave. */
-static float shares_of(const struct lattice *l, size_t patch, float keep[COEFFICIENTS]) {
+static float shares_of(const struct lattice *l, size_t patch, float keep[PATCH_SIZE]) {
     float count = l->patch_count[patch], error = 0.0f;
-    float mixing = l->mixing[patch] * count / l->variance[patch] * (0.25f * COEFFICIENTS);
-    for (int k = 0; k < COEFFICIENTS; k++) {
+    float mixing = l->mixing[patch] * count / l->variance[patch] * (0.25f * PATCH_SIZE);
+    for (int k = 0; k < PATCH_SIZE; k++) {
         float noise = noise_of(l, patch, k), power = l->clipped[patch][k];
         if (power > TEXTURE_POWER * noise)
             power = l->around[patch][k];
         float texture = power > TEXTURE_POWER * noise ? power - NOISE_TAKEN * noise : 0.0f;
-        float own = l->power[patch][k] * count, all = noise + mixing / basis.octave_count[k];
+        float own = l->power[patch][k] * count, all = noise + mixing / l->basis->octave_count[k];
         keep[k] = texture > 0.0f ? texture / (texture + all) : 0.0f;
         if (own > CERTAIN_POWER * all)
             keep[k] = fmaxf(keep[k], 1.0f - all / own);
@@ -313,20 +248,20 @@ static float shares_of(const struct lattice *l, size_t patch, float keep[COEFFIC
 
 /* Adds what is kept to kept[channel], and what that is off to `error`, which may be NULL. */
 static void keep_texture(struct lattice *l, float *const kept[3], float *error) {
-    float keep[COEFFICIENTS];
+    float keep[PATCH_SIZE];
     for (size_t i = 0; i < patches_of(l); i++) {
         if (!(l->variance[i] > 0.0f))
             continue;
-        float off = shares_of(l, i, keep) / (0.25f * COEFFICIENTS);
+        float off = shares_of(l, i, keep) / (0.25f * PATCH_SIZE);
         for (int c = 0; c < 3; c++) {
-            for (int k = 0; k < COEFFICIENTS; k++)
+            for (int k = 0; k < PATCH_SIZE; k++)
                 l->value[c][i][k] *= keep[k];
             add_patch(l, i, l->value[c][i], kept[c]);
         }
         struct extent e = extent_of(l, i);
         for (long y = e.y0; error && y < e.y1; y++)
             for (long x = e.x0; x < e.x1; x++)
-                error[sample_of(l, &e, x, y)] += window_power(x, y) * off;
+                error[sample_of(l, &e, x, y)] += window_power(l, x, y) * off;
     }
 }
 
@@ -356,12 +291,10 @@ static void filter_lattice(const struct patch_spectrum *p, const struct noise_sh
 }
 
 void patch_spectrum_filter(struct patch_spectrum *p) {
-    static pthread_once_t once = PTHREAD_ONCE_INIT;
     size_t samples = p->width * p->height;
     float *kept[3];
     struct noise_shape shape;
-    pthread_once(&once, make_basis);
-    make_noise_shape(&shape, p->block > p->step ? p->block / p->step : 1);
+    make_noise_shape(&shape, patch_basis(), p->block > p->step ? p->block / p->step : 1);
     for (int c = 0; c < 3; c++) {
         kept[c] = mem_calloc(samples, sizeof *kept[c]);
         for (size_t i = 0; i < samples; i++) {
