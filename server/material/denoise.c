@@ -1,7 +1,8 @@
 /* denoise.c -- see denoise.h.
  *
- * The finest band of a chart's scales is filtered in tiles with a margin for the filters. The low-pass that it leaves is
- * sampled at every GRID-th texel a side, and the coarser bands of the whole chart are filtered on that grid. */
+ * The finest band of a chart's scales is filtered in tiles with a margin for the filters. The low-pass that it
+ * leaves is sampled at every GRID-th texel a side, and the coarser bands of the whole chart are filtered on that
+ * grid. */
 #include "server/material/denoise.h"
 
 #include <math.h>

@@ -1,12 +1,12 @@
 /* denoise.h -- removes the photographs' noise from base colour, and fills in texels that were not measured.
  *
- * Each chart is filtered scale by scale (wiener.h), from one texel up to the whole chart. The power of noise is known
- * from a sample of it: half of a texel's photographs less the other half (split_half.h), which preserves the
+ * Each chart is filtered scale by scale (wiener.h), from one texel up to the whole chart. The power of noise is
+ * known from a sample of it: half of a texel's photographs less the other half (split_half.h), which preserves the
  * correlation of noise between neighbouring texels. Where there is a single photograph, the sample is read from a
- * picture of pure noise (noise.h). Detail is kept by its share of texture: walls become flat, wood keeps its grain. A
- * texel's weight is its inverse noise variance, but in means no greater than texture allows (texture_variance.h); texels
- * of weight 0 are filled in from their neighbours, and charts without measurements from their prior. Nothing crosses the
- * border of a chart, hence none of a segment. */
+ * picture of pure noise (noise.h). Detail is kept by its share of texture: walls become flat, wood keeps its grain.
+ * A texel's weight is its inverse noise variance, but in means no greater than texture allows (texture_variance.h);
+ * texels of weight 0 are filled in from their neighbours, and charts without measurements from their prior. Nothing
+ * crosses the border of a chart, hence none of a segment. */
 #ifndef UNBAKE_MATERIAL_DENOISE_H
 #define UNBAKE_MATERIAL_DENOISE_H
 

@@ -48,8 +48,8 @@ static void make_noise_shape(struct noise_shape *shape, const struct patch_basis
         }
 }
 
-/* One of the step x step lattices of samples, and the patches over it: patch (i, j) begins at sample ((i - 1) PATCH_SHIFT, (j -
- * 1) PATCH_SHIFT) of the lattice. */
+/* One of the step x step lattices of samples, and the patches over it: patch (i, j) begins at sample ((i - 1)
+ * PATCH_SHIFT, (j - 1) PATCH_SHIFT) of the lattice. */
 struct lattice {
     const struct patch_spectrum *in;
     const struct patch_basis *basis;
@@ -227,8 +227,8 @@ static void measure_power(struct lattice *l) {
     sum_around(l, l->clipped[0], PATCH_SIZE);
 }
 
-/* What is kept of a patch's coefficients; returns the expected squared error of that. All powers are sums around but for
- * the patch's own. What neighbours share may be all in one coefficient of each octave. */
+/* What is kept of a patch's coefficients; returns the expected squared error of that. All powers are sums around but
+ * for the patch's own. What neighbours share may be all in one coefficient of each octave. */
 static float shares_of(const struct lattice *l, size_t patch, float keep[PATCH_SIZE]) {
     float count = l->patch_count[patch], error = 0.0f;
     float mixing = l->mixing[patch] * count / l->variance[patch] * (0.25f * PATCH_SIZE);

@@ -1,10 +1,10 @@
 /* patch_spectrum.h -- Wiener filter of a picture's details, by the spectra of its patches.
  *
- * Patches of 16 x 16 samples that overlap by half are transformed (patch_transform.h). Noise has much the same power at
- * all frequencies of one length, but for blocks of samples that share it, while texture has its own in few: stripes,
- * joints, weaves. So a coefficient is kept by its share of texture (Wiener 1949), whose power is that of the coefficient
- * over the patches around less that of a sample of the noise; or, where there is much more of it in this patch alone
- * than noise explains, by that (as hard thresholds do; Yaroslavsky, Egiazarian and Astola 2001).
+ * Patches of 16 x 16 samples that overlap by half are transformed (patch_transform.h). Noise has much the same power
+ * at all frequencies of one length, but for blocks of samples that share it, while texture has its own in few:
+ * stripes, joints, weaves. So a coefficient is kept by its share of texture (Wiener 1949), whose power is that of
+ * the coefficient over the patches around less that of a sample of the noise; or, where there is much more of it in
+ * this patch alone than noise explains, by that (as hard thresholds do; Yaroslavsky, Egiazarian and Astola 2001).
  *
  * Samples that are less certain than those around count for less: what they lack is taken from what a first filter
  * kept there, and all is filtered again. */

@@ -1,9 +1,9 @@
 /* texture_variance.h -- how much the base colour of a chart's texels varies beyond their noise.
  *
- * Texels with more weight are less noisy, but no better examples of what is around them. Where texture varies by T and a
- * texel's noise by s, it counts in means over its surroundings with 1 / (s + T), not with 1 / s: with that a few texels
- * of a patch of sun, a hundred times less noisy than the floor around, would colour it all. As between studies of one
- * effect (random effects; Paule and Mandel 1982). */
+ * Texels with more weight are less noisy, but no better examples of what is around them. Where texture varies by T
+ * and a texel's noise by s, it counts in means over its surroundings with 1 / (s + T), not with 1 / s: with that a
+ * few texels of a patch of sun, a hundred times less noisy than the floor around, would colour it all. As between
+ * studies of one effect (random effects; Paule and Mandel 1982). */
 #ifndef UNBAKE_MATERIAL_TEXTURE_VARIANCE_H
 #define UNBAKE_MATERIAL_TEXTURE_VARIANCE_H
 

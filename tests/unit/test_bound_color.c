@@ -1,6 +1,6 @@
-/* bound_color.h in closed form: where half of a segment is measured, a bound below its colour tells that colour, and one
- * far above that the texel is unlike it; where nothing is measured, the mean of what paint may be. Channels that are not
- * bounded, and segments without bounds, keep every bit. */
+/* bound_color.h in closed form: where half of a segment is measured, a bound below its colour tells that colour, and
+ * one far above that the texel is unlike it; where nothing is measured, the mean of what paint may be. Channels that
+ * are not bounded, and segments without bounds, keep every bit. */
 #include <math.h>
 #include <string.h>
 

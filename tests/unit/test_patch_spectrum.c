@@ -1,6 +1,7 @@
-/* patch_spectrum.h in closed form: of noise alone almost nothing is kept; of a wave in noise the share of texture; what
- * has no noise is kept as it is, on each of the lattices; one mark that noise does not explain stays in its place; where
- * samples are missing or hardly trusted, the wave goes on. Nothing depends on what is further than it says. */
+/* patch_spectrum.h in closed form: of noise alone almost nothing is kept; of a wave in noise the share of texture;
+ * what has no noise is kept as it is, on each of the lattices; one mark that noise does not explain stays in its
+ * place; where samples are missing or hardly trusted, the wave goes on. Nothing depends on what is further than it
+ * says. */
 #include "server/material/patch_spectrum.h"
 
 #include <math.h>
