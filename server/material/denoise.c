@@ -72,18 +72,15 @@ static void tile_read(struct wiener *t, const struct denoise_job *job, const str
             t->inside[at] = is_inside(job, item->chart, x, y);
             if (t->inside[at])
                 m = job->measured[(size_t)y * job->inverse->width + (size_t)x];
-            float weight = texture_variance_weight(&job->variance[item->chart], m.weight);
+            const struct texture_variance *of = &job->variance[item->chart];
+            bool is_measured = m.weight > 0.0f;
+            float weight = is_measured ? texture_variance_weight(of, m.weight) : 0.0f;
+            float variance = is_measured ? texture_variance_noise(of, m.weight) : 0.0f;
+            float mixing = image_float_from_half(m.mixing);
             rgb value = measurement_value(&m);
             rgb noise = rgb_from_half(m.noise);
-            const float plane[WIENER_PLANES] = {value.r,
-                                                value.g,
-                                                value.b,
-                                                noise.r,
-                                                noise.g,
-                                                noise.b,
-                                                image_float_from_half(m.mixing),
-                                                m.weight > 0.0f ? 1.0f / m.weight : 0.0f,
-                                                1.0f};
+            const float plane[WIENER_PLANES] = {value.r, value.g, value.b,  noise.r, noise.g,
+                                                noise.b, mixing,  variance, 1.0f};
             for (int p = 0; p < WIENER_PLANES; p++)
                 t->plane[p][at] = weight * plane[p];
             for (int c = 0; c < 3; c++)

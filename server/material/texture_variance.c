@@ -25,7 +25,7 @@ static struct chart_sums *sums_of(const struct atlas *atlas, const struct invers
         if (!(m->weight > 0.0f))
             continue;
         struct chart_sums *s = &sums[chart];
-        double noise = (double)(variance[chart].noise / m->weight);
+        double noise = (double)texture_variance_noise(&variance[chart], m->weight);
         double weight = 1.0 / (noise + (double)variance[chart].texture);
         rgb value = measurement_value(m);
         for (int c = 0; c < 3; c++)

@@ -24,6 +24,9 @@
  * for .84. */
 #define POWER_BOUND 9.0f
 
+/* A quotient of planes below it would be of denormal numbers. */
+#define MIN_WEIGHT 1e-30f
+
 /* The planes of scratch that have one value a sample. */
 #define WIENER_SCRATCH(w)                                                                                              \
     {                                                                                                                  \
@@ -140,7 +143,9 @@ static float detail_power(const struct details *d, int first, size_t at) {
     return power;
 }
 
-static bool counts(const struct details *d, size_t at) { return d->w->inside[at] && d->of[WIENER_WEIGHT][at] > 0.0f; }
+static bool counts(const struct details *d, size_t at) {
+    return d->w->inside[at] && d->of[WIENER_WEIGHT][at] > MIN_WEIGHT;
+}
 
 /* Of a sample's noise, up to a factor: after smoothing that of the samples that it is the mean of. */
 static float variance_of(const struct details *d, size_t at) {
@@ -235,7 +240,7 @@ static void smooth(struct wiener *w, size_t step) {
 static void fill(struct wiener *w) {
     for (size_t at = 0; at < w->width * w->height; at++) {
         float weight = w->plane[WIENER_WEIGHT][at];
-        if (!w->inside[at] || w->fine[WIENER_WEIGHT][at] > 0.0f || w->filled[at] > 0.0f || !(weight > 0.0f))
+        if (!w->inside[at] || w->fine[WIENER_WEIGHT][at] > 0.0f || w->filled[at] > 0.0f || !(weight > MIN_WEIGHT))
             continue;
         w->filled[at] = weight;
         for (int p = 0; p < WIENER_WEIGHT; p++)

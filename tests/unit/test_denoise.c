@@ -171,18 +171,18 @@ static void test_holes(void) {
     texture_release(&out);
 }
 
-/* A few texels of hardly any weight tell all of a chart. */
+/* Three texels, of usual weight, hardly any and next to none, tell all of a chart. */
 static void test_lonely(void) {
     for (uint32_t i = 0; i < TEXELS; i++)
         measured[i] = (struct measurement){0};
     for (uint32_t k = 0; k < 3; k++) {
         set(10 + 30 * k, 20 + 40 * k, 0.5f + 0.1f * (float)k, 0.01f, 0.0f);
-        measured[(20 + 40 * k) * WIDTH + 10 + 30 * k].weight = 1e-20f;
+        measured[(20 + 40 * k) * WIDTH + 10 + 30 * k].weight = k == 0 ? 1.0f : k == 1 ? 1e-16f : 1e-37f;
     }
     filter();
     for (uint32_t y = 0; y < HEIGHT; y++)
         for (uint32_t x = 0; x < WIDTH / 2 - 1; x++) {
-            CHECK_NEAR(out.texel[y * WIDTH + x][1], 0.6f, 0.15f);
+            CHECK_NEAR(out.texel[y * WIDTH + x][1], 0.6f, 0.2f);
             CHECK(isfinite(image_float_from_half(deviation[y * WIDTH + x])));
         }
     texture_release(&out);
