@@ -26,6 +26,9 @@
 
 #define LEAST_SHAPE 0.01f /* of noise at a frequency that blocks lack, which is not all white otherwise */
 
+/* Of a patch: what is hardly trusted has hardly any, but powers over it must not overflow. */
+#define LEAST_VARIANCE 1e-12f
+
 /* Power of noise by coefficient where that of blocks of samples is the same, up to a factor. */
 struct noise_shape {
     float of[PATCH_SIZE], sum[PATCH_LENGTHS]; /* sums over the coefficients of a length */
@@ -117,7 +120,7 @@ static void weigh_patch(struct lattice *l, size_t patch) {
             variance += w * l->in->variance[at];
             mixing += w * l->in->mixing[at];
         }
-    l->variance[patch] = variance / (0.25f * PATCH_SIZE);
+    l->variance[patch] = variance > 0.0f ? fmaxf(variance / (0.25f * PATCH_SIZE), LEAST_VARIANCE) : 0.0f;
     l->mixing[patch] = mixing / (0.25f * PATCH_SIZE);
 }
 

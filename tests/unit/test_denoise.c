@@ -188,6 +188,19 @@ static void test_lonely(void) {
     texture_release(&out);
 }
 
+/* Beside much noise almost none: sums over it, run on, must not end below 0. */
+static void test_silence(void) {
+    for (uint32_t y = 0; y < HEIGHT; y++)
+        for (uint32_t x = 0; x < WIDTH; x++) {
+            float noise = x % (WIDTH / 2) < 24 ? 3.0f : 1e-7f;
+            set(x, y, truth(x, y) + 0.01f * normal(8, y * WIDTH + x), noise * normal(9, y * WIDTH + x), 0.0f);
+        }
+    filter();
+    for (uint32_t i = 0; i < TEXELS; i++)
+        CHECK(isfinite(out.texel[i][1]) && isfinite(image_float_from_half(deviation[i])));
+    texture_release(&out);
+}
+
 /* What is missing beside an edge is like its side of it, not like their mean. */
 static void test_gap(void) {
     for (uint32_t y = 0; y < HEIGHT; y++)
@@ -245,6 +258,7 @@ int main(void) {
     test_holes();
     test_gap();
     test_lonely();
+    test_silence();
     test_prior();
     test_threads();
     parallel_free(pool);

@@ -139,6 +139,23 @@ static void test_trust(void) {
     }
 }
 
+/* Where nothing is trusted beside what is, or nothing has noise, all is finite. */
+static void test_hardly_trusted(void) {
+    set(1.0f, NOISE);
+    for (size_t i = 0; i < SAMPLES; i++)
+        if (i % WIDTH > 160) {
+            trust[i] = 1e-12f;
+            variance[i] = 1e-8f;
+        }
+    filter(1);
+    for (size_t i = 0; i < SAMPLES; i++)
+        CHECK(isfinite(value[1][i]) && isfinite(error[i]));
+    set(0.0f, 0.0f);
+    filter(1);
+    for (size_t i = 0; i < SAMPLES; i++)
+        CHECK(value[1][i] == 0.0f && error[i] == 0.0f);
+}
+
 /* Changes one sample, which is one with noise only in the first run. */
 static void test_reach(void) {
     static float before[WIDTH];
@@ -167,6 +184,7 @@ int main(void) {
     test_without_noise();
     test_mark();
     test_trust();
+    test_hardly_trusted();
     test_reach();
     return check_result();
 }
