@@ -74,9 +74,9 @@ static void tile_read(struct wiener *t, const struct denoise_job *job, const str
                 m = job->measured[(size_t)y * job->inverse->width + (size_t)x];
             const struct texture_variance *of = &job->variance[item->chart];
             bool is_measured = m.weight > 0.0f;
-            float weight = is_measured ? texture_variance_weight(of, m.weight) : 0.0f;
-            float variance = is_measured ? texture_variance_noise(of, m.weight) : 0.0f;
             float mixing = image_float_from_half(m.mixing);
+            float weight = is_measured ? texture_variance_weight(of, m.weight, mixing) : 0.0f;
+            float variance = is_measured ? texture_variance_noise(of, m.weight) : 0.0f;
             rgb value = measurement_value(&m);
             rgb noise = rgb_from_half(m.noise);
             const float plane[WIENER_PLANES] = {value.r, value.g, value.b,  noise.r, noise.g,

@@ -18,6 +18,8 @@
  * passage's 8-bit walls have specks on 5 % of their pixels in place of .9. */
 #define TEXTURE_POWER 3.0f
 #define NOISE_TAKEN 1.5f
+/* What is taken off an octave's power over that of its noise. */
+#define OCTAVE_NOISE 2.0f
 /* In variances of its noise: what a patch's power is clipped to, unless that leaves TEXTURE_POWER of texture around;
  * and from where it tells of texture by itself: 5.5 standard deviations of gray noise. 16 for 30: passage +-.05 dB, its
  * 8-bit walls' specks 2 % for .9. */
@@ -230,16 +232,37 @@ static void measure_power(struct lattice *l) {
     sum_around(l, l->clipped[0], PATCH_SIZE);
 }
 
+/* Power beyond noise of the coefficients of each octave, by their greater frequency, in the mean over them: of texture
+ * that is no stronger in some than in others. */
+static void octave_texture(const struct lattice *l, size_t patch, float texture[PATCH_SIDE]) {
+    for (int first = 0; first < PATCH_SIDE; first = first == 0 ? 1 : 2 * first) {
+        int end = first == 0 ? 1 : 2 * first;
+        float power = 0.0f, noise = 0.0f;
+        for (int k = 0; k < PATCH_SIZE; k++) {
+            int frequency = k / PATCH_SIDE > k % PATCH_SIDE ? k / PATCH_SIDE : k % PATCH_SIDE;
+            if (frequency < first || frequency >= end)
+                continue;
+            power += l->clipped[patch][k];
+            noise += noise_of(l, patch, k);
+        }
+        for (int f = first; f < end; f++)
+            texture[f] = fmaxf(power / noise - OCTAVE_NOISE, 0.0f);
+    }
+}
+
 /* What is kept of a patch's coefficients; returns the expected squared error of that. All powers are sums around but
  * for the patch's own. What neighbours share may be all in one coefficient of each octave. */
 static float shares_of(const struct lattice *l, size_t patch, float keep[PATCH_SIZE]) {
-    float count = l->patch_count[patch], error = 0.0f;
+    float count = l->patch_count[patch], error = 0.0f, octave[PATCH_SIDE];
     float mixing = l->mixing[patch] * count / l->variance[patch] * (0.25f * PATCH_SIZE);
+    octave_texture(l, patch, octave);
     for (int k = 0; k < PATCH_SIZE; k++) {
+        int frequency = k / PATCH_SIDE > k % PATCH_SIDE ? k / PATCH_SIDE : k % PATCH_SIDE;
         float noise = noise_of(l, patch, k), power = l->clipped[patch][k];
         if (power > TEXTURE_POWER * noise)
             power = l->around[patch][k];
         float texture = power > TEXTURE_POWER * noise ? power - NOISE_TAKEN * noise : 0.0f;
+        texture = fmaxf(texture, octave[frequency] * noise);
         float own = l->power[patch][k] * count, all = noise + mixing / l->basis->octave_count[k];
         keep[k] = texture > 0.0f ? texture / (texture + all) : 0.0f;
         if (own > CERTAIN_POWER * all)

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "common/image.h"
 #include "common/mem.h"
 
 #define ROUNDS 4           /* of the fixed point */
@@ -25,7 +26,7 @@ static struct chart_sums *sums_of(const struct atlas *atlas, const struct invers
         if (!(m->weight > 0.0f))
             continue;
         struct chart_sums *s = &sums[chart];
-        double noise = (double)texture_variance_noise(&variance[chart], m->weight);
+        double noise = (double)(texture_variance_noise(&variance[chart], m->weight) + image_float_from_half(m->mixing));
         double weight = 1.0 / (noise + (double)variance[chart].texture);
         rgb value = measurement_value(m);
         for (int c = 0; c < 3; c++)

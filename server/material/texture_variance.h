@@ -29,9 +29,9 @@ static inline float texture_variance_noise(const struct texture_variance *v, flo
     return fminf(fmaxf(v->noise / weight, 1e-8f), 100.0f);
 }
 
-/* Its weight in means over its surroundings, in (0, 1]. */
-static inline float texture_variance_weight(const struct texture_variance *v, float weight) {
-    return v->texture / (texture_variance_noise(v, weight) + v->texture);
+/* Its weight in means over its surroundings, in (0, 1]; `mixing`: variance by light of other surfaces. */
+static inline float texture_variance_weight(const struct texture_variance *v, float weight, float mixing) {
+    return v->texture / (texture_variance_noise(v, weight) + mixing + v->texture);
 }
 
 #endif

@@ -18,8 +18,9 @@
  * staircase2 among 2, 1 and .6: of the demo room's errors (256 texels, all measured) 81, 77 and 74 % are within one
  * deviation. No other room has judged it. */
 #define UNRESOLVED 0.6f
-/* Clipped power over noise power from which samples above POWER_BOUND count as texture, not as outliers. */
-#define TEXTURE_CERTAIN 2.0f
+/* Share of the samples around that exceed POWER_BOUND from which these are texture, not outliers: of normal noise 1e-5
+ * do. */
+#define TEXTURE_SHARE 0.1f
 /* Clip of a sample's power, in variances of its noise: 3 standard deviations; 4: within .05 dB, passage's specks 1.04 %
  * for .84. */
 #define POWER_BOUND 9.0f
@@ -31,7 +32,7 @@
 #define WIENER_SCRATCH(w)                                                                                              \
     {                                                                                                                  \
         &(w)->error, &(w)->power, &(w)->bounded_power, &(w)->noise_power, &(w)->relative_noise, &(w)->weight_sum,      \
-            &(w)->count, &(w)->trust, &(w)->variance, &(w)->mixing, &(w)->filled, &(w)->scratch                        \
+            &(w)->count, &(w)->trust, &(w)->variance, &(w)->mixing, &(w)->filled, &(w)->outliers, &(w)->scratch        \
     }
 
 void wiener_init(struct wiener *w, size_t samples) {
@@ -185,15 +186,15 @@ static void measure_power(const struct details *d, size_t radius) {
         }
         w->power[at] = d->of[WIENER_WEIGHT][at] * power;
         w->bounded_power[at] = d->of[WIENER_WEIGHT][at] * fminf(power, bound);
+        w->outliers[at] = power > bound ? 1.0f : 0.0f;
     }
+    window_sums(w->outliers, w->scratch, w->width, w->height, radius);
     window_sums(w->power, w->scratch, w->width, w->height, radius);
     window_sums(w->bounded_power, w->scratch, w->width, w->height, radius);
 }
 
 /* Whether what is far off around a sample is texture: then it is too much to be outliers. */
-static bool is_texture(const struct wiener *w, size_t at) {
-    return w->bounded_power[at] >= TEXTURE_CERTAIN * w->noise_power[at];
-}
+static bool is_texture(const struct wiener *w, size_t at) { return w->outliers[at] > TEXTURE_SHARE * w->count[at]; }
 
 /* --- what was too fine ---------------------------------------------------------------------------- */
 

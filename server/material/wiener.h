@@ -34,7 +34,7 @@ struct wiener {
     float *error;                /* expected squared error of these, summed over channels and bands */
     float *fine[WIENER_PLANES], *coarse[WIENER_PLANES]; /* scratch, as all below */
     float *power, *bounded_power, *noise_power, *relative_noise, *weight_sum, *count;
-    float *trust, *variance, *mixing, *filled, *scratch;
+    float *trust, *variance, *mixing, *filled, *outliers, *scratch;
 };
 
 /* Room for `samples` of them; width and height are to be set, with width * height <= samples. */

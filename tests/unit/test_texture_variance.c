@@ -38,9 +38,11 @@ int main(void) {
     CHECK_NEAR(v[0].texture, wanted, 0.05f * wanted); /* 8,192 texels: a relative error of .016 */
     CHECK_NEAR(v[0].noise, 3.0f, 0.1f);
     CHECK_THAT(v[1].texture < 0.003f, "%g", (double)v[1].texture); /* a tenth of the noise */
-    float certain = texture_variance_weight(&v[0], 1.0f / (1e-4f * noise * noise)),
-          usual = texture_variance_weight(&v[0], 1.0f / (noise * noise));
+    float certain = texture_variance_weight(&v[0], 1.0f / (1e-4f * noise * noise), 0.0f),
+          usual = texture_variance_weight(&v[0], 1.0f / (noise * noise), 0.0f);
     CHECK_NEAR(certain / usual, (texture * texture + noise * noise) / (texture * texture), 0.05f);
+    float mixed = texture_variance_weight(&v[0], 1.0f / (noise * noise), 3.0f * noise * noise);
+    CHECK_NEAR(usual / mixed, (texture * texture + 2.0f * noise * noise) / (texture * texture + noise * noise), 0.05f);
     mem_free(v);
     return check_result();
 }
