@@ -153,8 +153,8 @@ static float variance_of(const struct details *d, size_t at) {
     return d->of[WIENER_VARIANCE][at] / d->of[WIENER_WEIGHT][at];
 }
 
-/* Noise variance of a sample's detail: its own, up to the factor that the noise around tells, whose running sums may end
- * a little below 0. */
+/* Noise variance of a sample's detail: its own, up to the factor that the noise around tells, whose running sums may
+ * end a little below 0. */
 static float noise_variance(const struct details *d, size_t at) {
     return fmaxf(d->w->relative_noise[at], 0.0f) / d->w->count[at] * variance_of(d, at);
 }
