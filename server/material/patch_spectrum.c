@@ -232,6 +232,12 @@ static void measure_power(struct lattice *l) {
     sum_around(l, l->clipped[0], PATCH_SIZE);
 }
 
+/* Of a coefficient's two. */
+static int greater_frequency(int coefficient) {
+    int y = coefficient / PATCH_SIDE, x = coefficient % PATCH_SIDE;
+    return x > y ? x : y;
+}
+
 /* Power beyond noise of the coefficients of each octave, by their greater frequency, in the mean over them: of texture
  * that is no stronger in some than in others. */
 static void octave_texture(const struct lattice *l, size_t patch, float texture[PATCH_SIDE]) {
@@ -239,8 +245,7 @@ static void octave_texture(const struct lattice *l, size_t patch, float texture[
         int end = first == 0 ? 1 : 2 * first;
         float power = 0.0f, noise = 0.0f;
         for (int k = 0; k < PATCH_SIZE; k++) {
-            int frequency = k / PATCH_SIDE > k % PATCH_SIDE ? k / PATCH_SIDE : k % PATCH_SIDE;
-            if (frequency < first || frequency >= end)
+            if (greater_frequency(k) < first || greater_frequency(k) >= end)
                 continue;
             power += l->clipped[patch][k];
             noise += noise_of(l, patch, k);
@@ -257,12 +262,11 @@ static float shares_of(const struct lattice *l, size_t patch, float keep[PATCH_S
     float mixing = l->mixing[patch] * count / l->variance[patch] * (0.25f * PATCH_SIZE);
     octave_texture(l, patch, octave);
     for (int k = 0; k < PATCH_SIZE; k++) {
-        int frequency = k / PATCH_SIDE > k % PATCH_SIDE ? k / PATCH_SIDE : k % PATCH_SIDE;
         float noise = noise_of(l, patch, k), power = l->clipped[patch][k];
         if (power > TEXTURE_POWER * noise)
             power = l->around[patch][k];
         float texture = power > TEXTURE_POWER * noise ? power - NOISE_TAKEN * noise : 0.0f;
-        texture = fmaxf(texture, octave[frequency] * noise);
+        texture = fmaxf(texture, octave[greater_frequency(k)] * noise);
         float own = l->power[patch][k] * count, all = noise + mixing / l->basis->octave_count[k];
         keep[k] = texture > 0.0f ? texture / (texture + all) : 0.0f;
         if (own > CERTAIN_POWER * all)

@@ -98,6 +98,18 @@ static void test_wave(void) {
     CHECK_THAT(stated > 0.5 * off && stated < 2.0 * off, "%g is stated of %g", stated, off);
 }
 
+/* Texture that is as strong at all frequencies, of 1.5 times the power of the noise: no coefficient stands out. */
+static void test_even_texture(void) {
+    double off, stated, kept;
+    set(0.0f, NOISE);
+    for (size_t i = 0; i < SAMPLES; i++)
+        for (uint32_t c = 0; c < 3; c++)
+            value[c][i] += sqrtf(1.5f) * NOISE * normal(7 + c, (uint32_t)i);
+    filter(1);
+    sums(0.0f, &off, &stated, &kept);
+    CHECK_THAT(kept > 0.15 * (double)(NOISE * NOISE), "of even texture %.2g is kept", kept / (double)(NOISE * NOISE));
+}
+
 static void test_without_noise(void) {
     for (size_t step = 1; step <= 3; step++) {
         set(1.0f, 0.0f);
@@ -181,6 +193,7 @@ int main(void) {
     test_noise();
     test_blocks();
     test_wave();
+    test_even_texture();
     test_without_noise();
     test_mark();
     test_trust();
