@@ -11,7 +11,7 @@
 #include "server/material/measurement.h"
 #include "server/scene/surface.h"
 
-/* Replaces the values of those of measured[height][width] whose `bounds` say so. */
+/* Replaces the values of those of measured[height][width] whose `bounds` say so; adds their variance to `mixing`. */
 void bound_color_settle(const struct surface *surface, struct measurement *measured);
 
 #endif

@@ -17,6 +17,7 @@
 #define FINE_STEP 1   /* texels: of the first band, filtered by tiles; the rest on the grid */
 #define GRID 4        /* texels between samples of the coarse scales: a quarter of their finest octave's step */
 #define COARSE_STEP 2 /* samples of the grid: step of the first coarse band */
+
 enum { SMOOTH_ERROR = 3, SMOOTH };
 
 struct box {

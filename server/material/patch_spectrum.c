@@ -251,7 +251,7 @@ static void octave_texture(const struct lattice *l, size_t patch, float texture[
             noise += noise_of(l, patch, k);
         }
         for (int f = first; f < end; f++)
-            texture[f] = fmaxf(power / noise - OCTAVE_NOISE, 0.0f);
+            texture[f] = noise > 0.0f ? fmaxf(power / noise - OCTAVE_NOISE, 0.0f) : 0.0f;
     }
 }
 

@@ -13,7 +13,9 @@
 
 #include <stddef.h>
 
-#define PATCH_SPECTRUM_REACH 104 /* steps within which lies all that what is kept of a sample depends on */
+/* Steps within which lies all that what is kept of a sample depends on. In a first filter 64: patches around those that
+ * hold it, and those around them, which tell their noise. In the second 40: patches around, filled in by the first. */
+#define PATCH_SPECTRUM_REACH 104
 
 /* Planes are [height][width]; the caller's. Samples that are missing have trust 0 and value 0. */
 struct patch_spectrum {

@@ -278,8 +278,9 @@ static float clip_of(const struct details *d, size_t at) {
 /* Samples that count for less than those around are trusted by that share; filled ones, which are means, wholly. */
 static float trust_of(const struct details *d, size_t at) {
     const struct wiener *w = d->w;
-    float usual = w->weight_sum[at] / w->count[at];
-    return w->filled[at] > 0.0f ? 1.0f : fminf(1.0f, d->of[WIENER_WEIGHT][at] / usual);
+    float weight = d->of[WIENER_WEIGHT][at];
+    float usual = fmaxf(w->weight_sum[at], weight) / w->count[at]; /* a running sum may lose what is small */
+    return w->filled[at] > 0.0f ? 1.0f : fminf(1.0f, weight / usual);
 }
 
 /* Of the details, in the place of `fine`, what is kept. */

@@ -39,7 +39,7 @@ struct placing {
 };
 
 /* Diffuse radiance, Lambert radiance without the sun, and response to the sun; weight 0 where base colour was not
- * measured. */
+ * measured, or is only bounded. */
 static void place_texel(void *user, size_t index, int thread) {
     (void)thread;
     const struct placing *job = user;
