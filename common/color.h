@@ -63,8 +63,8 @@ void color_matrix_d50(const double xyz[3][3], float matrix[3][3], bool *is_same)
 /* Converts `count` pixels of `stride` values, the first three of which are stored values in [0, 1]. `outside` counts
  * pixels outside of Rec. 709. */
 void color_convert(const struct color *color, float *pixel, size_t stride, size_t count, size_t *outside);
-/* The same for linear values, by a matrix only. Values from `ceiling` on are lower bounds: where all three are they stay
- * as they are, since white is white in both; where some are the others cannot be told, and all become NaN. */
+/* The same for linear values, by a matrix only. Values from `ceiling` on are lower bounds: where all three are they
+ * stay as they are, since white is white in both; where some are the others cannot be told, and all become NaN. */
 void color_multiply(const float matrix[3][3], float ceiling, float *pixel, size_t stride, size_t count,
                     size_t *outside);
 

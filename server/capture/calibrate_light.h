@@ -28,10 +28,10 @@ struct light_found {
     double spread_before, spread_after; /* rms deviation of log radiance from the mean of its point, all channels */
 };
 
-/* Sets exposure, gain and vignette of the training photographs, the vignette of all, starting from their present values,
- * and straightens the pixels of all, once (photograph.is_straight). `faults`: LIGHT_* that may be there; with none only
- * unknown exposures are solved. Gauge: where nothing determines the mean of G, it is 0. The same for any number of
- * threads. */
+/* Sets exposure, gain and vignette of the training photographs, the vignette of all, starting from their present
+ * values, and straightens the pixels of all, once (photograph.is_straight). `faults`: LIGHT_* that may be there; with
+ * none only unknown exposures are solved. Gauge: where nothing determines the mean of G, it is 0. The same for any
+ * number of threads. */
 void calibrate_light(struct scene *scene, const struct views *views, const struct atlas *atlas,
                      const struct inverse_uv *inverse, int faults, struct parallel *pool, struct light_found *found);
 

@@ -10,7 +10,8 @@
  * so it commutes with the projection.
  *
  * A curve that pressed all observations of a point together would make them agree. So the cost by which they are judged
- * is that of the stored values, F's argument, and the basis is taken where the others of the point foretell the value. */
+ * is that of the stored values, F's argument, and the basis is taken where the others of the point foretell the
+ * value. */
 #include "server/capture/light_fit.h"
 
 #include <math.h>
@@ -30,9 +31,9 @@
 #define DRIFT_SIGMA 0.2            /* +25 %: no change */
 #define COLOR_SIGMA 0.2            /* +25 %: no change */
 #define VIGNETTE_SIGMA 0.5         /* +25 %: no change */
-/* Of the power of a tone curve, and of each term of its shape. An S of .6 of smoothstep has .28; .05, .03, 0. Frames of a
- * few exposures far apart leave a shape open that repeats from one to the next (Grossberg and Nayar 2003): the prior of
- * shapes is as strong as if all observations of a photograph, which share errors, were one. */
+/* Of the power of a tone curve, and of each term of its shape. An S of .6 of smoothstep has .28; .05, .03, 0. Frames of
+ * a few exposures far apart leave a shape open that repeats from one to the next (Grossberg and Nayar 2003): the prior
+ * of shapes is as strong as if all observations of a photograph, which share errors, were one. */
 #define TONE_POWER_SIGMA 0.3
 #define TONE_SHAPE_SIGMA 0.1
 
@@ -237,8 +238,8 @@ static void solve_linear(const struct light_fit *f, int model, double *x) {
 
 /* --- robustness --------------------------------------------------------------------------------- */
 
-/* What straightened observations of a point are off by, from the mean by these weights; NAN where all of them are 0. Both
- * arrays [observations of the point]. */
+/* What straightened observations of a point are off by, from the mean by these weights; NAN where all of them are 0.
+ * Both arrays [observations of the point]. */
 static void find_errors(const struct light_fit *f, const double *x, size_t point, int channel, const double *weight,
                         double *off) {
     size_t first = f->o->start[point], count = f->o->start[point + 1] - first;

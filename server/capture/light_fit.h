@@ -1,9 +1,9 @@
-/* light_fit.h -- the equations behind calibrate_light.h: exposure, colour, vignette and tone curve that make photographs
- * agree where they overlap, for a given set of faults.
+/* light_fit.h -- the equations behind calibrate_light.h: exposure, colour, vignette and tone curve that make
+ * photographs agree where they overlap, for a given set of faults.
  *
  * Parameters x are in logarithms: G[f][c] of each training photograph f and channel c, then v of the vignette, then the
- * terms of the tone curve. Robust: observations far from their point's mean lose weight. Held-out points take part in no
- * solve and judge it. */
+ * terms of the tone curve. Robust: observations far from their point's mean lose weight. Held-out points take part in
+ * no solve and judge it. */
 #ifndef UNBAKE_CAPTURE_LIGHT_FIT_H
 #define UNBAKE_CAPTURE_LIGHT_FIT_H
 
@@ -22,12 +22,12 @@
  * (Holland & Welsch 1977); less, since highlights are many. */
 #define LIGHT_CAUCHY 0.25 /* +25 %: no change */
 
-/* A model is a set of faults; parameters of the others are held at 0. Tones are tried first, right after the fit without
- * them, by which `usable` is. */
+/* A model is a set of faults; parameters of the others are held at 0. Tones are tried first, right after the fit
+ * without them, by which `usable` is. */
 enum { LIGHT_TONES = 1, LIGHT_DRIFT = 2, LIGHT_COLOR = 4, LIGHT_VIGNETTE = 8, LIGHT_ALL = 15 };
 
-/* An observation under the tone curve F of the newest solution, by channel; s: log of its stored value, and p of the one
- * that the others of its point foretell. */
+/* An observation under the tone curve F of the newest solution, by channel; s: log of its stored value, and p of the
+ * one that the others of its point foretell. */
 struct light_bend {
     float basis[3][TONE_TERMS]; /* at p, which is nearer to the truth than s */
     float added[3];             /* F(s) - s; without it the value is that of a camera without a curve */
@@ -75,8 +75,8 @@ double light_fit_value(const struct light_fit *f, size_t observation, int channe
 bool light_fit_bend(struct light_fit *f, const double *x);
 
 /* Squared residuals of a point's observations over their expected variance, about the L that weight[] gives; INFINITY
- * where the prediction is too dark or too bright for the photograph. Under a curve those stay so that were without, since
- * a curve could leave out what it does not explain. Both arrays [observations of the point]. */
+ * where the prediction is too dark or too bright for the photograph. Under a curve those stay so that were without,
+ * since a curve could leave out what it does not explain. Both arrays [observations of the point]. */
 void light_fit_residuals(const struct light_fit *f, int model, const double *x, size_t point, const double *weight,
                          double *square);
 

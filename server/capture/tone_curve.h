@@ -1,8 +1,8 @@
 /* tone_curve.h -- what a camera does to tones beyond sRGB: an S that makes shadows darker and highlights brighter, a
  * shoulder that holds highlights back.
  *
- * Stored values v are those of photograph.h, linear if the file is sRGB. With s = log v a camera with a curve stores what
- * is in truth
+ * Stored values v are those of photograph.h, linear if the file is sRGB. With s = log v a camera with a curve stores
+ * what is in truth
  *
  *      F(s) = s + sum_k term_k b_k(s),
  *

@@ -1,9 +1,10 @@
 /* unseen_space.h -- where what no photograph shows begins: the border of the space that cameras look into.
  *
- * A scan has no surface behind a cornice, under a cupboard or above a lintel, since no camera sees it. Space is cut into
- * cubes; one is seen if some training camera sees into it past the mesh. A face between a seen cube and an unseen one
- * with no mesh between them is part of the border: light may come from there (hole filling by space carving, Curless
- * and Levoy 1996, has surface there). The faces stand a quarter of a cube deeper than that, so that no camera sees them. */
+ * A scan has no surface behind a cornice, under a cupboard or above a lintel, since no camera sees it. Space is cut
+ * into cubes; one is seen if some training camera sees into it past the mesh. A face between a seen cube and an unseen
+ * one with no mesh between them is part of the border: light may come from there (hole filling by space carving,
+ * Curless and Levoy 1996, has surface there). The faces stand a quarter of a cube deeper than that, so that no camera
+ * sees them. */
 #ifndef UNBAKE_CAPTURE_UNSEEN_SPACE_H
 #define UNBAKE_CAPTURE_UNSEEN_SPACE_H
 

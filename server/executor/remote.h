@@ -8,7 +8,8 @@
  *    through, its reply does not decide alone: a failed one is found by name in the site's listing, and repeated, under
  *    another name and token, only after REMOTE_ABSENT_MAX good listings without it.
  * 2. A status command that fails, comes too late or says nothing that can be understood changes nothing.
- * 3. An attempt is lost when REMOTE_UNKNOWN_MAX listings in a row do not have it alive, and its node has been silent for
+ * 3. An attempt is lost when REMOTE_UNKNOWN_MAX listings in a row do not have it alive, and its node has been silent
+ * for
  *    one and a half of its lease; both by a monotonic clock, which begins anew with the daemon. Then its row is closed,
  *    which shuts its node out, and only after its last writer has left it has ended.
  * 4. What the site has ended for its own reasons (pre-empted, out of time, a broken node), or started again, counts as

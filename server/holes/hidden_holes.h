@@ -10,7 +10,8 @@
 #include "server/holes/hole_regions.h"
 
 /* Appends them to `holes`, once hole_regions_find has found the others, and gives their cells their region's number;
- * those beside a hole that photographs show become a part of it. The mesh stays as it is (hole_surface.h adds to it). */
+ * those beside a hole that photographs show become a part of it. The mesh stays as it is (hole_surface.h adds to
+ * it). */
 void hidden_holes_add(struct hole_regions *holes, struct hole_grid *grid, const struct mesh *mesh,
                       const struct accel *accel);
 

@@ -13,9 +13,9 @@
 uint16_t *photo_pixels_table(void);
 
 /* Fill photo->pixel, and count in *faults. Linear values from the largest number of half precision on become lower
- * bounds, as clipped ones, unless they are connected with pixels that are no numbers: light never makes these, so all of
- * such a patch is a fault, and none of it is used. Negative values (from filters or colours outside of Rec. 709) become
- * 0. */
+ * bounds, as clipped ones, unless they are connected with pixels that are no numbers: light never makes these, so all
+ * of such a patch is a fault, and none of it is used. Negative values (from filters or colours outside of Rec. 709)
+ * become 0. */
 void photo_pixels_from_srgb(const uint16_t *half_of_srgb, const struct image *image, struct photograph *photo);
 void photo_pixels_from_linear(const struct image *image, const struct image_info *info, struct photograph *photo,
                               struct photo_faults *faults);

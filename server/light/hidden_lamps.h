@@ -15,8 +15,8 @@ bool hidden_lamps_any(const struct light_model *m);
 /* Adds hidden lamps to a model that was surveyed. */
 void hidden_lamps_find(struct light_model *m);
 
-/* Seeks them also where a scan has no surface: among the parts of the border of what photographs do not show. Those that
- * are lamps: part[LIGHT_MAX], their number is the result. */
+/* Seeks them also where a scan has no surface: among the parts of the border of what photographs do not show. Those
+ * that are lamps: part[LIGHT_MAX], their number is the result. */
 size_t hidden_lamps_find_parts(struct light_model *m, const struct unseen_space *space, uint32_t part[LIGHT_MAX]);
 
 #endif

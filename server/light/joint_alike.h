@@ -4,7 +4,7 @@
  * smoothly, and the likelihood's slope by it is a sum of the patches' scores, weighted with its share w of their light,
  * whose variance is that of independent scores times
  *
- *     V = sum over p, q of w_p s_p w_q s_q / sum over p of (w_p s_p)^2     p, q of one segment, less than a radius apart
+ *     V = sum over p, q of w_p s_p w_q s_q / sum over p of (w_p s_p)^2    p, q of one segment, less than a radius apart
  *
  * (the estimator of Conley 1999 with a uniform kernel). Logarithms of likelihood ratios divided by V are those of a
  * model that knows, and so are variances multiplied by V. */

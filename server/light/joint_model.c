@@ -71,7 +71,8 @@ struct joint_white_bound joint_white_bound(double beyond, double variance) {
     return (struct joint_white_bound){t_loss(e), weight * beyond, weight};
 }
 
-/* What a point contributes, for a residual in deviations: to the loss, its derivative, and a curvature that is positive. */
+/* What a point contributes, for a residual in deviations: to the loss, its derivative, and a curvature that is
+ * positive. */
 struct pull {
     double loss, slope, weight;
 };

@@ -1,8 +1,9 @@
 /* light_estimate.h -- the light that photographs do not measure, estimated from what it lights, all of it together.
  *
  * Its sources are lamps that no photograph shows, lamps and sky at which every photograph saturates, and a sun in whose
- * light every photograph does (light_model.h). They get the radiances under which base colours are most plausible (joint_fit.h); light of unseen
- * sky, of unseen surfaces and of lamps that are seen is fitted with them, within its uncertainty, but left as it is. */
+ * light every photograph does (light_model.h). They get the radiances under which base colours are most plausible
+ * (joint_fit.h); light of unseen sky, of unseen surfaces and of lamps that are seen is fitted with them, within its
+ * uncertainty, but left as it is. */
 #ifndef UNBAKE_LIGHT_LIGHT_ESTIMATE_H
 #define UNBAKE_LIGHT_LIGHT_ESTIMATE_H
 
@@ -11,7 +12,8 @@
 #include "server/state/reconstruction.h"
 
 /* Needs fused radiance, and a world lit by r->environment if that has a map. Fills r->evidence of hidden and saturated
- * lamps, r->light, r->sun where it saturates what it lights, and brightens saturated directions of the environment. The same for any number of threads. */
+ * lamps, r->light, r->sun where it saturates what it lights, and brightens saturated directions of the environment. The
+ * same for any number of threads. */
 void light_estimate(struct reconstruction *r, const struct views *views);
 
 /* The same for the sources that were found, with the outgoing radiance of `field`, which unobserved texels have too.

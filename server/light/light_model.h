@@ -31,16 +31,16 @@ void light_model_release(struct light_model *m);
 void light_model_survey(struct light_model *m, const struct views *views, const struct light_field *field,
                         const struct fused *observed);
 
-/* Adds to the deviations of m->joint what a highlight may add to albedo, which makes dark surfaces less alike, and fills
- * m->albedo. How dark a segment is is judged once, by the sources' priors (light_model_survey calls it): were it judged
- * by the fit, light that makes all dark would explain anything. */
+/* Adds to the deviations of m->joint what a highlight may add to albedo, which makes dark surfaces less alike, and
+ * fills m->albedo. How dark a segment is is judged once, by the sources' priors (light_model_survey calls it): were it
+ * judged by the fit, light that makes all dark would explain anything. */
 void light_model_allow_for_highlights(struct light_model *m);
 
 /* Adds to column[points.count] the response of a hidden lamp: its own light and what unseen surfaces reflect of it. */
 void light_model_respond_hidden(const struct light_model *m, uint32_t segment, float *column);
 
-/* The median albedo of what is measured of each segment, at the fit's values. albedo[segment_count] stays as it is where
- * nothing is. */
+/* The median albedo of what is measured of each segment, at the fit's values. albedo[segment_count] stays as it is
+ * where nothing is. */
 void light_model_find_albedos(const struct light_model *m, float *albedo);
 
 /* How many patches are worth one to the source that was added last, at the fit's values (joint_alike.h). */

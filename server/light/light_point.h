@@ -31,8 +31,8 @@ struct light_points {
     vec3 least, most;          /* corners of the room */
 };
 
-/* The edge of patches in a room, and the patch of a place: a cube of that edge, from the corner `least` of the room, and
- * which way its surface faces. */
+/* The edge of patches in a room, and the patch of a place: a cube of that edge, from the corner `least` of the room,
+ * and which way its surface faces. */
 float light_patch_edge(const struct mesh *mesh);
 uint32_t light_patch(const struct surface_point *at, vec3 least, float edge_m);
 

@@ -1,7 +1,7 @@
 /* light_priors.h -- what every estimate of light assumes of a room before it looks at it, each named once.
  *
- * *_DEVIATION and the like are standard deviations of natural logarithms: .7 is a factor of two. Of the room: the median
- * radiance that photographs show. README.md says how far results move with them. */
+ * *_DEVIATION and the like are standard deviations of natural logarithms: .7 is a factor of two. Of the room: the
+ * median radiance that photographs show. README.md says how far results move with them. */
 #ifndef UNBAKE_LIGHT_LIGHT_PRIORS_H
 #define UNBAKE_LIGHT_LIGHT_PRIORS_H
 
@@ -36,7 +36,8 @@
  * observed radiances differ by less look alike. */
 #define SEEN_DEVIATION 0.1
 
-/* An opening of a scan over the room: most of what lies behind is dark, or no brighter than the room, some are lamps. */
+/* An opening of a scan over the room: most of what lies behind is dark, or no brighter than the room, some are
+ * lamps. */
 #define OPENING_OVER_ROOM 0.1
 
 /* What is filled in, of the sky and of surfaces that no photograph shows: right within a factor of two. */

@@ -9,8 +9,8 @@
  * follow. */
 void light_solve(struct light_model *m);
 
-/* The same, and saturated lamps that white paint in this light would show as well become surfaces that reflect: as much as
- * makes them saturate, or more. */
+/* The same, and saturated lamps that white paint in this light would show as well become surfaces that reflect: as much
+ * as makes them saturate, or more. */
 void light_solve_deciding(struct light_model *m);
 
 #endif

@@ -15,11 +15,11 @@
 #include "server/capture/views.h"
 #include "server/state/reconstruction.h"
 
-/* Needs fused radiance, and a world lit by r->environment if that has a map. Does nothing unless r->is_surrounded, which
- * it takes back where most of the room was not scanned. Sets r->openings and r->light.source, takes r->environment
- * away, and returns the number of new segments, each a quad (added_surface.h), the last ones of the mesh. Where there are
- * any, the mesh's arrays may have moved, and what was made of mesh and segments must be made again. The same for any
- * number of threads. */
+/* Needs fused radiance, and a world lit by r->environment if that has a map. Does nothing unless r->is_surrounded,
+ * which it takes back where most of the room was not scanned. Sets r->openings and r->light.source, takes
+ * r->environment away, and returns the number of new segments, each a quad (added_surface.h), the last ones of the
+ * mesh. Where there are any, the mesh's arrays may have moved, and what was made of mesh and segments must be made
+ * again. The same for any number of threads. */
 size_t openings_find(struct reconstruction *r, const struct views *views);
 
 #endif

@@ -34,9 +34,9 @@ void survey_init(struct survey *s, struct reconstruction *r, const struct views 
                  const bool *without, bool with_bounds, size_t points);
 void survey_release(struct survey *s);
 
-/* Light at a texel's place `at`, by `rays` rays from a little inside of its triangle: a texel whose centre lies beside it
- * stands for a point of its edge, from where rays pass between two walls. In scratch[thread] is what the rays found. False
- * where there is no place. Thread-safe for different threads. */
+/* Light at a texel's place `at`, by `rays` rays from a little inside of its triangle: a texel whose centre lies beside
+ * it stands for a point of its edge, from where rays pass between two walls. In scratch[thread] is what the rays found.
+ * False where there is no place. Thread-safe for different threads. */
 bool survey_gather(const struct survey *s, uint32_t texel, size_t rays, int thread, struct surface_point *at,
                    struct irradiance *light);
 

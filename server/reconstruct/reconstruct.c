@@ -76,8 +76,8 @@ static enum status prepare(struct stage_run *run, struct error *err) {
     return prepare_run(run->r, &run->views, &run->pace, err);
 }
 
-/* Makes again what was made of the mesh, and fuses again what photographs show, if surface was added to it. All that was
- * added, the triangles from `scanned` on, is coarse. */
+/* Makes again what was made of the mesh, and fuses again what photographs show, if surface was added to it. All that
+ * was added, the triangles from `scanned` on, is coarse. */
 static enum status take_up_surface(struct stage_run *run, bool was_added, size_t scanned, struct error *err) {
     struct reconstruction *r = run->r;
     if (!was_added)

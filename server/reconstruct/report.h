@@ -7,8 +7,8 @@
 #include "server/state/reconstruction.h"
 
 /* Renders every held-out view into r->held_out and adds "views" and "metrics" to r->report. A photograph of unknown
- * exposure is compared at the exposure that fits it best; so it is in all, and in white balance, where these drift. By how
- * much whole views are too bright or dark tells how well the light is known: it is added to r->materials.spread.
+ * exposure is compared at the exposure that fits it best; so it is in all, and in white balance, where these drift. By
+ * how much whole views are too bright or dark tells how well the light is known: it is added to r->materials.spread.
  * STATUS_CANCELLED when stopped. */
 enum status report_held_out(struct reconstruction *r, const struct views *views, const struct pace *pace,
                             struct error *err);

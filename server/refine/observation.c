@@ -44,9 +44,9 @@ void observation_batch_release(struct observation_batch *b) {
 void observation_batch_clear(struct observation_batch *b) { b->observation_count = 0; }
 
 /* Sets up the paths of observation `at`, whose first sample has number `sample_number`. False when one cannot be used:
- * outside the picture, masked, a firefly, or a mixed pixel while that of the texel's centre is clean. Nor can one at the
- * end of half precision: as a bound it would pull by 65504 where a renderer failed, and of a lamp that is so bright the
- * fit of light has it already. */
+ * outside the picture, masked, a firefly, or a mixed pixel while that of the texel's centre is clean. Nor can one at
+ * the end of half precision: as a bound it would pull by 65504 where a renderer failed, and of a lamp that is so bright
+ * the fit of light has it already. */
 static bool connect(struct observation_batch *b, size_t at, const struct view *view, uint32_t texel, uint64_t iteration,
                     uint32_t sample_number) {
     const struct surface *s = &b->surface;

@@ -39,8 +39,8 @@ struct materials {
     uint16_t *deviation; /* [height][width] half precision: standard deviation of base colour by measurement, over its
                           * channels; 0: unknown. NULL: none. Owned */
     float spread;        /* relative standard deviation of base colour along plain surface (plain_spread.h), and by the
-                          * deviations that lamps' radiances have, and what held-out views are too bright or too dark by;
-                          * MATERIALS_SPREAD until it is known */
+                          * deviations that lamps' radiances have, and what held-out views are too bright or too dark
+                          * by; MATERIALS_SPREAD until it is known */
     /* Of things that were added to a room; no derivative knows of metals. NULL: none. Owned. */
     float *metallic; /* [segment_count] share of the surface that is metal, which reflects in the base colour and not
                            * diffusely; MATERIALS_BY_TEXEL: that and roughness are in gloss */

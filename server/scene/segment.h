@@ -27,7 +27,8 @@ void segments_automatic(struct segments *s, const struct mesh *mesh);
 /* What the input calls the object that the segment is or is part of; of several automatic segments in one object
  * numbered; borrowed; NULL: nothing. */
 const char *segments_name(const struct segments *s, const struct mesh *mesh, size_t segment);
-/* A segment if it is one of is_known[count]; otherwise another one of its object that is, or itself if there is none. */
+/* A segment if it is one of is_known[count]; otherwise another one of its object that is, or itself if there is
+ * none. */
 uint32_t segments_known_part(const struct segments *s, uint32_t segment, const bool *is_known);
 void segments_release(struct segments *s);
 

@@ -1,7 +1,7 @@
 /* attempts.h -- attempts of jobs: which there are, and how they begin and end. As for all of the store, see store.h.
  *
- *      (none) ──store_job_start──> RUNNING ──store_job_succeed, _fail, _crash, _lose, _stop, _block; store_reconcile──>
- *      ENDED
+ *      (none) ──store_job_start──> RUNNING ──store_job_succeed, _fail, _crash, _lose, _stop, _block──> ENDED
+ *                                     └──────store_reconcile────────────────────────────────────────────^
  *
  *      FORMER ──store_attempt_adopted──> RUNNING or ENDED, as its job is: attempts of an older version, whose files lie
  *                                        in their job's folder until the daemon has moved them (data/attempt_folder.h)

@@ -1,4 +1,5 @@
-/* fault_requests.h -- clients of a daemon whose disk or memory fails: each request does what it should or says why not. */
+/* fault_requests.h -- clients of a daemon whose disk or memory fails: each request does what it should or says why
+ * not. */
 #ifndef UNBAKE_TESTS_CHAOS_FAULT_REQUESTS_H
 #define UNBAKE_TESTS_CHAOS_FAULT_REQUESTS_H
 

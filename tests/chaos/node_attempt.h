@@ -1,4 +1,5 @@
-/* node_attempt.h -- a scheduler's side of attempts by the real `unbaked node`: begins them, reads their lines, ends them. */
+/* node_attempt.h -- a scheduler's side of attempts by the real `unbaked node`: begins them, reads their lines, ends
+ * them. */
 #ifndef UNBAKE_TESTS_CHAOS_NODE_ATTEMPT_H
 #define UNBAKE_TESTS_CHAOS_NODE_ATTEMPT_H
 

@@ -4,7 +4,7 @@
  *
  *   ball      a glowing ball in the middle of free space, nothing outside
  *   lamp N    one of the three brightest emitters of the truth alone
- *   sky       the map `sky`, with the segments `remove` taken away; left out without a map, or where nothing of it comes in
+ *   sky       the map `sky`, with the segments `remove` taken away; not without a map, nor where nothing of it comes in
  *
  * Each is rendered twice of either room, with independent noise: o1, o2 of the recovered one, a, b of the true one.
  * PSNR is that of sRGB pictures at one exposure a lighting, of which the mean square is the mean of (o1 - a) (o2 - b),

@@ -1,5 +1,5 @@
-/* light_point.h: what a sky sends to points through a hole in the ceiling, against closed forms: all of it and by cell, of
- * the sky and of a box around the room; nothing behind a wall; and the joint fit finds the sky's radiance from these
+/* light_point.h: what a sky sends to points through a hole in the ceiling, against closed forms: all of it and by cell,
+ * of the sky and of a box around the room; nothing behind a wall; and the joint fit finds the sky's radiance from these
  * responses, which noise would make too small. sky_doubt.h: half of that sky, of bright texels alone. */
 #include "server/light/joint_fit.h"
 #include "server/light/decision/sky_doubt.h"

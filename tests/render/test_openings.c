@@ -1,6 +1,6 @@
-/* openings.h, surround.h: which cell of the box around a scan a ray leaves through; a room whose ceiling was not scanned,
- * nor the lamp beneath it: light comes in from where it does; and one of which hardly more than a wall and the floor
- * were. The same for any number of threads. */
+/* openings.h, surround.h: which cell of the box around a scan a ray leaves through; a room whose ceiling was not
+ * scanned, nor the lamp beneath it: light comes in from where it does; and one of which hardly more than a wall and the
+ * floor were. The same for any number of threads. */
 #include "server/light/surround.h"
 #include "tests/check.h"
 #include "tests/render/shell.h"

@@ -1,5 +1,5 @@
-/* Renders against closed forms (relight.h): a furnace with a wall taken away, lamps over a plane, a panorama against six
- * perspectives, sources alone against all of them, direct and indirect light, sun and sky apart. */
+/* Renders against closed forms (relight.h): a furnace with a wall taken away, lamps over a plane, a panorama against
+ * six perspectives, sources alone against all of them, direct and indirect light, sun and sky apart. */
 #include <sys/stat.h>
 
 #include "common/file.h"

@@ -128,8 +128,8 @@ static void test_screen(struct parallel *pool) {
     scene_release(&scene);
 }
 
-/* Screen and lamp saturate. How bright the lamp is nobody knows, nor, then, what white paint would show at the screen; but
- * the screen may be as much brighter than it seems. */
+/* Screen and lamp saturate. How bright the lamp is nobody knows, nor, then, what white paint would show at the screen;
+ * but the screen may be as much brighter than it seems. */
 static void test_saturated(struct parallel *pool) {
     struct scene scene = {0};
     make_room(&scene.mesh, screen, true);

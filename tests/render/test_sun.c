@@ -101,8 +101,8 @@ static void test_sun(struct parallel *pool) {
     scene_release(&scene);
 }
 
-/* At one exposure the lamp, the sky and what the sun lights saturate. Where these patches lie tells where the sun is, and
- * what they send on how strong it is. */
+/* At one exposure the lamp, the sky and what the sun lights saturate. Where these patches lie tells where the sun is,
+ * and what they send on how strong it is. */
 static void test_clipped(struct parallel *pool) {
     struct scene scene = {0};
     struct image sky;
@@ -230,8 +230,8 @@ static void saturate_where_lit(struct reconstruction *r, const vec3 *direction, 
     }
 }
 
-/* A bright part of the sky, 40 degrees wide, of which half makes saturate what it reaches: patches have edges that suit a
- * direction in it, but others as well. */
+/* A bright part of the sky, 40 degrees wide, of which half makes saturate what it reaches: patches have edges that suit
+ * a direction in it, but others as well. */
 static void check_bright_sky(struct reconstruction *r, struct parallel *pool) {
     vec3 direction[9];
     for (int k = 0; k < 9; k++)

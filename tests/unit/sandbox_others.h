@@ -1,4 +1,5 @@
-/* sandbox_others.h -- what a process in the sandbox must not reach: another process, sockets, folders; and whether it did. */
+/* sandbox_others.h -- what a process in the sandbox must not reach: another process, sockets, folders; and whether it
+ * did. */
 #ifndef UNBAKE_TESTS_UNIT_SANDBOX_OTHERS_H
 #define UNBAKE_TESTS_UNIT_SANDBOX_OTHERS_H
 

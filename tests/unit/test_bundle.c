@@ -1,5 +1,5 @@
-/* test_bundle.c -- bundles: a small good one in several shapes. test_bundle_bad.c has bad ones, test_bundle_rooms.c real
- * ones. */
+/* test_bundle.c -- bundles: a small good one in several shapes. test_bundle_bad.c has bad ones, test_bundle_rooms.c
+ * real ones. */
 #include <zlib.h>
 
 #include "server/ingest/facts.h"

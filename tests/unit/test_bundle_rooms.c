@@ -1,4 +1,5 @@
-/* test_bundle_rooms.c -- the real rooms: poses, axes, pixel places and objects against a renderer's pictures of them. */
+/* test_bundle_rooms.c -- the real rooms: poses, axes, pixel places and objects against a renderer's pictures of
+ * them. */
 #include "common/image.h"
 #include "common/mem.h"
 #include "server/ingest/bundle.h"

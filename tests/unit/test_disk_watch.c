@@ -1,5 +1,5 @@
-/* test_disk_watch.c -- when the disk counts as nearly full, and when no more: not by the same figure, lest jobs stop and go
- * on all the time. */
+/* test_disk_watch.c -- when the disk counts as nearly full, and when no more: not by the same figure, lest jobs stop
+ * and go on all the time. */
 #include "server/job/disk_watch.h"
 
 #include <errno.h>

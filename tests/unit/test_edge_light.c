@@ -1,5 +1,6 @@
-/* edge_light.h: a plane that a dim sky lights from the front and a bright one from behind. Around its edges half of either
- * arrives, which counts within reach of them, on a scan; reflection.h: what is as bright there is no lamp then. */
+/* edge_light.h: a plane that a dim sky lights from the front and a bright one from behind. Around its edges half of
+ * either arrives, which counts within reach of them, on a scan; reflection.h: what is as bright there is no lamp
+ * then. */
 #include "server/light/decision/edge_light.h"
 #include "server/light/decision/reflection.h"
 #include "server/scene/latlong.h"

@@ -1,6 +1,6 @@
 /* test_image_formats.c -- HEIF, AVIF, WebP and CMYK JPEG: pictures of six patches, made here by the libraries' encoders
- * (those of HEIF are in tests/data/image, by libheif 1.15 with x265 and aom), come back in their colours; layers of EXR;
- * what is cut short, or of a kind that is not read, is refused. */
+ * (those of HEIF are in tests/data/image, by libheif 1.15 with x265 and aom), come back in their colours; layers of
+ * EXR; what is cut short, or of a kind that is not read, is refused. */
 #include <webp/encode.h>
 #include <webp/mux.h>
 

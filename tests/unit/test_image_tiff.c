@@ -1,4 +1,5 @@
-/* test_image_tiff.c -- TIFF: pictures of six patches, made here by libtiff in its layouts, come back in their colours. */
+/* test_image_tiff.c -- TIFF: pictures of six patches, made here by libtiff in its layouts, come back in their
+ * colours. */
 #include <tiffio.h>
 
 #include "tests/unit/patches.h"

@@ -196,8 +196,8 @@ static void test_bound(struct parallel *pool) {
     joint_fit_release(&f);
 }
 
-/* Photographs saturate where a lamp lights most. Left out, or taken for what is there, these places would make it dimmer
- * than it is: only what is dark is measured there. Places of lamps say nothing, whatever they show. */
+/* Photographs saturate where a lamp lights most. Left out, or taken for what is there, these places would make it
+ * dimmer than it is: only what is dark is measured there. Places of lamps say nothing, whatever they show. */
 static void test_clipped_points(struct parallel *pool) {
     const float x[2] = {60.0f, 0.0f}, clip = 0.35f;
     struct joint_source prior = source_about(log(30.0), 1.5);

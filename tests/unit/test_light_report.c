@@ -1,5 +1,5 @@
-/* light_estimate.h: the report states the radiance of sky and ground, of a sun, and of segments that are emitters, with its
- * deviation; not of a white surface that saturates. */
+/* light_estimate.h: the report states the radiance of sky and ground, of a sun, and of segments that are emitters, with
+ * its deviation; not of a white surface that saturates. */
 #include "server/light/light_estimate.h"
 #include "tests/check.h"
 

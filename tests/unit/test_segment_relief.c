@@ -1,5 +1,5 @@
-/* test_segment_relief.c -- what stands off a wall of a scan: a panel as scans round it, a wall that bows or is rough and
- * has none, one that has several, and a ball. */
+/* test_segment_relief.c -- what stands off a wall of a scan: a panel as scans round it, a wall that bows or is rough
+ * and has none, one that has several, and a ball. */
 #include "server/scene/segment_relief.h"
 
 #include "common/rng.h"

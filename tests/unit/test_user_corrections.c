@@ -1,5 +1,5 @@
-/* test_user_corrections.c -- what a user puts right of a job: photographs left out, a part of the mesh kept, a segment that
- * emits or does not. */
+/* test_user_corrections.c -- what a user puts right of a job: photographs left out, a part of the mesh kept, a segment
+ * that emits or does not. */
 #include "server/scene/select.h"
 #include "tests/unit/tiny_scene.h"
 

@@ -179,8 +179,8 @@ static double shift_along_walk(const struct pose_solver *s, size_t f) {
     return shift_px > 0.0 ? shift_px : sqrt(squares);
 }
 
-/* Where photographs were surely moved, or all together, the tracker may drift: then those that are not sure follow their
- * neighbours. */
+/* Where photographs were surely moved, or all together, the tracker may drift: then those that are not sure follow
+ * their neighbours. */
 static void add_drift(struct pose_solver *s, bool convincing, size_t held_out_count, int coarsest) {
     if (!convincing && free_count(s) < MIN_SURE)
         return;

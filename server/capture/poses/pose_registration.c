@@ -12,8 +12,8 @@
 #define ROUNDS 30 /* Gauss-Newton steps, at most; a motion that takes more is not found */
 /* Pixels: a step that ends the rounds; about twice as much is left. */
 #define STEP_PX 0.005
-/* Standard deviations of the prior: what depth cameras' calibrations (.1 degree) and trackers leave, and more. It decides
- * only where the photographs leave a motion open, as along the only plane. */
+/* Standard deviations of the prior: what depth cameras' calibrations (.1 degree) and trackers leave, and more. It
+ * decides only where the photographs leave a motion open, as along the only plane. */
 #define TURN_PRIOR 0.01 /* radians: half a degree */
 #define MOVE_PRIOR 0.01 /* of the mean depth: 3 cm at 3 m */
 /* Of the chi-square's root: the chance of six errors is one in a thousand. Held-out tracks judge once more. */

@@ -10,8 +10,8 @@
  * scale is two of them, as light_fit.h has it; each residual is clamped to so many scales. */
 #define SCALE_PER_MEAN 2.5 /* +25 %: no change */
 #define RESIDUAL_CLAMP 2.0 /* +25 %: no change */
-/* Observations, of the mean residual of all frames, beside a frame's own: as many as it has unknowns of pose and offset,
- * by which its own are made small. */
+/* Observations, of the mean residual of all frames, beside a frame's own: as many as it has unknowns of pose and
+ * offset, by which its own are made small. */
 #define SCALE_PRIOR (POSE_UNKNOWNS + POSE_CELLS)
 #define CONSENSUS_ROUNDS 4 /* of reweighting, of the mean of eleven at most; +25 %: no change */
 #define MIN_CONSENSUS 3    /* observations: of two that differ neither is known to be wrong; to 4: no change */
@@ -275,8 +275,9 @@ struct reweighting {
 };
 
 /* Weighs a track's observations; their absolute residuals, NAN where there is none, into the result. An observation has
- * its share in the consensus: of the variance of its error only 1 - share is left in the residual, which is scaled up to
- * it. Else a frame that happens to agree is trusted more, makes up the consensus by itself, and agrees all the more. */
+ * its share in the consensus: of the variance of its error only 1 - share is left in the residual, which is scaled up
+ * to it. Else a frame that happens to agree is trusted more, makes up the consensus by itself, and agrees all the
+ * more. */
 static void weigh_observations(void *user, size_t track, void *result) {
     const struct reweighting *r = user;
     struct pose_solver *s = r->solver;

@@ -108,8 +108,8 @@ void pose_linearise(struct pose_solver *s);
  * with the surface, reflections do not. */
 bool pose_slope(const struct pose_solver *s, size_t track, const struct camera *camera, float g[2]);
 
-/* Robust weights of all observations and scales of all frames, from the present residuals. A scale is that of errors: what
- * an observation's own share in its consensus takes from its residual is given back. */
+/* Robust weights of all observations and scales of all frames, from the present residuals. A scale is that of errors:
+ * what an observation's own share in its consensus takes from its residual is given back. */
 void pose_reweight(struct pose_solver *s);
 
 /* Consensus of a track: the robust mean of its observations, offsets subtracted (NAN of fewer than three), and the

@@ -10,8 +10,8 @@
 
 #include "server/state/reconstruction.h"
 
-/* Fills chosen[] with texels of texel[count], all of one segment: evenly spaced ones of those that are about as bright as
- * the segment, or of all where none is. Returns how many, at most `wanted`. Thread-safe. */
+/* Fills chosen[] with texels of texel[count], all of one segment: evenly spaced ones of those that are about as bright
+ * as the segment, or of all where none is. Returns how many, at most `wanted`. Thread-safe. */
 size_t bright_texels_choose(const struct reconstruction *r, const uint32_t *texel, size_t count, size_t wanted,
                             uint32_t *chosen);
 

@@ -8,8 +8,8 @@
  *
  * h_c is the albedo that the lobe's highlight feigns: what it would reflect towards the photographs over W, their
  * median, since L is one. Each lobe is as likely as the prior of gloss says (specular_posterior.h). u is the share of W
- * that comes from unobserved sky, f the deviation of that, D that of light that is not modelled, lognormal about W. g is
- * what arrives around the edges of a scan over what arrives here (edge_light.h). */
+ * that comes from unobserved sky, f the deviation of that, D that of light that is not modelled, lognormal about W. g
+ * is what arrives around the edges of a scan over what arrives here (edge_light.h). */
 #ifndef UNBAKE_LIGHT_DECISION_REFLECTION_H
 #define UNBAKE_LIGHT_DECISION_REFLECTION_H
 
@@ -29,8 +29,8 @@ static inline float reflection_limit(float fitted_share) {
     return (float)ALBEDO_WHITE * expf(REFLECTION_DEVIATIONS * sqrtf(white * white + sky * sky));
 }
 
-/* Standard deviation of log W: `lambert`, `sky` of it from a sky of that deviation, and light that is not modelled, of a
- * deviation of `dark`, by which W is surer in bright places than in a dark corner. */
+/* Standard deviation of log W: `lambert`, `sky` of it from a sky of that deviation, and light that is not modelled, of
+ * a deviation of `dark`, by which W is surer in bright places than in a dark corner. */
 static inline double reflection_light_deviation(double lambert, double sky, double sky_deviation, double dark) {
     double within = fmax(lambert, 1e-30), share = fmin(sky / within, 1.0) * sky_deviation;
     return sqrt(ALBEDO_WHITE_DEVIATION * ALBEDO_WHITE_DEVIATION + share * share +

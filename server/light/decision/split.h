@@ -2,10 +2,10 @@
  *
  * A segment emits as a whole or not at all, but a screen and its bezel, or a bulb and its fixture, often are one
  * segment. A connected part is split off if all of it is brighter than a white surface could be there, and the rest of
- * the segment is at most half as bright and large enough. One at which all photographs saturate, mostly in all channels,
- * may be as much brighter than it seems as what lights it, and consists of the triangles that do. Whether the part emits
- * is decided later, as for all segments (solve.c). White paint, highlights (bright from some directions only) and sun
- * patches are not split off (shining.h).
+ * the segment is at most half as bright and large enough. One at which all photographs saturate, mostly in all
+ * channels, may be as much brighter than it seems as what lights it, and consists of the triangles that do. Whether the
+ * part emits is decided later, as for all segments (solve.c). White paint, highlights (bright from some directions
+ * only) and sun patches are not split off (shining.h).
  *
  * Limits: triangles are not cut, so a lit part of one is not found; nor is a screen darker than white paper in its
  * place. Sunlight of an unobserved sun, through an opening that the mesh lacks, looks like an emitter. */

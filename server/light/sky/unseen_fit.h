@@ -1,9 +1,9 @@
 /* unseen_fit.h -- fits radiance of unobserved directions (unseen_light.h) to points of the surface.
  *
  * The unknown is the logarithm of a coarse map (sky_cells.h), whose cells are sources of a joint fit (joint_fit.h): of
- * each no more is known than that the map was even (LIGHT_UNKNOWN_DEVIATION). Neighbouring cells are not tied: skies get
- * brighter upwards by factors, and an even one needs more light of it to explain the same shade. How bright the whole
- * is hardly shows, so a common factor then leaves nine tenths of the base colours below that of white paint. */
+ * each no more is known than that the map was even (LIGHT_UNKNOWN_DEVIATION). Neighbouring cells are not tied: skies
+ * get brighter upwards by factors, and an even one needs more light of it to explain the same shade. How bright the
+ * whole is hardly shows, so a common factor then leaves nine tenths of the base colours below that of white paint. */
 #ifndef UNBAKE_LIGHT_SKY_UNSEEN_FIT_H
 #define UNBAKE_LIGHT_SKY_UNSEEN_FIT_H
 

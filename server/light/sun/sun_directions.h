@@ -20,8 +20,8 @@ size_t sun_directions_spread(const struct environment *environment,
 /* The likeliest first. */
 void sun_directions_sort(struct sun_candidate *candidate, size_t count);
 
-/* Moves a candidate by steps of so many degrees, and ever smaller ones down to `least_degrees`, for as long as its score
- * rises. */
+/* Moves a candidate by steps of so many degrees, and ever smaller ones down to `least_degrees`, for as long as its
+ * score rises. */
 void sun_directions_walk(struct sun_candidate *candidate, double degrees, double least_degrees,
                          double (*score_of)(void *user, vec3 direction), void *user);
 

@@ -1,8 +1,8 @@
-/* sunlit.h -- what saturates in the light of a sun that is not measured: how strong the sun is at least, what it sends on,
- * and what it would show in the shade.
+/* sunlit.h -- what saturates in the light of a sun that is not measured: how strong the sun is at least, what it sends
+ * on, and what it would show in the shade.
  *
- * Of a sunlit place no photograph shows how bright it is, but the rest of its segment tells its albedo, and what it shows
- * in the shade. So it is a source of light of one unknown, the strength of the sun, which the joint fit finds: by
+ * Of a sunlit place no photograph shows how bright it is, but the rest of its segment tells its albedo, and what it
+ * shows in the shade. So it is a source of light of one unknown, the strength of the sun, which the joint fit finds: by
  * what measured places get from it and from the sun itself. */
 #ifndef UNBAKE_LIGHT_SUN_SUNLIT_H
 #define UNBAKE_LIGHT_SUN_SUNLIT_H
