@@ -26,6 +26,7 @@ static void hand_over_segment(struct reconstruction *r, const struct light_lamp 
     rgb radiance = lamp->radiance;
     e->is_unbounded = lamp->kind == ESTIMATED_SATURATED;
     e->is_hidden = !e->is_unbounded;
+    e->deviation = lamp->deviation;
     for (int c = 0; c < 3; c++)
         (&radiance.r)[c] = lamp->is_measured[c] ? (&e->observed.r)[c] : (&radiance.r)[c];
     evidence_set_radiance(e, radiance);

@@ -73,8 +73,28 @@ static void test_dark(void) {
     CHECK_NEAR(reflection_light_deviation(1.0, 0.5, 0.7, 0.0), hypot(ALBEDO_WHITE_DEVIATION, 0.35), 1e-9);
 }
 
+/* A saturated lamp that shows .25 at least, where white paint shows .2: by what it lights it has some radiance, give or
+ * take a factor of 18, and may be none; with a factor of 1.3 it is one. So is one that is known as little and shows four
+ * times as much as white paint. */
+static void test_saturated_lamp(void) {
+    const struct {
+        float observed, radiance, deviation;
+        bool emits;
+    } lamp[] = {{0.25f, 0.62f, 2.9f, false}, {0.25f, 0.62f, 0.25f, true}, {0.8f, 1.0f, 2.9f, true}};
+    for (size_t i = 0; i < sizeof lamp / sizeof *lamp; i++) {
+        struct emitter_evidence e = {.observed = rgb_gray(lamp[i].observed),
+                                     .radiance = rgb_gray(lamp[i].radiance),
+                                     .lambert = rgb_gray(0.2f),
+                                     .is_unbounded = true,
+                                     .deviation = lamp[i].deviation};
+        e.reflection = (float)reflection_probability(&e, ALBEDO_WHITE, 0.2);
+        CHECK_THAT(reflection_is_unlikely(&e) == lamp[i].emits, "lamp %zu: %g", i, (double)e.reflection);
+    }
+}
+
 int main(void) {
     test_dark();
+    test_saturated_lamp();
     struct parallel *pool = parallel_new(0);
     for (int i = 0; i < BOARD; i++)
         wall_color[i] = rgb_scale(wall_color[i], 0.3f);

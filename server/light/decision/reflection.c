@@ -28,6 +28,19 @@ struct feigned {
 /* Probability that a normal deviate is at least z. */
 static double tail(double z) { return 0.5 * erfc(z * 0.70710678118654752); }
 
+/* Probability that a surface of this albedo reflects so much of `lambert`. */
+static double reflects(rgb radiance, rgb lambert, double albedo, double deviation) {
+    double white = fmax((double)rgb_mean(lambert), 1e-30);
+    return tail(log(fmax((double)rgb_mean(radiance), 1e-30) / (albedo * white)) / deviation);
+}
+
+double reflection_probability(const struct emitter_evidence *e, double albedo, double deviation) {
+    if (!e->is_unbounded)
+        return reflects(e->radiance, e->lambert, albedo, deviation);
+    return fmin(reflects(e->observed, e->lambert, albedo, deviation),
+                reflects(e->radiance, e->lambert, albedo, hypot(deviation, (double)e->deviation)));
+}
+
 static void add_view(const struct divide *d, const struct surface_point *at, uint32_t texel, uint32_t train,
                      float lambert, int thread, struct feigned *f) {
     struct highlight highlight;
@@ -66,27 +79,26 @@ static void find_highlights(const struct reconstruction *r, const struct divide 
 void reflection_find(struct reconstruction *r, const struct divide *d, uint32_t segment, const uint32_t *texel,
                      size_t count, int thread) {
     struct emitter_evidence *e = &r->evidence[segment];
-    double shown = (double)(rgb_mean(e->radiance) / rgb_mean(e->lambert)), prior[SPECULAR_CANDIDATES];
+    double prior[SPECULAR_CANDIDATES];
     e->sky_lambert = 0.0f;
     e->reflection = 1.0f;
-    if (!(shown > (double)reflection_limit(0.0f)))
+    if (!(rgb_mean(e->radiance) > reflection_limit(0.0f) * rgb_mean(e->lambert)))
         return;
     e->sky_lambert = sky_doubt(r, texel, count);
     double deviation = reflection_light_deviation((double)rgb_mean(e->lambert), (double)e->sky_lambert,
                                                   r->sky_is_fitted ? FIT_DEVIATION : FILL_DEVIATION,
                                                   (double)(DARK_DEVIATION * d->views->median_radiance));
-    double sum = tail(log(shown / ALBEDO_WHITE) / deviation);
-    e->reflection = (float)sum;
+    e->reflection = (float)reflection_probability(e, ALBEDO_WHITE, deviation);
     if (!reflection_is_unlikely(e))
         return;
-    shown /= (double)edge_light(r, d, texel, count, thread);
+    double around = (double)edge_light(r, d, texel, count, thread);
     struct feigned *f = mem_alloc(sizeof *f);
     find_highlights(r, d, texel, count, thread, f);
     specular_prior((double)count / (double)r->inverse.valid_count, prior);
-    sum = prior[SPECULAR_DIFFUSE] * tail(log(shown / ALBEDO_WHITE) / deviation);
+    double sum = prior[SPECULAR_DIFFUSE] * reflection_probability(e, around * ALBEDO_WHITE, deviation);
     for (size_t c = 0; c < LOBES; c++) {
-        float median = quantile(f->albedo[c], f->count, 0.5);
-        sum += prior[c + 1] * tail(log(shown / (ALBEDO_WHITE + (double)median)) / deviation);
+        double feigned = (double)quantile(f->albedo[c], f->count, 0.5);
+        sum += prior[c + 1] * reflection_probability(e, around * (ALBEDO_WHITE + feigned), deviation);
     }
     e->reflection = (float)sum;
     mem_free(f);

@@ -9,7 +9,10 @@
  * h_c is the albedo that the lobe's highlight feigns: what it would reflect towards the photographs over W, their
  * median, since L is one. Each lobe is as likely as the prior of gloss says (specular_posterior.h). u is the share of W
  * that comes from unobserved sky, f the deviation of that, D that of light that is not modelled, lognormal about W. g
- * is what arrives around the edges of a scan over what arrives here (edge_light.h). */
+ * is what arrives around the edges of a scan over what arrives here (edge_light.h).
+ *
+ * Of a saturated lamp L is inferred from what it lights, which may hardly tell it: its own deviation adds to s. That it
+ * shows its lower bound at least is sure. It emits if reflection would show either as seldom. */
 #ifndef UNBAKE_LIGHT_DECISION_REFLECTION_H
 #define UNBAKE_LIGHT_DECISION_REFLECTION_H
 
@@ -36,6 +39,10 @@ static inline double reflection_light_deviation(double lambert, double sky, doub
     return sqrt(ALBEDO_WHITE_DEVIATION * ALBEDO_WHITE_DEVIATION + share * share +
                 log1p(dark / within * (dark / within)));
 }
+
+/* Probability that a surface of this albedo reflects as much as the segment shows, by `radiance` and `lambert`, where
+ * log W has this deviation. */
+double reflection_probability(const struct emitter_evidence *evidence, double albedo, double deviation);
 
 /* Sets `sky_lambert` and `reflection` of r->evidence[segment], with texel[count], by its `radiance` and `lambert`.
  * `thread` picks of d->scratch. */
