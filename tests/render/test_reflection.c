@@ -74,8 +74,8 @@ static void test_dark(void) {
 }
 
 /* A saturated lamp that shows .25 at least, where white paint shows .2: by what it lights it has some radiance, give or
- * take a factor of 18, and may be none; with a factor of 1.3 it is one. So is one that is known as little and shows four
- * times as much as white paint. */
+ * take a factor of 18, and may be none; with a factor of 1.3 it is one. So is one that is known as little and shows
+ * four times as much as white paint. */
 static void test_saturated_lamp(void) {
     const struct {
         float observed, radiance, deviation;

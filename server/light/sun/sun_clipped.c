@@ -3,12 +3,14 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "common/mem.h"
 #include "common/spaced.h"
 #include "server/light/light_point.h"
 #include "server/light/light_priors.h"
 #include "server/light/sun/sun_directions.h"
+#include "server/light/sun/symmetric_sum.h"
 #include "server/render/bsdf.h"
 
 #define PLACES 16384     /* evenly spread over all that photographs show */
@@ -16,27 +18,34 @@
 #define EDGES 2.0f       /* of a patch, in those of the joint fit: some .6 m */
 #define PLACES_ALIKE 6.0 /* independent draws that a patch's places are worth, at most */
 #define RADIUS_DEGREES 0.27f
-#define NEAR_DEGREES 7.0 /* so near to the right direction a wrong one is likely, too */
+/* Power of its light by which the odds of a place may rise: at most as the logistic distribution does that is nearest
+ * to a normal one (1.7 deviations: Haley 1952) of albedos, if there were no light but that of the sky. */
+#define STEEPEST (1.7 / ALBEDO_POINT)
+#define POWER_STEPS 16 /* halvings of the interval in which it is sought, by the golden ratio */
 
 struct clipped_place {
     int64_t object; /* parts that shine are segments of their own (split.h) */
     uint32_t patch;
     bool is_clipped;
+    double light; /* the logarithm of what all directions that may saturate bring, and as much again on average */
     struct surface_point at;
 };
 
 /* Places first to end, of which some saturate and some do not. */
 struct clipped_patch {
     size_t first, end, clipped;
+    double log_sum; /* symmetric_sum_log of its places without a sun */
 };
 
 struct clipped_search {
     const struct reconstruction *r;
-    size_t place_count, patch_count;
-    struct clipped_place *place; /* [place_count] by object and patch; owned, as all below */
-    struct clipped_patch *patch; /* [patch_count] */
-    double *log_factorial;       /* [places of the largest patch + 1] */
+    size_t place_count, patch_count, largest; /* largest: places of the largest patch */
+    struct clipped_place *place;              /* [place_count] by object and patch; owned, as all below */
+    struct clipped_patch *patch;              /* [patch_count] */
+    size_t candidate_count;
     struct sun_candidate *candidate;
+    bool *may_be; /* [candidate_count] no photograph measures the direction */
+    double power; /* of its light, by which the odds rise that a place saturates */
 };
 
 /* --- places ------------------------------------------------------------------------------------------------ */
@@ -74,63 +83,138 @@ static void find_places(struct clipped_search *s) {
     qsort(s->place, s->place_count, sizeof *s->place, by_patch);
 }
 
-/* Those of which some places saturate and some do not. */
+/* Patches of which some places saturate and some do not; only their places are kept. */
 static void find_patches(struct clipped_search *s) {
-    size_t largest = 0;
+    size_t kept = 0;
     s->patch = mem_array(s->place_count + 1, sizeof *s->patch);
     for (size_t first = 0, end; first < s->place_count; first = end) {
-        struct clipped_patch patch = {.first = first};
+        struct clipped_patch patch = {.first = kept};
         for (end = first; end < s->place_count && s->place[end].object == s->place[first].object &&
                           s->place[end].patch == s->place[first].patch;
              end++)
             patch.clipped += s->place[end].is_clipped;
-        patch.end = end;
         if (patch.clipped == 0 || patch.clipped == end - first)
             continue;
+        memmove(&s->place[kept], &s->place[first], (end - first) * sizeof *s->place);
+        patch.end = kept += end - first;
+        s->largest = end - first > s->largest ? end - first : s->largest;
         s->patch[s->patch_count++] = patch;
-        largest = end - first > largest ? end - first : largest;
     }
-    s->log_factorial = mem_array(largest + 1, sizeof *s->log_factorial);
-    s->log_factorial[0] = 0.0;
-    for (size_t i = 1; i <= largest; i++)
-        s->log_factorial[i] = s->log_factorial[i - 1] + log((double)i);
+    s->place_count = kept;
+}
+
+/* --- the light of the sky ---------------------------------------------------------------------------------- */
+
+static void find_directions(struct clipped_search *s) {
+    const struct environment *e = &s->r->environment;
+    s->candidate_count = sun_directions_spread(e, NULL, &s->candidate);
+    s->may_be = mem_array(s->candidate_count + 1, sizeof *s->may_be);
+    for (size_t i = 0; i < s->candidate_count; i++)
+        s->may_be[i] = !e->map.pixel || !environment_is_measured(e, s->candidate[i].direction);
+}
+
+static void find_light(void *user, size_t index, int thread) {
+    (void)thread;
+    struct clipped_search *s = user;
+    struct clipped_place *p = &s->place[index];
+    p->light = 0.0;
+    for (size_t i = 0; i < s->candidate_count; i++) {
+        const struct sun sun = {.direction = s->candidate[i].direction};
+        if (s->may_be[i])
+            p->light += (double)(fmaxf(vec3_dot(sun.direction, p->at.shading), 0.0f) *
+                                 sun_visibility(&sun, s->r->world.accel, &p->at, 1));
+    }
+}
+
+/* Other light is taken for as much as that of the sky is on average. */
+static void find_all_light(struct clipped_search *s) {
+    double mean = 0.0;
+    parallel_for(s->r->pool, s->place_count, find_light, s);
+    for (size_t i = 0; i < s->place_count; i++)
+        mean += s->place[i].light / (double)s->place_count;
+    for (size_t i = 0; i < s->place_count; i++)
+        s->place[i].light = mean > 0.0 ? log(1.0 + s->place[i].light / mean) : 0.0;
 }
 
 /* --- evidence ---------------------------------------------------------------------------------------------- */
 
-static double log_choose(const struct clipped_search *s, size_t n, size_t k) {
-    return s->log_factorial[n] - s->log_factorial[k] - s->log_factorial[n - k];
+/* Scratch for the largest patch. */
+struct clipped_scratch {
+    double *weight, *chance;
+};
+
+static struct clipped_scratch scratch_make(const struct clipped_search *s) {
+    double *both = mem_array(2 * s->largest + 2, sizeof *both);
+    return (struct clipped_scratch){both, both + s->largest + 1};
 }
 
-static double log_add(double a, double b) {
-    double most = fmax(a, b);
-    return most + log(exp(a - most) + exp(b - most));
+static double patch_share(const struct clipped_patch *patch) {
+    return fmin(1.0, PLACES_ALIKE / (double)(patch->end - patch->first));
 }
 
-/* Of `all` places `clipped` saturate, `lit` see the sun, and `both` do both: log(P(both) with it / P(both) without). */
-static double evidence_of(const struct clipped_search *s, size_t all, size_t clipped, size_t lit, size_t both) {
-    size_t first = clipped + lit > all ? clipped + lit - all : 0, last = clipped < lit ? clipped : lit;
-    double of_all = log_choose(s, all, lit), sum = -INFINITY; /* logarithm of the mean of ODDS^k without a sun */
-    for (size_t k = first; k <= last; k++)
-        sum = log_add(sum, log_choose(s, clipped, k) + log_choose(s, all - clipped, lit - k) - of_all +
-                               (double)k * log(ODDS));
-    return (double)both * log(ODDS) - sum;
+/* Log likelihood of all patches without a sun; their log_sum. */
+static double settle(struct clipped_search *s, double power) {
+    struct clipped_scratch scratch = scratch_make(s);
+    double sum = 0.0;
+    s->power = power;
+    for (size_t i = 0; i < s->patch_count; i++) {
+        struct clipped_patch *patch = &s->patch[i];
+        size_t all = patch->end - patch->first;
+        double own = 0.0;
+        for (size_t k = 0; k < all; k++) {
+            double log_odds = power * s->place[patch->first + k].light;
+            scratch.weight[k] = exp(log_odds);
+            own += s->place[patch->first + k].is_clipped ? log_odds : 0.0;
+        }
+        patch->log_sum = symmetric_sum_log(scratch.weight, all, patch->clipped, scratch.chance);
+        sum += patch_share(patch) * (own - patch->log_sum);
+    }
+    mem_free(scratch.weight);
+    return sum;
+}
+
+/* The power by which it is likeliest that those places saturate that do; the likelihood is concave in it. */
+static void find_power(struct clipped_search *s) {
+    const double ratio = 0.5 * (sqrt(5.0) - 1.0);
+    double low = 0.0, high = STEEPEST, a = high - ratio * high, b = ratio * high, of_a = settle(s, a),
+           of_b = settle(s, b);
+    for (int i = 0; i < POWER_STEPS; i++) {
+        if (of_a > of_b) {
+            high = b, b = a, of_b = of_a;
+            of_a = settle(s, a = high - ratio * (high - low));
+        } else {
+            low = a, a = b, of_a = of_b;
+            of_b = settle(s, b = low + ratio * (high - low));
+        }
+    }
+    settle(s, 0.5 * (low + high));
+}
+
+/* How much likelier a patch is with a sun of that direction, a logarithm. */
+static double patch_evidence(const struct clipped_search *s, const struct clipped_patch *patch, const struct sun *sun,
+                             struct clipped_scratch *scratch) {
+    size_t all = patch->end - patch->first, lit = 0, both = 0;
+    for (size_t k = 0; k < all; k++) {
+        const struct clipped_place *p = &s->place[patch->first + k];
+        bool is_lit = sun_visibility(sun, s->r->world.accel, &p->at, 1) > 0.0f;
+        scratch->weight[k] = exp(s->power * p->light) * (is_lit ? ODDS : 1.0);
+        lit += is_lit;
+        both += is_lit && p->is_clipped;
+    }
+    if (lit == 0 || lit == all)
+        return 0.0;
+    double log_sum = symmetric_sum_log(scratch->weight, all, patch->clipped, scratch->chance);
+    return patch_share(patch) * ((double)both * log(ODDS) - log_sum + patch->log_sum);
 }
 
 static double score_of(void *user, vec3 direction) {
     const struct clipped_search *s = user;
     const struct sun sun = {.direction = direction};
+    struct clipped_scratch scratch = scratch_make(s);
     double sum = 0.0;
-    for (size_t i = 0; i < s->patch_count; i++) {
-        const struct clipped_patch *patch = &s->patch[i];
-        size_t all = patch->end - patch->first, lit = 0, both = 0;
-        for (size_t k = patch->first; k < patch->end; k++) {
-            bool is_lit = sun_visibility(&sun, s->r->world.accel, &s->place[k].at, 1) > 0.0f;
-            lit += is_lit;
-            both += is_lit && s->place[k].is_clipped;
-        }
-        sum += fmin(1.0, PLACES_ALIKE / (double)all) * evidence_of(s, all, patch->clipped, lit, both);
-    }
+    for (size_t i = 0; i < s->patch_count; i++)
+        sum += patch_evidence(s, &s->patch[i], &sun, &scratch);
+    mem_free(scratch.weight);
     return sum;
 }
 
@@ -142,42 +226,34 @@ static void score_candidate(void *user, size_t index, int thread) {
 
 /* --- the whole --------------------------------------------------------------------------------------------- */
 
-/* The likeliest direction that no photograph measures, and by how much it exceeds all that are no neighbours of it;
- * *count: directions that none measures. */
-static struct sun_candidate find_likeliest(struct clipped_search *s, double *beyond, size_t *count) {
-    const struct environment *e = &s->r->environment;
+/* The likeliest direction that no photograph measures; *count: of those, how many these places could tell. */
+static struct sun_candidate find_likeliest(struct clipped_search *s, size_t *count) {
     struct sun_candidate best = {.score = 0.0};
-    double rival = 0.0;
-    size_t all = sun_directions_spread(e, NULL, &s->candidate);
-    parallel_for(s->r->pool, s->patch_count > 0 ? all : 0, score_candidate, s);
-    for (size_t i = 0; i < all; i++) {
-        bool may_be = !e->map.pixel || !environment_is_measured(e, s->candidate[i].direction);
-        *count += may_be;
-        if (may_be && s->candidate[i].score > best.score)
+    parallel_for(s->r->pool, s->candidate_count, score_candidate, s);
+    for (size_t i = 0; i < s->candidate_count; i++) {
+        *count += s->may_be[i] && s->candidate[i].score != 0.0;
+        if (s->may_be[i] && s->candidate[i].score > best.score)
             best = s->candidate[i];
     }
-    for (size_t i = 0; i < all; i++) {
-        bool is_near = (double)vec3_dot(s->candidate[i].direction, best.direction) > cos(NEAR_DEGREES * PI / 180.0);
-        rival = is_near ? rival : fmax(rival, s->candidate[i].score);
-    }
-    *beyond = best.score - rival;
     return best;
 }
 
 void sun_clipped_find(struct reconstruction *r) {
     struct clipped_search s = {.r = r};
-    double beyond;
     size_t count = 0;
     find_places(&s);
     find_patches(&s);
-    struct sun_candidate best = find_likeliest(&s, &beyond, &count);
-    if (best.score > log(SURE * (double)(count + 1)) && beyond > log(SURE)) {
+    find_directions(&s);
+    find_all_light(&s);
+    find_power(&s);
+    struct sun_candidate best = find_likeliest(&s, &count);
+    if (best.score > log(SURE * (double)(count + 1))) {
         sun_directions_walk(&best, 1.5, 0.1, score_of, &s);
         r->sun = (struct sun){.is_there = true, .is_clipped = true, .direction = best.direction};
         r->sun.radius_rad = RADIUS_DEGREES * BSDF_PI / 180.0f;
     }
+    mem_free(s.may_be);
     mem_free(s.candidate);
-    mem_free(s.log_factorial);
     mem_free(s.patch);
     mem_free(s.place);
 }

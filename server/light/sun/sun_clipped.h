@@ -5,20 +5,23 @@
  * of these patches are is known. Places of one segment that lie near each other and face the same way differ in little
  * but that the sun reaches some of them: with the right direction those saturate, and the others do not.
  *
- * Of m places of such a patch s saturate, t see the direction, k do both. Given m, s and t, of which none tells of a
- * sun, k is hypergeometric without it. With it the odds that a place saturates are ODDS times those in its shade, and
+ * But a bright sky draws edges as well: beside a window's frame a place sees less of it than the next. How many places
+ * of a patch saturate, s, tells of no sun; given s, place i is among them by its odds
  *
- *     P(k) ~ C(s, k) C(m - s, t - k) ODDS^k        (Fisher's noncentral hypergeometric distribution)
+ *     w_i = (1 + S_i / S)^g ODDS^(it sees the direction)
  *
- * The evidence is the logarithm of the ratio of both, summed over all patches. Whole walls that saturate, dark things
- * that do not, and what a bright sky brings to all sides of a patch say nothing. Places of a patch are no independent
- * draws: it counts as at most PLACES_ALIKE of them. A sun is there if its odds exceed 20 to 1 with one expected among
- * all directions that no photograph measures; and 20 to 1 over the likeliest direction elsewhere: the edge of a window
- * before a bright sky makes places saturate likewise, but all directions through it explain that about as well.
+ * S_i is what a uniform sky brings that is as wide as all directions no photograph measures, S its mean over all
+ * places: other light is taken for as much. That just the places C of a patch saturate has the probability
  *
- * Limits. One sun, of half a degree. How strong it is comes from the joint fit (sunlit.h).
+ *     prod over C of w_i / e_s(w)        (conditional logistic regression: symmetric_sum.h)
  *
- * Fisher 1935, The logic of inductive inference (the distribution). */
+ * g is what makes the places that saturate likeliest without a sun, of all patches together. The evidence is the
+ * logarithm of the ratio of the probabilities with a sun and without, summed over all patches. Whole walls that
+ * saturate and dark things that do not say nothing. Places of a patch are no independent draws: it counts as at most
+ * PLACES_ALIKE of them. A sun is there if its odds exceed 20 to 1 with one expected among all directions that could be
+ * told, which are those that part some patch and that no photograph measures.
+ *
+ * Limits. One sun, of half a degree. How strong it is comes from the joint fit (sunlit.h). */
 #ifndef UNBAKE_LIGHT_SUN_SUN_CLIPPED_H
 #define UNBAKE_LIGHT_SUN_SUN_CLIPPED_H
 
