@@ -3,7 +3,6 @@
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "common/mem.h"
 #include "common/spaced.h"
@@ -13,10 +12,11 @@
 #include "server/light/sun/symmetric_sum.h"
 #include "server/render/bsdf.h"
 
-#define PLACES 16384     /* evenly spread over all that photographs show */
-#define ODDS 20.0        /* of saturation in the sun over that in its shade */
-#define EDGES 2.0f       /* of a patch, in those of the joint fit: some .6 m */
-#define PLACES_ALIKE 6.0 /* independent draws that a patch's places are worth, at most */
+#define PLACES 16384      /* evenly spread over all that photographs show */
+#define PLACES_A_PATCH 64 /* of these, at most */
+#define ODDS 20.0         /* of saturation in the sun over that in its shade */
+#define EDGES 2.0f        /* of a patch, in those of the joint fit: some .6 m */
+#define PLACES_ALIKE 6.0  /* independent draws that a patch's places are worth, at most */
 #define RADIUS_DEGREES 0.27f
 /* Power of its light by which the odds of a place may rise: at most as the logistic distribution does that is nearest
  * to a normal one (1.7 deviations: Haley 1952) of albedos, if there were no light but that of the sky. */
@@ -25,7 +25,7 @@
 
 struct clipped_place {
     int64_t object; /* parts that shine are segments of their own (split.h) */
-    uint32_t patch;
+    uint32_t patch, texel;
     bool is_clipped;
     double light; /* the logarithm of what all directions that may saturate bring, and as much again on average */
     struct surface_point at;
@@ -39,9 +39,9 @@ struct clipped_patch {
 
 struct clipped_search {
     const struct reconstruction *r;
-    size_t place_count, patch_count, largest; /* largest: places of the largest patch */
-    struct clipped_place *place;              /* [place_count] by object and patch; owned, as all below */
-    struct clipped_patch *patch;              /* [patch_count] */
+    size_t place_count, patch_count;
+    struct clipped_place *place; /* [place_count] by object and patch; owned, as all below */
+    struct clipped_patch *patch; /* [patch_count] */
     size_t candidate_count;
     struct sun_candidate *candidate;
     bool *may_be; /* [candidate_count] no photograph measures the direction */
@@ -56,7 +56,7 @@ static int by_patch(const void *a, const void *b) {
         return first->object < second->object ? -1 : 1;
     if (first->patch != second->patch)
         return first->patch < second->patch ? -1 : 1;
-    return (first->at.triangle > second->at.triangle) - (first->at.triangle < second->at.triangle);
+    return (first->texel > second->texel) - (first->texel < second->texel);
 }
 
 static void find_places(struct clipped_search *s) {
@@ -77,10 +77,15 @@ static void find_places(struct clipped_search *s) {
             continue;
         p->object = r->segments.id[reconstruction_segment(r, texel)];
         p->patch = light_patch(&p->at, least, EDGES * light_patch_edge(mesh));
+        p->texel = texel;
         p->is_clipped = r->fused.is_bound[texel];
         s->place_count++;
     }
     qsort(s->place, s->place_count, sizeof *s->place, by_patch);
+}
+
+static bool is_one_patch(const struct clipped_place *a, const struct clipped_place *b) {
+    return a->object == b->object && a->patch == b->patch;
 }
 
 /* Patches of which some places saturate and some do not; only their places are kept. */
@@ -89,15 +94,16 @@ static void find_patches(struct clipped_search *s) {
     s->patch = mem_array(s->place_count + 1, sizeof *s->patch);
     for (size_t first = 0, end; first < s->place_count; first = end) {
         struct clipped_patch patch = {.first = kept};
-        for (end = first; end < s->place_count && s->place[end].object == s->place[first].object &&
-                          s->place[end].patch == s->place[first].patch;
-             end++)
-            patch.clipped += s->place[end].is_clipped;
-        if (patch.clipped == 0 || patch.clipped == end - first)
+        for (end = first; end < s->place_count && is_one_patch(&s->place[end], &s->place[first]);)
+            end++;
+        size_t all = end - first, wanted = all < PLACES_A_PATCH ? all : PLACES_A_PATCH;
+        for (size_t k = 0; k < wanted; k++) {
+            s->place[kept + k] = s->place[first + spaced(k, all, wanted)];
+            patch.clipped += s->place[kept + k].is_clipped;
+        }
+        if (patch.clipped == 0 || patch.clipped == wanted)
             continue;
-        memmove(&s->place[kept], &s->place[first], (end - first) * sizeof *s->place);
-        patch.end = kept += end - first;
-        s->largest = end - first > s->largest ? end - first : s->largest;
+        patch.end = kept += wanted;
         s->patch[s->patch_count++] = patch;
     }
     s->place_count = kept;
@@ -138,15 +144,10 @@ static void find_all_light(struct clipped_search *s) {
 
 /* --- evidence ---------------------------------------------------------------------------------------------- */
 
-/* Scratch for the largest patch. */
+/* Scratch for a patch. */
 struct clipped_scratch {
-    double *weight, *chance;
+    double weight[PLACES_A_PATCH], chance[PLACES_A_PATCH + 1];
 };
-
-static struct clipped_scratch scratch_make(const struct clipped_search *s) {
-    double *both = mem_array(2 * s->largest + 2, sizeof *both);
-    return (struct clipped_scratch){both, both + s->largest + 1};
-}
 
 static double patch_share(const struct clipped_patch *patch) {
     return fmin(1.0, PLACES_ALIKE / (double)(patch->end - patch->first));
@@ -154,7 +155,7 @@ static double patch_share(const struct clipped_patch *patch) {
 
 /* Log likelihood of all patches without a sun; their log_sum. */
 static double settle(struct clipped_search *s, double power) {
-    struct clipped_scratch scratch = scratch_make(s);
+    struct clipped_scratch scratch;
     double sum = 0.0;
     s->power = power;
     for (size_t i = 0; i < s->patch_count; i++) {
@@ -169,7 +170,6 @@ static double settle(struct clipped_search *s, double power) {
         patch->log_sum = symmetric_sum_log(scratch.weight, all, patch->clipped, scratch.chance);
         sum += patch_share(patch) * (own - patch->log_sum);
     }
-    mem_free(scratch.weight);
     return sum;
 }
 
@@ -210,11 +210,10 @@ static double patch_evidence(const struct clipped_search *s, const struct clippe
 static double score_of(void *user, vec3 direction) {
     const struct clipped_search *s = user;
     const struct sun sun = {.direction = direction};
-    struct clipped_scratch scratch = scratch_make(s);
+    struct clipped_scratch scratch;
     double sum = 0.0;
     for (size_t i = 0; i < s->patch_count; i++)
         sum += patch_evidence(s, &s->patch[i], &sun, &scratch);
-    mem_free(scratch.weight);
     return sum;
 }
 
