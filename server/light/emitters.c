@@ -21,6 +21,10 @@
 #define OUTSHINES 1.3f
 /* A saturated pixel must be so much brighter than all around it: a bar before a white sky is as white as the sky. */
 #define OUTSHINES_SATURATED 1.05f
+/* Within a pixel of an edge it does not count either where it lies between others that saturate, in so many directions:
+ * the light may be theirs, as at a bar before a white sky. Along a tube one direction does. */
+#define BETWEEN_PAIRS 2
+#define BLEEDS (VIEWS_EDGE - 1)
 /* Least part of a segment's observations that are not outshone by their surroundings. Lamps in a row outshine each
  * other in many. */
 #define MIN_OWN_PART 0.25f
@@ -108,6 +112,8 @@ static bool outshines(const struct photograph *photo, const struct view *view, c
     if (edge == VIEWS_EDGE)
         return own > OUTSHINES * ring.brightest;
     bool is_saturated = photograph_sample_saturates(sample);
+    if (is_saturated && edge >= BLEEDS && ring.saturated_pairs >= BETWEEN_PAIRS)
+        return false;
     return own * ring.count >= (is_saturated ? OUTSHINES_SATURATED : 1.0f) * ring.sum;
 }
 

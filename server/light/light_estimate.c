@@ -75,9 +75,37 @@ static void hand_over(struct light_model *m) {
 
 /* --- the whole --------------------------------------------------------------------------------------------- */
 
-static void estimate(struct light_model *m, const struct views *views) {
+/* Marks the saturated segments that are no lamps; whether there are any. */
+static bool mark_lit(struct light_model *m) {
+    bool any = false;
+    for (size_t i = 0; i < m->lamps.count; i++) {
+        const struct light_lamp *lamp = &m->lamps.lamp[i];
+        for (size_t k = 0; k < lamp->segment_count; k++) {
+            struct emitter_evidence *e = &m->r->evidence[lamp->segment[k]];
+            bool saturates = e->saturated[0] || e->saturated[1] || e->saturated[2];
+            e->is_lit = lamp->kind == ESTIMATED_SEEN && saturates;
+            any = any || e->is_lit;
+        }
+    }
+    return any;
+}
+
+/* Where more segments saturate than can be tried at once, those that turn out to reflect make room for others: white
+ * walls are larger than lamps. */
+static void solve_all(struct light_model *m, const struct views *views) {
     light_model_survey(m, views, NULL, NULL);
     light_solve_deciding(m);
+    while (m->lamps.left_some_out && mark_lit(m)) {
+        struct reconstruction *r = m->r;
+        light_model_release(m);
+        light_model_init(m, r, views, false);
+        light_model_survey(m, views, NULL, NULL);
+        light_solve_deciding(m);
+    }
+}
+
+static void estimate(struct light_model *m, const struct views *views) {
+    solve_all(m, views);
     hidden_lamps_find(m);
     light_solve(m);
     light_finish(m);

@@ -121,7 +121,7 @@ static size_t sort_bright(const struct light_lamps *l, bool saturated, struct br
     for (size_t i = 0; i < r->segments.count; i++) {
         const struct emitter_evidence *e = &r->evidence[i];
         bool is_bright = saturated || (e->is_seen && emitters_outshine(rgb_mean(e->radiance), l->median_radiance));
-        bool may_shine = settings_emitter(r->settings, (uint32_t)i, !e->is_sunlit);
+        bool may_shine = settings_emitter(r->settings, (uint32_t)i, !e->is_sunlit && !e->is_lit);
         if (is_saturated(e) == saturated && is_bright && !l->is_lamp[i] && may_shine)
             (*found)[count++] = (struct bright){(uint32_t)i, (double)(rgb_mean(e->radiance) * l->light.area_m2[i])};
     }
@@ -131,9 +131,10 @@ static size_t sort_bright(const struct light_lamps *l, bool saturated, struct br
 
 static void choose_saturated(struct light_lamps *l) {
     struct bright *found;
-    size_t count = sort_bright(l, true, &found);
-    for (size_t i = 0; i < count && l->count <= LIGHT_MAX + l->r->openings.count; i++)
+    size_t count = sort_bright(l, true, &found), i;
+    for (i = 0; i < count && l->count <= LIGHT_MAX + l->r->openings.count; i++)
         add_saturated(l, found[i].segment);
+    l->left_some_out = i < count;
     mem_free(found);
 }
 

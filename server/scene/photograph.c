@@ -182,6 +182,7 @@ bool photograph_sample_cubic(const struct photograph *photo, float x, float y, r
 struct photograph_ring photograph_ring(const struct photograph *photo, float x, float y, float radius_px) {
     static const float along[8][2] = {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}};
     struct photograph_ring ring = {.darkest = INFINITY};
+    bool saturates[8] = {false};
     for (int i = 0; i < 8; i++) {
         struct photograph_sample at;
         float px = x + radius_px * along[i][0], py = y + radius_px * along[i][1];
@@ -193,6 +194,9 @@ struct photograph_ring photograph_ring(const struct photograph *photo, float x, 
         ring.darkest = fminf(ring.darkest, brightness);
         ring.sum += brightness;
         ring.count += 1.0f;
+        saturates[i] = photograph_sample_saturates(&at);
     }
+    for (int i = 0; i < 4; i++)
+        ring.saturated_pairs += saturates[i] && saturates[i + 4];
     return ring;
 }

@@ -117,9 +117,11 @@ static inline void photograph_cubic(float t, float weight[4]) {
     weight[3] = -0.5f * t * t * (1.0f - t);
 }
 
-/* Brightness (mean of the channels) at eight points on a circle; those outside the picture or masked are left out. */
+/* Brightness (mean of the channels) at eight points on a circle; those outside the picture or masked are left out. With
+ * no point left `darkest` is infinite and all else 0. */
 struct photograph_ring {
-    float brightest, darkest, sum, count; /* with no point left, `darkest` is infinite and the others are 0 */
+    float brightest, darkest, sum, count;
+    int saturated_pairs; /* of points opposite to each other, both saturate */
 };
 struct photograph_ring photograph_ring(const struct photograph *photo, float x, float y, float radius_px);
 

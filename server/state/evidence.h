@@ -19,6 +19,7 @@ struct emitter_evidence {
     bool is_unbounded;    /* a saturated lamp whose `radiance` is inferred from its light (light_model.h) */
     float deviation;      /* of such a lamp: standard deviation of the logarithm of `radiance` */
     bool is_sunlit;       /* it saturates in the light of a sun, mostly (sun_clipped.h), and is no lamp */
+    bool is_lit;          /* it saturates, but white paint would as well (light_solve.h), and is no lamp */
     bool is_outshone;     /* photographs show it, but no brighter than what is beside or behind it */
     rgb lambert;          /* mean radiance that a Lambertian surface of albedo 1 would reflect there */
     float emitted_share;  /* part of `radiance` beyond `lambert`, in [0, 1] */
