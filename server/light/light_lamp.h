@@ -32,7 +32,7 @@ struct light_lamps {
     const struct reconstruction *r; /* borrowed */
     float median_radiance;          /* of the room */
     struct segment_light light;
-    bool *is_lamp; /* [segment_count] segments of lamps, which known light goes without; owned */
+    bool *is_lamp;      /* [segment_count] segments of lamps, which known light goes without; owned */
     bool left_some_out; /* more saturate than there is room for */
     size_t count;
     struct light_lamp lamp[LIGHT_LAMPS_MAX];
@@ -50,8 +50,8 @@ const struct light_lamp *light_lamps_half(const struct light_lamps *l, size_t ha
 void light_lamps_add_sun(struct light_lamps *l, rgb least, rgb strength);
 const struct light_lamp *light_lamps_sun(const struct light_lamps *l);
 
-/* Adds the lamps at which photographs saturate, by r->evidence (emitters_observe), the largest first; with `again` those of r->light, and
- * the hidden ones, instead. And those that photographs measure. */
+/* Adds the lamps at which photographs saturate, by r->evidence (emitters_observe), the largest first; with `again`
+ * those of r->light, and the hidden ones, instead. And those that photographs measure. */
 void light_lamps_choose(struct light_lamps *l, bool again);
 
 /* Adds a hidden lamp. */

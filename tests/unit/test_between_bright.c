@@ -1,5 +1,6 @@
 /* emitters.h: a surface three pixels wide at which photographs saturate shines if what is around it is dark, also where
- * a tube goes on; between a white sky on both sides nobody knows whose light it is, though one pixel near it is dark. */
+ * a tube goes on; between a white sky on both sides nobody knows whose light it is, though one pixel near it is
+ * dark. */
 #include "server/light/emitters.h"
 
 #include "tests/unit/plane_rig.h"
