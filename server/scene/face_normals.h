@@ -28,6 +28,9 @@ static inline bool face_normals_are_noisy(const struct face_normals *f) {
     return face_normals_are_rough(f) && f->least_difference > 0.002f;
 }
 
+/* So rough that the filter cannot tell noise from edges: adjacent normals differ by 20 degrees. */
+static inline bool face_normals_are_crumpled(const struct face_normals *f) { return f->roughness > 0.35f; }
+
 /* Unit normal of welded vertex v: area-weighted mean over its triangles; 0 where it has none. */
 vec3 face_normals_at(const struct face_normals *f, size_t v);
 

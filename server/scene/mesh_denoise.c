@@ -11,6 +11,7 @@
 #include "server/scene/mesh_round.h"
 
 #define CHUNK 1024               /* vertices per work item */
+#define CRUMPLED_PASSES 8        /* of averaging over direct neighbours, at most */
 #define ROUNDS 3                 /* of filtering normals and then fitting vertices to them */
 #define STEPS_PER_ROUND 10       /* fixed-point iterations of the vertex update */
 #define CURVED_PASSES 2          /* of smoothing curved surfaces; the first gives them better normals */
@@ -168,6 +169,36 @@ static void recompute_normals(struct denoising *d, struct face_normals *faces, s
     face_normals_init(faces, d->mesh, pool);
 }
 
+/* --- noise as large as triangles ---------------------------------------------------------------- */
+
+static void mean_chunk(void *user, size_t chunk, int thread) {
+    (void)thread;
+    const struct denoising *d = user;
+    const struct face_normals *f = d->faces;
+    for (size_t v = chunk * CHUNK; v < chunk_end(d->mesh, chunk); v++) {
+        vec3 sum = d->mesh->position[v];
+        float count = 1.0f;
+        for (uint32_t i = f->first[v]; i < f->first[v + 1]; i++) {
+            for (int c = 0; c < 3; c++) {
+                uint32_t other = f->weld[d->mesh->index[f->triangle[i]][c]];
+                sum = other == v ? sum : vec3_add(sum, d->mesh->position[other]);
+                count += other != v;
+            }
+        }
+        d->next[v] = vec3_scale(sum, 1.0f / count);
+    }
+}
+
+/* Moves vertices to the mean of their neighbours until normals tell of the surface again. What is lost at edges the
+ * planes bring back, which are fitted to where the vertices were. */
+static void average_crumpled(struct denoising *d, struct face_normals *faces, struct parallel *pool) {
+    for (int pass = 0; pass < CRUMPLED_PASSES && face_normals_are_crumpled(faces); pass++) {
+        parallel_for(pool, chunks_of(d->mesh), mean_chunk, d);
+        set_positions(d->mesh, faces->weld, d->next);
+        recompute_normals(d, faces, pool);
+    }
+}
+
 static void denoise_rough(struct denoising *d, struct face_normals *faces, struct parallel *pool) {
     size_t vertices = d->mesh->vertex_count;
     struct mesh_planes planes;
@@ -179,6 +210,7 @@ static void denoise_rough(struct denoising *d, struct face_normals *faces, struc
     d->displacement = mem_array(vertices, sizeof *d->displacement);
     d->value = mem_array(vertices, sizeof *d->value);
     d->average = mem_array(vertices, sizeof *d->average);
+    average_crumpled(d, faces, pool);
     for (int round = 0; round < ROUNDS; round++) {
         fit_vertices_to_normals(d, pool);
         recompute_normals(d, faces, pool);
