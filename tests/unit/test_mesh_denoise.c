@@ -8,7 +8,8 @@
 #include "tests/check.h"
 #include "tests/unit/rough_mesh.h"
 
-#define ROUGH 0.02f /* vertices are off by as much at most, evenly */
+#define ROUGH 0.02f   /* vertices are off by as much at most, evenly */
+#define CRUMPLED 0.2f /* edges are .1 */
 #define DEVIATION (ROUGH / sqrtf(3.0f))
 
 /* Root of the mean square of the distance of the sheets' vertices from their plane; of those on the edge between them
@@ -54,6 +55,21 @@ static void test_sheets(struct parallel *pool) {
     CHECK(memcmp(other.position, m.position, m.vertex_count * sizeof *m.position) == 0);
     parallel_free(one);
     mesh_release(&other);
+    mesh_release(&m);
+    mesh_release(&before);
+}
+
+/* Noise as large as the edges of triangles: their normals tell nothing. */
+static void test_crumpled(struct parallel *pool) {
+    struct mesh before, m;
+    rough_sheets(&before, CRUMPLED);
+    rough_sheets(&m, CRUMPLED);
+    float noise = mesh_denoise(&m, pool), deviation = CRUMPLED / sqrtf(3.0f);
+    CHECK_THAT(noise > 0.8f * deviation && noise < 1.2f * deviation, "%g, true is %g", (double)noise,
+               (double)deviation);
+    float was = off_plane(&before, false), is = off_plane(&m, false), edge = off_plane(&m, true);
+    CHECK_THAT(is < 0.2f * was, "%g of %g", (double)is, (double)was);
+    CHECK_THAT(edge < 0.5f * was, "%g of %g", (double)edge, (double)was);
     mesh_release(&m);
     mesh_release(&before);
 }
@@ -124,6 +140,7 @@ static void test_kept(struct parallel *pool) {
 int main(void) {
     struct parallel *pool = parallel_new(3);
     test_sheets(pool);
+    test_crumpled(pool);
     test_ball(pool);
     test_box(pool);
     test_kept(pool);
