@@ -2,7 +2,8 @@
  *
  * Vertices of a scan are off by millimetres, independently. Photographs then see one surface point in different
  * places, silhouettes are jagged, and a carpet intersects its floor. Triangle normals are filtered (face_normals.h)
- * and vertices are moved until the triangles have these normals (Sun et al. 2007). Edges survive.
+ * and vertices are moved until the triangles have these normals (Sun et al. 2007). Edges survive. Where noise is as
+ * large as triangles normals tell nothing: vertices are averaged first, until they do.
  *
  * The filter flattens curved surfaces of few triangles. So the mean displacement of a neighbourhood is undone, and
  * where displacements exceed the noise they are shrunk by a Wiener factor. Then planar regions are flattened
