@@ -168,7 +168,8 @@ decimated to 50 %,0.0005,0.5,1.02
 decimated to 10 %,0.0005,0.1,1.03"
 }
 
-# Table 1 on a mesh as dense as a scanner's, with edges of 2 cm in the mean, its lamps flush with wall and ceiling, as in the paper's offices.
+# Table 1 on a mesh as dense as a scanner's, with edges of 2 cm in the mean, its lamps flush with wall and ceiling, as in
+# the paper's offices.
 dense() {
     demo_room 15 15 --flush-lamps || return
     spoil "Table 1, dense mesh, flush lamps" "$dense_edge" <<<"flat,0,1,-
