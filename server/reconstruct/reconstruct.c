@@ -173,9 +173,23 @@ static enum status run_resumable(struct stage_run *run, struct error *err) {
     return status;
 }
 
+/* A room of which photographs show something has light; where none was found, all is black in it, and base colours are
+ * what is left of a division by nothing. */
+static void report_lit(const struct stage_run *run) {
+    const struct reconstruction *r = run->r;
+    bool is_lit = r->sun.is_there || (r->environment.map.pixel && r->environment.luminance > 0.0);
+    for (size_t i = 0; i < r->segments.count; i++)
+        is_lit = is_lit || r->is_emitter[i];
+    json_add_bool(r->report, "lit", is_lit);
+    if (!is_lit)
+        run->hooks->log(run->hooks->user, "light: nothing that shines was found: renders are black, and base colours "
+                                          "mean nothing. Is the mesh that of the photographs?");
+}
+
 static enum status report(struct stage_run *run, struct error *err) {
     measure_spread(run->r);
     world_update_lights(&run->r->world);
+    report_lit(run);
     report_emitters(run->r);
     light_report(run->r);
     report_grey_card(run->r, run->hooks);

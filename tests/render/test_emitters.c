@@ -1,4 +1,5 @@
-/* emitters.h: a lamp is found, and of a speck in mixed pixels a single look that is too bright tells nothing. */
+/* emitters.h: a lamp is found, and of a speck in mixed pixels a single look that is too bright tells nothing. A room in
+ * which nothing shines is said to be none. */
 #include "server/state/evidence.h"
 #include "server/state/reconstruction.h"
 #include "tests/check.h"
@@ -44,6 +45,15 @@ static void check_emitters(struct scene *scene, size_t frame) {
         CHECK_THAT(r.is_emitter[s] == (r.segments.id[s] == LAMP), "segment %zu, frame %zu", s, frame);
         CHECK_THAT(r.evidence[s].is_seen == (r.segments.id[s] != SPECK), "segment %zu, frame %zu", s, frame);
     }
+    CHECK(cJSON_IsTrue(cJSON_GetObjectItem(r.report, "lit")));
+    reconstruct_release(&r);
+}
+
+/* Its only lamp is told to be none. */
+static void test_unlit(struct scene *scene) {
+    struct reconstruction r;
+    shell_solve_with("{" SHELL_COARSE_TEXTURE "," SHELL_LITTLE ",\"emitters.6\":\"off\"}", scene, 0, &r);
+    CHECK(cJSON_IsFalse(cJSON_GetObjectItem(r.report, "lit")));
     reconstruct_release(&r);
 }
 
@@ -61,6 +71,7 @@ int main(void) {
         brighten_speck(&scene.photograph[f], 1.0f / BRIGHTER);
     }
     CHECK(tried > 0);
+    test_unlit(&scene);
     scene_release(&scene);
     parallel_free(pool);
     return check_result();
