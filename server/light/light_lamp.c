@@ -108,8 +108,11 @@ static int by_power(const void *a, const void *b) {
     return (first->segment > second->segment) - (first->segment < second->segment);
 }
 
-static bool is_saturated(const struct emitter_evidence *e) {
-    return e->is_seen && (e->saturated[0] || e->saturated[1] || e->saturated[2]);
+/* What is as white as all around it may be that; not where people say that it shines. */
+static bool is_saturated(const struct reconstruction *r, uint32_t segment) {
+    const struct emitter_evidence *e = &r->evidence[segment];
+    bool is_known = e->is_seen || (e->is_outshone && settings_emitter(r->settings, segment, false));
+    return is_known && (e->saturated[0] || e->saturated[1] || e->saturated[2]);
 }
 
 /* Segments, of those that are saturated or are not, that outshine the room, most power first; *found is the
@@ -122,7 +125,7 @@ static size_t sort_bright(const struct light_lamps *l, bool saturated, struct br
         const struct emitter_evidence *e = &r->evidence[i];
         bool is_bright = saturated || (e->is_seen && emitters_outshine(rgb_mean(e->radiance), l->median_radiance));
         bool may_shine = settings_emitter(r->settings, (uint32_t)i, !e->is_sunlit && !e->is_lit);
-        if (is_saturated(e) == saturated && is_bright && !l->is_lamp[i] && may_shine)
+        if (is_saturated(r, (uint32_t)i) == saturated && is_bright && !l->is_lamp[i] && may_shine)
             (*found)[count++] = (struct bright){(uint32_t)i, (double)(rgb_mean(e->radiance) * l->light.area_m2[i])};
     }
     qsort(*found, count, sizeof **found, by_power);
