@@ -126,6 +126,7 @@ static void try(struct room *room, const struct image *sky, const struct image *
                               .environment_confidence = known,
                               .comparison_count = VIEWS,
                               .comparison = comparison,
+                              .has_materials = true,
                               .report = report};
     enum status status = export_outputs(dir, &in, NULL, NULL, &err);
     CHECK_THAT(status == STATUS_OK, "%s", err.message);
