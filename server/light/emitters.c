@@ -172,9 +172,8 @@ static void fill_evidence(struct emitter_evidence *e, struct edge_class *class) 
     e->observed = rgb_make(value[0], value[1], value[2]);
     if (e->is_unbounded)
         return;
-    bool is_measured = !(e->saturated[0] || e->saturated[1] || e->saturated[2]);
     /* Near edges dark observations are left out as outshone: only those away from them have an unbiased mean. */
-    bool obstructed = best == class && e->is_seen && is_measured && is_obstructed(&class->sums);
+    bool obstructed = best == class && e->is_seen && !evidence_saturates(e) && is_obstructed(&class->sums);
     evidence_set_radiance(e, obstructed ? mean_radiance(&class->sums, e->observed) : e->observed);
 }
 

@@ -82,8 +82,7 @@ static bool mark_lit(struct light_model *m) {
         const struct light_lamp *lamp = &m->lamps.lamp[i];
         for (size_t k = 0; k < lamp->segment_count; k++) {
             struct emitter_evidence *e = &m->r->evidence[lamp->segment[k]];
-            bool saturates = e->saturated[0] || e->saturated[1] || e->saturated[2];
-            e->is_lit = lamp->kind == ESTIMATED_SEEN && saturates;
+            e->is_lit = lamp->kind == ESTIMATED_SEEN && evidence_saturates(e);
             any = any || e->is_lit;
         }
     }

@@ -112,7 +112,7 @@ static int by_power(const void *a, const void *b) {
 static bool is_saturated(const struct reconstruction *r, uint32_t segment) {
     const struct emitter_evidence *e = &r->evidence[segment];
     bool is_known = e->is_seen || (e->is_outshone && settings_emitter(r->settings, segment, false));
-    return is_known && (e->saturated[0] || e->saturated[1] || e->saturated[2]);
+    return is_known && evidence_saturates(e);
 }
 
 /* Segments, of those that are saturated or are not, that outshine the room, most power first; *found is the

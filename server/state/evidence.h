@@ -28,6 +28,11 @@ struct emitter_evidence {
     float sky_lambert;    /* mean radiance of a Lambertian surface of albedo 1 by unobserved sky (sky_doubt.h) */
 };
 
+/* Whether `observed` is no more than a lower bound. */
+static inline bool evidence_saturates(const struct emitter_evidence *e) {
+    return e->saturated[0] || e->saturated[1] || e->saturated[2];
+}
+
 static inline void evidence_set_radiance(struct emitter_evidence *e, rgb radiance) { e->radiance = radiance; }
 
 /* Sets `lambert`, and `emitted_share` from it and from `radiance`. */

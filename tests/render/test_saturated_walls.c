@@ -62,8 +62,7 @@ int main(void) {
     shell_solve_with(SETTINGS, &scene, 0, &r);
     for (size_t s = 0; s < r.segments.count; s++) {
         bool is_lamp = r.segments.id[s] == LAMP;
-        const bool *by_channel = r.evidence[s].saturated;
-        saturated += r.evidence[s].is_seen && (by_channel[0] || by_channel[1] || by_channel[2]);
+        saturated += r.evidence[s].is_seen && evidence_saturates(&r.evidence[s]);
         CHECK_THAT(r.is_emitter[s] == is_lamp, "object %d", (int)r.segments.id[s]);
         if (is_lamp)
             CHECK_THAT(r.materials.emission[s].r > 0.5f * lamp_radiance.r, "%g", (double)r.materials.emission[s].r);
