@@ -179,6 +179,11 @@ static void put_weak(struct buf *out, const cJSON *report) {
     double unseen = number_at(report, "unseen_light", "share_of_rays");
     int reasons = 0;
     buf_puts(out, "<p>Where it is weak:</p><ul>");
+    if (cJSON_IsFalse(cJSON_GetObjectItemCaseSensitive(report, "lit"))) {
+        buf_puts(out, "<li>Nothing that shines was found: re-renders are black, and base colours mean nothing. Is the "
+                      "mesh that of the photographs?</li>");
+        reasons++;
+    }
     if (seen < SEEN_WHOLE) {
         buf_printf(out, "<li>%.0f %% of the surface is in no photograph: its colour is that of its surroundings.</li>",
                    100.0 * (1.0 - seen));

@@ -45,6 +45,8 @@ int main(void) {
     CHECK(!says(bad, "No weakness is known"));
     CHECK(says("{\"calibration\": {\"contrast_unknown\": true}}", "The exposures of the photographs are not told"));
     CHECK(!says("{\"calibration\": {\"contrast_unknown\": false}}", "not told"));
+    CHECK(says("{\"lit\": false}", "Nothing that shines was found"));
+    CHECK(!says("{\"lit\": true}", "Nothing that shines") && !says(good, "Nothing that shines"));
     const char *holes =
         "{\"holes\": {\"filled\": 2, \"filled_m2\": 145.2, \"openings_kept\": 1, \"openings_m2\": 0.5}}";
     CHECK(says(holes, "2 holes of the mesh were filled, 145 m²"));
