@@ -76,7 +76,7 @@ void environment_fill(struct environment *e) {
 
 void environment_update_figures(struct environment *e) {
     size_t cells = environment_pixel_count(e), spread_count = 0;
-    double all = 0.0, seen = 0.0, luminance = 0.0, seen_luminance = 0.0;
+    double all = 0.0, seen = 0.0, bound = 0.0, luminance = 0.0, seen_luminance = 0.0;
     float *spread = mem_array(cells, sizeof *spread);
     for (size_t i = 0; i < cells; i++) {
         const float *known = e->confidence.pixel + 2 * i;
@@ -85,11 +85,14 @@ void environment_update_figures(struct environment *e) {
         all += angle;
         luminance += light;
         seen += known[0] > 0.0f ? angle : 0.0;
+        bound += e->is_bound && e->is_bound[i] ? angle : 0.0;
         seen_luminance += known[0] > 0.0f ? light : 0.0;
         if (known[0] > 1.0f)
             spread[spread_count++] = known[1];
     }
     e->seen_share = seen / all;
+    if (e->is_bound)
+        e->saturated_share = seen > 0.0 ? bound / seen : 0.0;
     e->median_spread = (double)quantile(spread, spread_count, 0.5);
     e->luminance = luminance / all;
     e->seen_luminance = seen > 0.0 ? seen_luminance / seen : 0.0;

@@ -8,9 +8,11 @@
 
 #include <math.h>
 
+#include "common/image_ceiling.h"
 #include "common/mem.h"
 #include "common/quantile.h"
 #include "server/capture/censored.h"
+#include "server/capture/environment_bounds.h"
 #include "server/scene/latlong.h"
 
 /* Metres: distance of a point that every camera of a room sees in the same direction; +25 %: no change. */
@@ -44,6 +46,7 @@ struct environment_windows {
     size_t window_count;
     struct window *window;    /* [window_count] */
     struct censored *scratch; /* [threads][3][window_count] observations of one direction */
+    struct environment_ceiling ceiling;
 };
 
 /* --- photographs with open pixels ------------------------------------------------------------ */
@@ -180,9 +183,15 @@ static struct cell cell_at(const struct image *map, size_t column, size_t row) {
     };
 }
 
-/* A photograph's observation of a pixel, for each channel; false: none. */
+/* The radiance up to which a photograph measures. */
+static float ceiling_of(const struct photograph *photo, const struct photograph_sample *sample) {
+    float least = fminf(sample->clip_radiance.r, fminf(sample->clip_radiance.g, sample->clip_radiance.b));
+    return fminf(least, IMAGE_HALF_LARGEST / photo->exposure);
+}
+
+/* A photograph's observation of a pixel, for each channel, and the radiance up to which it measures; false: none. */
 static bool sample_window(const struct environment_windows *g, const struct window *w, const struct cell *cell,
-                          struct censored value[3]) {
+                          struct censored value[3], float *ceiling) {
     const struct views *v = g->views;
     const struct photograph *photo = &v->scene->photograph[v->train[w->train]];
     vec3 origin = camera_origin(&photo->camera);
@@ -199,6 +208,7 @@ static bool sample_window(const struct environment_windows *g, const struct wind
             !photograph_sample(photo, x, y, &sample))
             continue;
         float tap_weight = views_open(v, w->train, x, y, 1) ? 1.0f : RIM_WEIGHT;
+        *ceiling = ceiling_of(photo, &sample);
         const float radiance[3] = {sample.radiance.r, sample.radiance.g, sample.radiance.b};
         for (int c = 0; c < 3; c++) {
             sum[c] += tap_weight * radiance[c];
@@ -240,8 +250,10 @@ static void gather_cell(struct environment_windows *g, size_t column, size_t row
     for (size_t i = 0; i < g->window_count; i++) {
         const struct window *w = &g->window[i];
         struct censored value[3];
-        if (vec3_dot(cell.centre, w->axis) < w->cosine || !sample_window(g, w, &cell, value))
+        float ceiling = 0.0f;
+        if (vec3_dot(cell.centre, w->axis) < w->cosine || !sample_window(g, w, &cell, value, &ceiling))
             continue;
+        g->ceiling.radiance[at] = fmaxf(g->ceiling.radiance[at], ceiling);
         for (size_t c = 0; c < 3; c++)
             scratch[c * g->window_count + count] = value[c];
         spread_add(&spread, value);
@@ -249,15 +261,14 @@ static void gather_cell(struct environment_windows *g, size_t column, size_t row
     }
     if (count == 0)
         return;
-    bool is_bound = false;
     for (size_t c = 0; c < 3; c++) {
-        bool channel_is_bound;
-        e->map.pixel[3 * at + c] = fmaxf(combine(scratch + c * g->window_count, count, &channel_is_bound), 0.0f);
-        is_bound |= channel_is_bound;
+        bool is_bound;
+        e->map.pixel[3 * at + c] = fmaxf(combine(scratch + c * g->window_count, count, &is_bound), 0.0f);
+        g->ceiling.bound_channels[at] |= (uint8_t)(is_bound << c);
     }
     e->confidence.pixel[2 * at] = (float)count;
     e->confidence.pixel[2 * at + 1] = spread_of(&spread);
-    e->is_bound[at] = is_bound;
+    e->is_bound[at] = g->ceiling.bound_channels[at] != 0;
 }
 
 static void gather_row(void *user, size_t row, int thread) {
@@ -286,70 +297,35 @@ static void join_pole(struct environment *e, size_t row) {
     }
 }
 
-/* --- lower bounds ------------------------------------------------------------------------------- */
-
-/* Median of the channels' mean over measured directions; 0 where there is none. */
-static float median_measured(const struct environment *e) {
-    size_t cells = environment_pixel_count(e), count = 0;
-    float *measured = mem_array(cells, sizeof *measured);
-    for (size_t i = 0; i < cells; i++) {
-        if (environment_pixel_is_seen(e, i) && !e->is_bound[i])
-            measured[count++] = rgb_mean(environment_pixel_radiance(e, i));
-    }
-    float median = quantile(measured, count, 0.5);
-    mem_free(measured);
-    return median;
-}
-
-/* Where only long exposures look out, their lower bound is below the radiance measured elsewhere and carries no
- * information: such directions count as unseen. With a single exposure no bound is below measured values. */
-static void drop_weak_bounds(struct environment *e) {
-    float median = median_measured(e);
-    for (size_t i = 0; i < environment_pixel_count(e); i++) {
-        if (e->is_bound[i] && rgb_mean(environment_pixel_radiance(e, i)) < median) {
-            e->is_bound[i] = false;
-            e->confidence.pixel[2 * i] = e->confidence.pixel[2 * i + 1] = 0.0f;
-        }
-    }
-}
-
-/* Share of the seen solid angle with a lower bound only; negative where nothing is seen. */
-static double saturated_share(const struct environment *e) {
-    double seen = 0.0, saturated = 0.0;
-    for (size_t i = 0; i < environment_pixel_count(e); i++) {
-        double angle = environment_pixel_is_seen(e, i) ? environment_cell_angle(e, i / e->map.width) : 0.0;
-        seen += angle;
-        saturated += e->is_bound[i] ? angle : 0.0;
-    }
-    return seen > 0.0 ? saturated / seen : -1.0;
-}
-
 /* --- the whole ---------------------------------------------------------------------------------- */
 
 bool environment_gather(struct environment *e, const struct views *views, float edge_m, struct parallel *pool) {
     struct environment_windows g = {.views = views, .e = e};
-    double saturated = -1.0;
+    bool any = false;
     *e = (struct environment){0};
     uint32_t width = find_windows(&g, pool);
     if (width > 0) {
         environment_make_empty(e, width);
         e->rim_angle = angle_at_rims(&g, edge_m);
         g.scratch = mem_array((size_t)parallel_thread_count(pool) * 3 * g.window_count, sizeof *g.scratch);
+        g.ceiling.radiance = mem_calloc(environment_pixel_count(e), sizeof *g.ceiling.radiance);
+        g.ceiling.bound_channels = mem_calloc(environment_pixel_count(e), sizeof *g.ceiling.bound_channels);
         parallel_for(pool, e->map.height, gather_row, &g);
         join_pole(e, 0);
         join_pole(e, e->map.height - 1);
-        drop_weak_bounds(e);
-        saturated = saturated_share(e);
+        environment_tell_bounds(e, &g.ceiling);
+        for (size_t i = 0; i < environment_pixel_count(e) && !any; i++)
+            any = environment_pixel_is_seen(e, i); /* open pixels may all be masked */
     }
-    bool any = saturated >= 0.0; /* open pixels may all be masked */
     if (any) {
         environment_fill(e);
         environment_update_figures(e);
-        e->saturated_share = saturated;
         e->photograph_count = g.window_count;
     } else {
         environment_release(e);
     }
+    mem_free(g.ceiling.radiance);
+    mem_free(g.ceiling.bound_channels);
     mem_free(g.scratch);
     mem_free(g.window);
     return any;

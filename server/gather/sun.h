@@ -12,13 +12,17 @@
 #include "server/render/accel.h"
 #include "server/scene/surface.h"
 
+/* Radians: half the angle under which the sun appears, .27 degrees. */
+#define SUN_RADIUS_RAD 0.0047f
+
 struct sun {
     bool is_there;
     bool is_measured; /* photographs show it, and how bright it is */
-    bool is_clipped;  /* photographs saturate in its light: how bright it is comes from the joint fit (sun_clipped.h) */
+    bool is_clipped;  /* photographs saturate in it, or in its light: how bright it is comes from the joint fit */
     vec3 direction;   /* unit, towards its middle */
     float radius_rad; /* angular radius */
     rgb irradiance;   /* of a surface that faces it */
+    rgb least;        /* the same, as far as saturated photographs tell it */
 };
 
 /* Unit direction uniformly distributed over the disc, for u in [0, 1)^2. */

@@ -35,7 +35,8 @@ static struct hole_scatter scatter_away(const struct hole_observations *observat
             uint32_t column = (uint32_t)u < columns ? (uint32_t)u : columns - 1;
             uint32_t row = (uint32_t)v < rows ? (uint32_t)v : rows - 1;
             at[end] = row * columns + column;
-            hole_mean_add(&mean[at[end]], l->value);
+            if (!l->is_saturated)
+                hole_mean_add(&mean[at[end]], l->value);
         }
         for (size_t k = i; k < end; k++)
             hole_mean_close(&mean[at[k]]);
@@ -89,7 +90,7 @@ static void add_steps(struct hole_steps *steps, const struct hole_grid *grid, co
     for (int k = 0; k < 4; k++) {
         const struct hole_cell *next = seen_surface(grid, plane, at, 2 * way[k][0], 2 * way[k][1]);
         const struct hole_cell *after = seen_surface(grid, plane, at, 4 * way[k][0], 4 * way[k][1]);
-        if (next)
+        if (next && grid->cell[at].open.photographs > 0)
             steps->across[steps->across_count++] = (float)fabs(hole_mean_value(&next->surface) - own);
         if (next && after)
             steps->beside[steps->beside_count++] =

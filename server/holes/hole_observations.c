@@ -195,7 +195,8 @@ void hole_observations_assign(struct hole_observations *observations, struct hol
             assign(observation, observations, grid);
             if (observation->cell == HOLE_NO_CELL)
                 continue;
-            hole_mean_add(&grid->cell[observation->cell].open, observation->value);
+            if (!observation->is_saturated)
+                hole_mean_add(&grid->cell[observation->cell].open, observation->value);
             grid->cell[observation->cell].opened++;
         }
         for (size_t k = i; k < end; k++) {

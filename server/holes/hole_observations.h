@@ -16,7 +16,7 @@
 /* A pixel whose ray meets no surface and that is not dark. */
 struct hole_observation {
     vec3 direction;            /* unit */
-    float value;               /* log radiance */
+    float value;               /* log radiance; where it is saturated a lower bound, which is in no mean */
     uint32_t train;            /* index into views.train; observations are in its order */
     uint32_t cell;             /* that it is taken to see, or HOLE_NO_CELL */
     bool is_saturated, is_out; /* is_out: no cell on its way is left */

@@ -57,7 +57,8 @@ struct ratio_sums {
 struct edge_class {
     struct channel_values channel[3];
     struct ratio_sums sums;
-    size_t outshone_count; /* observations left out since something beside was as bright */
+    size_t outshone_count;                    /* observations left out since something beside was as bright */
+    size_t clear_count, clear_outshone_count; /* unsaturated ones: that are in, that were left out */
 };
 
 static void add_value(struct channel_values *v, float radiance, bool saturated) {
@@ -132,8 +133,10 @@ static void observe_texel(const struct evidence_job *job, uint32_t texel, struct
             continue;
         if (!outshines(photo, &view[k], &sample, edge)) {
             class[edge].outshone_count++;
+            class[edge].clear_outshone_count += !photograph_sample_saturates(&sample);
             continue;
         }
+        class[edge].clear_count += !photograph_sample_saturates(&sample);
         add_to_sums(r, texel, &sample, &class[edge].sums);
         struct channel_values *channel = class[edge].channel;
         add_value(&channel[0], sample.radiance.r, sample.saturated[0]);
@@ -157,19 +160,42 @@ static struct edge_class *choose_class(struct edge_class *class) {
     return best;
 }
 
+static bool is_own(size_t own, size_t outshone) { return (float)own >= MIN_OWN_PART * (float)(own + outshone); }
+
+/* Whether photographs that saturate are outvoted by others, which do not, and in which something beside is brighter: a
+ * bar before a white sky. Mixed pixels, which are outshone by their own surface, do not vote. */
+static bool is_outvoted(const struct edge_class *class) {
+    size_t own = 0, outshone = 0;
+    for (int edge = 0; edge < VIEWS_EDGE; edge++) {
+        own += class[edge].clear_count;
+        outshone += class[edge].clear_outshone_count;
+    }
+    return outshone >= MIN_OBSERVATIONS && !is_own(own, outshone);
+}
+
+/* Medians of a class. */
+static void take_medians(struct emitter_evidence *e, struct edge_class *class) {
+    float value[3] = {0};
+    for (int c = 0; c < 3; c++)
+        e->saturated[c] = class->channel[c].count > 0 &&
+                          !quantile_bounded_median(class->channel[c].value, class->channel[c].count, &value[c]);
+    e->observed = rgb_make(value[0], value[1], value[2]);
+}
+
 static void fill_evidence(struct emitter_evidence *e, struct edge_class *class) {
     struct edge_class *best = choose_class(class);
-    size_t count = best->channel[0].count, least = best == &class[VIEWS_EDGE] ? MIN_OBSERVATIONS_MIXED : 1;
-    e->is_seen = count >= least && (float)count >= MIN_OWN_PART * (float)(count + best->outshone_count);
+    size_t least = best == &class[VIEWS_EDGE] ? MIN_OBSERVATIONS_MIXED : 1;
+    e->is_seen = best->channel[0].count >= least && is_own(best->channel[0].count, best->outshone_count);
     e->is_outshone = !e->is_seen && outshone_count(class) >= MIN_OBSERVATIONS;
     if (!e->is_seen)
         best = class; /* mostly outshone: no value */
     e->only_mixed = best == &class[VIEWS_EDGE];
-    float value[3] = {0};
-    for (int c = 0; c < 3; c++)
-        e->saturated[c] = best->channel[c].count > 0 &&
-                          !quantile_bounded_median(best->channel[c].value, best->channel[c].count, &value[c]);
-    e->observed = rgb_make(value[0], value[1], value[2]);
+    take_medians(e, best);
+    if (evidence_saturates(e) && is_outvoted(class)) {
+        e->is_seen = false;
+        e->is_outshone = true;
+        e->observed = rgb_gray(0.0f);
+    }
     if (e->is_unbounded)
         return;
     /* Near edges dark observations are left out as outshone: only those away from them have an unbiased mean. */

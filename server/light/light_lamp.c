@@ -219,6 +219,8 @@ struct joint_source light_lamps_prior(const struct light_lamps *l, const struct 
         source.deviation = SEEN_DEVIATION;
         source.least = -INFINITY;
     }
+    if (lamp->kind == ESTIMATED_SUN)
+        source.mean = fmax(source.mean, light_lamps_hidden_prior(l).mean);
     source.value = fmax(log(fmax((double)rgb_mean(lamp->radiance), 1e-30)), source.least);
     return source;
 }

@@ -30,7 +30,9 @@ void light_model_init(struct light_model *m, struct reconstruction *r, const str
     if (r->sun.is_clipped) {
         sunlit_init(&m->sunlit, r);
         sunlit_mark(&m->sunlit);
-        light_lamps_add_sun(&m->lamps, sunlit_least(&m->sunlit), rgb_scale(r->sun.irradiance, 1.0f / BSDF_PI));
+        rgb least = sunlit_least(&m->sunlit), shown = rgb_scale(r->sun.least, 1.0f / BSDF_PI);
+        least = rgb_make(fmaxf(least.r, shown.r), fmaxf(least.g, shown.g), fmaxf(least.b, shown.b));
+        light_lamps_add_sun(&m->lamps, least, rgb_scale(r->sun.irradiance, 1.0f / BSDF_PI));
     }
     light_lamps_choose(&m->lamps, again);
 }

@@ -19,8 +19,8 @@
  *                                   deviations that confidence.exr states
  *   plain_specks                    as evaluate's (plain_surface.h)
  *
- * With PICTURES, and unless that is "": of each held-out view base_color_NNN.png (true | recovered). With TRUTH the
- * held-out views of that folder in place of ROOM's (scan_ceiling). */
+ * With PICTURES, and unless that is "": of each held-out view base_color_NNN.png and emission_NNN.png (true and
+ * recovered). With TRUTH the held-out views of that folder in place of ROOM's (scan_ceiling). */
 #include "tests/bench/capture_frame.h"
 
 #define SAMPLES 16
@@ -48,6 +48,19 @@ static void leave_out(struct comparison *c, const struct image *truth, const str
     }
 }
 
+static enum status write_pictures(const char *folder, const char *stem, const struct image *truth,
+                                  const struct image *found, struct error *err) {
+    const char *const names[] = {"base_color", "emission"};
+    enum status status = STATUS_OK;
+    for (size_t i = 0; i < sizeof names / sizeof *names && status == STATUS_OK; i++) {
+        char *path = mem_printf("%s/%s_%s.png", folder, names[i], stem), *prefix = mem_printf("%s.", names[i]);
+        status = pair_picture_write(path, truth, found, prefix, 1.0f, err);
+        mem_free(path);
+        mem_free(prefix);
+    }
+    return status;
+}
+
 static enum status score_view(struct comparison *c, const struct photograph *p, const char *truths,
                               const char *pictures, struct error *err) {
     struct image truth = {0}, found = {0}, deviation = {0};
@@ -70,10 +83,8 @@ static enum status score_view(struct comparison *c, const struct photograph *p, 
         deviation_coverage_add(&c->coverage, &found, &deviation, &truth, flags);
     }
     plain_surface_add(&c->plain, &found, &truth, flags);
-    path = pictures ? mem_printf("%s/base_color_%s.png", pictures, stem) : NULL;
-    if (path)
-        status = pair_picture_write(path, &truth, &found, "base_color.", 1.0f, err);
-    mem_free(path);
+    if (pictures)
+        status = write_pictures(pictures, stem, &truth, &found, err);
 out:
     image_release(&truth);
     image_release(&found);

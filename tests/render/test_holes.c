@@ -1,6 +1,7 @@
 /* test_holes.c -- a room of 4 x 3 x 3 m whose mesh lacks 2 x 1.5 m of a wall, photographed with what may be there: the
- * wall, painted or plain; sky, clouded or plain; a room beyond; nothing. Photographs are closed forms. Or it lacks what
- * none of them shows: a part of the wall behind a panel, the floor within a block that reaches the ceiling. */
+ * wall, painted or plain, also where some photographs saturate; sky, clouded or plain; a room beyond; nothing.
+ * Photographs are closed forms. Or it lacks what none of them shows: a part of the wall behind a panel, the floor
+ * within a block that reaches the ceiling. */
 #include "server/holes/holes.h"
 
 #include "common/image.h"
@@ -14,8 +15,9 @@
 #define WALL 4         /* the object of the wall at z = 0 */
 #define HOLE_M2 3.0    /* x of 1 to 3 m, y of 1.25 to 2.75 m */
 #define BEYOND_Z -1.5f /* of the wall of the room beyond */
+#define CLIP 0.32f     /* the painted wall is of .3 to .9 */
 
-enum shown { PAINTED_WALL, PLAIN_WALL, FAINT_CLOUDS, CLOUDED_SKY, PLAIN_SKY, ROOM_BEYOND, NOTHING };
+enum shown { PAINTED_WALL, CLIPPED_WALL, PLAIN_WALL, FAINT_CLOUDS, CLOUDED_SKY, PLAIN_SKY, ROOM_BEYOND, NOTHING };
 
 struct holed {
     enum shown shown;
@@ -50,6 +52,7 @@ static float beyond(enum shown shown, vec3 origin, vec3 direction) {
     vec3 on_next = vec3_mad(origin, (BEYOND_Z - origin.z) / direction.z, direction);
     switch (shown) {
     case PAINTED_WALL:
+    case CLIPPED_WALL:
     case PLAIN_WALL: return wall_radiance(shown, on_wall);
     case FAINT_CLOUDS: /* in the mean as bright as the wall */
         return 0.6f + 0.2f * (paint(vec3_scale(direction, 4.0f)) - 0.6f);
@@ -60,6 +63,9 @@ static float beyond(enum shown shown, vec3 origin, vec3 direction) {
     }
     return 0.0f;
 }
+
+/* Where the wall is to be clipped two photographs in five are, nearly everywhere. */
+static bool is_clipped(const struct holed *room, size_t frame) { return room->shown == CLIPPED_WALL && frame % 5 < 2; }
 
 static void take(struct holed *room, size_t frame) {
     struct photograph *photo = &room->scene.photograph[frame];
@@ -73,7 +79,8 @@ static void take(struct holed *room, size_t frame) {
         float value = meets ? wall_radiance(room->shown, vec3_mad(origin, hit.distance_m, direction))
                             : beyond(room->shown, origin, direction);
         for (size_t c = 0; c < 3; c++)
-            photo->pixel[i][c] = image_half_from_float(value * (1.0f + 0.0173f * random_of(frame, 3 * i + c)));
+            photo->pixel[i][c] =
+                image_half_from_float(fminf(value * (1.0f + 0.0173f * random_of(frame, 3 * i + c)), photo->clip));
     }
 }
 
@@ -122,6 +129,8 @@ static void make_of(struct holed *room, void make_mesh_of(struct mesh *m), enum 
         struct photograph *photo = &room->scene.photograph[f];
         *photo = (struct photograph){
             .is_hdr = true, .exposure_known = true, .exposure = 1.0f, .gain = {1, 1, 1}, .clip = INFINITY};
+        if (is_clipped(room, f))
+            photo->is_hdr = false, photo->clip = CLIP;
         photo->name = mem_printf("frame %zu", f);
         vec3 to = spread((int)f * 7 + 3, 0.0f); /* every other one looks at the wall */
         photo->camera = look(spread((int)f, 0.4f), f % 2 == 0 ? to : vec3_make(to.x, 0.5f + to.y, 0.0f));
@@ -315,6 +324,7 @@ static void test_hidden_of(bool is_scan, const char *json) {
 int main(void) {
     test_hole(PAINTED_WALL);
     test_hole(PLAIN_WALL);
+    test_hole(CLIPPED_WALL);
     test_hidden();
     test_opening(FAINT_CLOUDS);
     test_opening(CLOUDED_SKY);

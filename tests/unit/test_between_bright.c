@@ -1,6 +1,7 @@
 /* emitters.h: a surface three pixels wide at which photographs saturate shines if what is around it is dark, also where
  * a tube goes on; between a white sky on both sides nobody knows whose light it is, though one pixel near it is
- * dark. */
+ * dark. Nor does it shine where photographs from near saturate in all of it, but others, which do not, show that the
+ * sky is brighter. */
 #include "server/light/emitters.h"
 
 #include "tests/unit/plane_rig.h"
@@ -10,7 +11,10 @@
 #define CLIP 0.75f
 #define DARK 0.1f
 
-enum around { AROUND_DARK, AROUND_TUBE, AROUND_SKY };
+#define NEAR 3.0f /* times */
+#define BRIGHT 4.0f
+
+enum around { AROUND_DARK, AROUND_TUBE, AROUND_SKY, AROUND_BRIGHT };
 
 /* The dark pixel of the sky is below. */
 static rgb shown(void *user, vec3 place) {
@@ -19,6 +23,7 @@ static rgb shown(void *user, vec3 place) {
     switch (*(const enum around *)user) {
     case AROUND_TUBE: return rgb_gray(along ? 1.0f : DARK);
     case AROUND_SKY: return rgb_gray(along && place.y < -5.0f ? DARK : 1.0f);
+    case AROUND_BRIGHT: return rgb_gray(is_own ? 1.0f : BRIGHT);
     default: return rgb_gray(is_own ? 1.0f : DARK);
     }
 }
@@ -28,7 +33,10 @@ static struct emitter_evidence look(enum around around) {
     plane_rig_init(&rig, PHOTOGRAPHS, 1);
     for (int i = 0; i < PHOTOGRAPHS; i++) {
         float x = 0.5f * (float)(i % 4 - 2), y = 0.5f * (float)(i / 4 - 2);
-        plane_rig_add(&rig, (vec3){x, y, 90.0f}, (vec3){0.1f, 0.2f, 0.0f}, PIXEL_M, shown, &around)->clip = CLIP;
+        bool is_near = around == AROUND_BRIGHT && i % 4 == 0, is_short = around == AROUND_BRIGHT && !is_near;
+        plane_rig_add(&rig, (vec3){x, y, 90.0f}, (vec3){0.1f, 0.2f, 0.0f}, is_near ? PIXEL_M / NEAR : PIXEL_M, shown,
+                      &around)
+            ->clip = is_short ? 2.0f * BRIGHT : CLIP;
     }
     plane_rig_look(&rig, 0.01f);
     emitters_observe(&rig.r, &rig.views, rig.r.evidence);
@@ -39,8 +47,10 @@ static struct emitter_evidence look(enum around around) {
 
 int main(void) {
     struct emitter_evidence dark = look(AROUND_DARK), tube = look(AROUND_TUBE), sky = look(AROUND_SKY);
+    struct emitter_evidence bright = look(AROUND_BRIGHT);
     CHECK(dark.is_seen && dark.saturated[0]);
     CHECK(tube.is_seen && tube.saturated[0]);
     CHECK(!sky.is_seen && sky.is_outshone);
+    CHECK(!bright.is_seen && bright.is_outshone && rgb_is_black(bright.radiance));
     return check_result();
 }

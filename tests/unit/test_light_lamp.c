@@ -1,5 +1,6 @@
 /* light_lamp.h: of segments at which all photographs saturate those are lamps that no sun lights, unless people say
- * otherwise. Where there is no room for all, those that turned out to reflect make room. */
+ * otherwise. Where there is no room for all, those that turned out to reflect make room. What is assumed of a sun in
+ * which photographs saturate. */
 #include "server/light/light_lamp.h"
 #include <math.h>
 
@@ -76,8 +77,28 @@ static void test_many(void) {
     settings_release(&room.settings);
 }
 
+/* Of a sun in which photographs saturate no more is known than of a lamp that none shows, but for what they show. */
+static void test_sun(void) {
+    static struct room room;
+    struct light_lamps lamps;
+    make_room(&room, 1, "{}");
+    light_lamps_init(&lamps, &room.r, 0.1f);
+    double lamp = light_lamps_hidden_prior(&lamps).mean;
+    for (int k = 0; k < 2; k++) {
+        float least = k == 0 ? 1e-3f : 1e3f;
+        light_lamps_add_sun(&lamps, rgb_gray(least), rgb_gray(0.0f));
+        struct joint_source prior = light_lamps_prior(&lamps, &lamps.lamp[k]);
+        CHECK_NEAR(prior.mean, fmax(lamp, log((double)least)), 1e-6);
+        CHECK_NEAR(prior.least, log((double)least), 1e-6);
+        CHECK_NEAR(prior.value, prior.least, 1e-6);
+    }
+    light_lamps_release(&lamps);
+    settings_release(&room.settings);
+}
+
 int main(void) {
     test_told();
     test_many();
+    test_sun();
     return check_result();
 }

@@ -1,6 +1,7 @@
 /* sun_seen.h: a sun that was drawn into a map of distant light is taken out of it again, as strong, as wide and where
- * it was, also blurred as photographs blur it, and the sky about it is what it was; at a pole, around the seam. What is
- * cut by unseen or saturated directions, wide or weak stays. */
+ * it was, also blurred as photographs blur it, and the sky about it is what it was; at a pole, around the seam. Where
+ * photographs saturate in it, it is as strong as that at least. What is cut by unseen directions, wide or weak stays,
+ * and so does what saturates below the horizon. */
 #include "common/mem.h"
 #include "server/light/sun/sun_seen.h"
 #include "server/scene/latlong.h"
@@ -62,6 +63,37 @@ static void check_taken(struct sun drawn, bool blurs) {
     environment_release(&e);
 }
 
+/* What photographs show of the sun: no more than SHOWN, and it is a bound. */
+#define SHOWN 40.0f
+
+static void saturate(struct environment *e) {
+    for (size_t i = 0; i < WIDTH * HEIGHT; i++) {
+        e->is_bound[i] = rgb_mean(environment_pixel_radiance(e, i)) > SHOWN;
+        for (size_t c = 0; c < 3; c++)
+            e->map.pixel[3 * i + c] = fminf(e->map.pixel[3 * i + c], SHOWN);
+    }
+    environment_update_figures(e);
+}
+
+static void check_clipped(struct sun drawn) {
+    struct environment e;
+    struct sun taken = {0};
+    make_sky(&e);
+    sun_draw(&drawn, &e);
+    blur(&e);
+    saturate(&e);
+    CHECK(e.saturated_share > 0.0 && sun_seen_take(&e, &taken));
+    CHECK(taken.is_there && taken.is_clipped && !taken.is_measured && e.saturated_share == 0.0);
+    CHECK(vec3_dot(taken.direction, drawn.direction) > cosf(0.004f));
+    CHECK_NEAR(taken.radius_rad, SUN_RADIUS_RAD, 1e-6f);
+    CHECK(taken.least.r > 0.0f && taken.least.r < drawn.irradiance.r);
+    for (size_t i = 0; i < WIDTH * HEIGHT; i++) {
+        CHECK(!e.is_bound[i]);
+        CHECK_NEAR(e.map.pixel[3 * i], sky_at(&e, i), 0.05f);
+    }
+    environment_release(&e);
+}
+
 /* What is done to the pixel in the sun's middle, and to a map. */
 enum harm { UNSEEN, SATURATED, NOTHING };
 
@@ -74,7 +106,7 @@ static void check_left(struct sun drawn, enum harm harm) {
     if (harm == UNSEEN)
         e.confidence.pixel[2 * (middle + 1)] = 0.0f;
     if (harm == SATURATED)
-        e.is_bound[middle + 1] = true;
+        saturate(&e);
     float before = e.map.pixel[3 * middle];
     CHECK(!sun_seen_take(&e, &taken) && !taken.is_there);
     CHECK(e.map.pixel[3 * middle] == before);
@@ -90,7 +122,8 @@ int main(void) {
     check_taken(sun_at(359.8, 10.0, 1.0, 1.0f), true);
     check_taken(sun_at(10.0, 89.0, 2.0, 1.0f), false);
     check_left(sun_at(40.0, 35.0, 1.5, 1.0f), UNSEEN);
-    check_left(sun_at(40.0, 35.0, 1.5, 1.0f), SATURATED);
+    check_clipped(sun_at(40.0, 35.0, 1.5, 1.0f));
+    check_left(sun_at(40.0, -35.0, 1.5, 1.0f), SATURATED);
     check_left(sun_at(40.0, 35.0, 6.0, 20.0f), NOTHING);
     check_left(sun_at(40.0, 35.0, 1.0, 0.01f), NOTHING); /* a hundredth of the sky's light */
     return check_result();

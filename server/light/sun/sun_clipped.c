@@ -17,7 +17,6 @@
 #define ODDS 20.0         /* of saturation in the sun over that in its shade */
 #define EDGES 2.0f        /* of a patch, in those of the joint fit: some .6 m */
 #define PLACES_ALIKE 6.0  /* independent draws that a patch's places are worth, at most */
-#define RADIUS_DEGREES 0.27f
 /* Power of its light by which the odds of a place may rise: at most as the logistic distribution does that is nearest
  * to a normal one (1.7 deviations: Haley 1952) of albedos, if there were no light but that of the sky. */
 #define STEEPEST (1.7 / ALBEDO_POINT)
@@ -249,7 +248,7 @@ void sun_clipped_find(struct reconstruction *r) {
     if (best.score > log(SURE * (double)(count + 1))) {
         sun_directions_walk(&best, 1.5, 0.1, score_of, &s);
         r->sun = (struct sun){.is_there = true, .is_clipped = true, .direction = best.direction};
-        r->sun.radius_rad = RADIUS_DEGREES * BSDF_PI / 180.0f;
+        r->sun.radius_rad = SUN_RADIUS_RAD;
     }
     mem_free(s.may_be);
     mem_free(s.candidate);

@@ -33,7 +33,7 @@ static double angle_between(vec3 a, vec3 b) { return 2.0 * asin(fmin(0.5 * (doub
 static size_t brightest_pixel(const struct environment *e) {
     size_t best = 0;
     for (size_t i = 1; i < environment_pixel_count(e); i++) {
-        if (is_measured(e, i) &&
+        if (environment_pixel_is_seen(e, i) &&
             rgb_mean(environment_pixel_radiance(e, i)) > rgb_mean(environment_pixel_radiance(e, best)))
             best = i;
     }
@@ -61,11 +61,15 @@ static void find_disc(struct seen_sun *s, size_t brightest) {
     s->ring_rad = s->reach_rad + BLUR_PIXELS * pixel_rad;
 }
 
-/* Whether all of the disc, and what it is spread over, is measured. */
-static bool is_whole(const struct seen_sun *s) {
+/* Whether all of the disc, and what it is spread over, is seen; *is_clipped: not all of it is measured. */
+static bool is_whole(const struct seen_sun *s, bool *is_clipped) {
+    *is_clipped = false;
     for (size_t i = 0; i < environment_pixel_count(s->e); i++) {
-        if (!is_measured(s->e, i) && angle_between(environment_pixel_direction(s->e, i), s->middle) < s->reach_rad)
+        if (angle_between(environment_pixel_direction(s->e, i), s->middle) >= s->reach_rad)
+            continue;
+        if (!environment_pixel_is_seen(s->e, i))
             return false;
+        *is_clipped = *is_clipped || !is_measured(s->e, i);
     }
     return true;
 }
@@ -87,34 +91,44 @@ static bool find_around(struct seen_sun *s) {
     return count > 0;
 }
 
-/* Irradiance, on a surface that faces it, beyond what is around it; with `map` also gives its pixels that. */
-static rgb take_excess(const struct seen_sun *s, struct image *map) {
+/* Irradiance, on a surface that faces it, beyond what is around it; with `e`, the map that it is in, also gives its
+ * pixels that. */
+static rgb take_excess(const struct seen_sun *s, struct environment *e) {
     rgb sum = rgb_gray(0.0f);
     for (size_t i = 0; i < environment_pixel_count(s->e); i++) {
         rgb excess = rgb_clamp(rgb_sub(environment_pixel_radiance(s->e, i), s->around), 0.0f, INFINITY);
         if (!(angle_between(environment_pixel_direction(s->e, i), s->middle) < s->reach_rad))
             continue;
         sum = rgb_add(sum, rgb_scale(excess, (float)environment_cell_angle(s->e, i / s->e->map.width)));
-        for (size_t c = 0; c < 3 && map; c++)
-            map->pixel[3 * i + c] -= (&excess.r)[c];
+        for (size_t c = 0; c < 3 && e; c++)
+            e->map.pixel[3 * i + c] -= (&excess.r)[c];
+        if (e)
+            e->is_bound[i] = false;
     }
     return sum;
 }
 
 bool sun_seen_take(struct environment *e, struct sun *sun) {
     struct seen_sun s = {.e = e};
+    bool is_clipped;
     if (!e->map.pixel)
         return false;
     size_t brightest = brightest_pixel(e);
     find_disc(&s, brightest);
     if (!(rgb_mean(environment_pixel_radiance(e, brightest)) > 0.0f) || s.radius_rad > WIDEST_DEGREES * PI / 180.0 ||
-        !is_whole(&s) || !find_around(&s))
+        !is_whole(&s, &is_clipped) || !find_around(&s) || (is_clipped && s.middle.y < 0.0f))
         return false;
     rgb irradiance = take_excess(&s, NULL);
-    if ((double)rgb_luminance(irradiance) < MIN_SHARE * 4.0 * PI * e->luminance)
+    if (!is_clipped && (double)rgb_luminance(irradiance) < MIN_SHARE * 4.0 * PI * e->luminance)
         return false;
-    take_excess(&s, &e->map);
+    take_excess(&s, e);
     environment_update_figures(e);
-    *sun = (struct sun){true, true, false, s.middle, (float)s.radius_rad, irradiance};
+    *sun = (struct sun){.is_there = true,
+                        .is_measured = !is_clipped,
+                        .is_clipped = is_clipped,
+                        .direction = s.middle,
+                        .radius_rad = is_clipped ? fminf((float)s.radius_rad, SUN_RADIUS_RAD) : (float)s.radius_rad,
+                        .irradiance = irradiance,
+                        .least = irradiance};
     return true;
 }
