@@ -57,8 +57,10 @@ struct ratio_sums {
 struct edge_class {
     struct channel_values channel[3];
     struct ratio_sums sums;
-    size_t outshone_count;                    /* observations left out since something beside was as bright */
-    size_t clear_count, clear_outshone_count; /* unsaturated ones: that are in, that were left out */
+    size_t outshone_count; /* observations left out since something beside was as bright */
+    /* Those that tell whose light it is: unsaturated ones that were left out; of those that are in these, and the
+     * ones that saturate before darker surroundings. */
+    size_t telling_outshone_count, telling_count;
 };
 
 static void add_value(struct channel_values *v, float radiance, bool saturated) {
@@ -118,6 +120,14 @@ static bool outshines(const struct photograph *photo, const struct view *view, c
     return own * ring.count >= (is_saturated ? OUTSHINES_SATURATED : 1.0f) * ring.sum;
 }
 
+/* Whether an observation tells that its light is the surface's own: it does not saturate, or what is around it is
+ * darker. */
+static bool tells(const struct photograph *photo, const struct view *view, const struct photograph_sample *sample) {
+    struct photograph_ring ring = photograph_ring(photo, view->x, view->y, RING_PIXELS);
+    return !photograph_sample_saturates(sample) ||
+           rgb_mean(sample->radiance) * ring.count >= OUTSHINES_SATURATED * ring.sum;
+}
+
 static void observe_texel(const struct evidence_job *job, uint32_t texel, struct edge_class *class) {
     const struct reconstruction *r = job->r;
     struct surface_point at;
@@ -133,10 +143,10 @@ static void observe_texel(const struct evidence_job *job, uint32_t texel, struct
             continue;
         if (!outshines(photo, &view[k], &sample, edge)) {
             class[edge].outshone_count++;
-            class[edge].clear_outshone_count += !photograph_sample_saturates(&sample);
+            class[edge].telling_outshone_count += !photograph_sample_saturates(&sample);
             continue;
         }
-        class[edge].clear_count += !photograph_sample_saturates(&sample);
+        class[edge].telling_count += edge > 0 || tells(photo, &view[k], &sample);
         add_to_sums(r, texel, &sample, &class[edge].sums);
         struct channel_values *channel = class[edge].channel;
         add_value(&channel[0], sample.radiance.r, sample.saturated[0]);
@@ -167,8 +177,8 @@ static bool is_own(size_t own, size_t outshone) { return (float)own >= MIN_OWN_P
 static bool is_outvoted(const struct edge_class *class) {
     size_t own = 0, outshone = 0;
     for (int edge = 0; edge < VIEWS_EDGE; edge++) {
-        own += class[edge].clear_count;
-        outshone += class[edge].clear_outshone_count;
+        own += class[edge].telling_count;
+        outshone += class[edge].telling_outshone_count;
     }
     return outshone >= MIN_OBSERVATIONS && !is_own(own, outshone);
 }
