@@ -7,9 +7,9 @@
  * Limits. What an opening shows is taken to be infinitely far. Where it is near (an unscanned wall seen through a hole
  * of the mesh), photographs from different places disagree about a direction; the map holds their median, and `spread`
  * is their disagreement. Where frames saturate, others of shorter exposures tell of it, if there are any
- * (environment_bounds.h). Unseen directions are filled in smoothly from their surroundings (fill.h), which is a guess; a sun among them
- * is searched for by what it lights (sun_find.h). Through the gaps of a scan and beside its rounded edges photographs
- * show the room itself: that lights what it lights, but nothing is filled in from it. */
+ * (environment_bounds.h). Unseen directions are filled in smoothly from their surroundings (fill.h), which is a guess;
+ * a sun among them is searched for by what it lights (sun_find.h). Through the gaps of a scan and beside its rounded
+ * edges photographs show the room itself: that lights what it lights, but nothing is filled in from it. */
 #ifndef UNBAKE_CAPTURE_ENVIRONMENT_H
 #define UNBAKE_CAPTURE_ENVIRONMENT_H
 
