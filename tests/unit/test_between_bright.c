@@ -1,7 +1,7 @@
 /* emitters.h: a surface three pixels wide at which photographs saturate shines if what is around it is dark, also where
- * a tube goes on; between a white sky on both sides nobody knows whose light it is, though one pixel near it is
- * dark. Nor does it shine where photographs from near saturate in all of it, but others, which do not, show that the
- * sky is brighter. */
+ * a tube goes on, or the poses of some photographs are wrong; between a white sky on both sides nobody knows whose
+ * light it is, though one pixel near it is dark. Nor does it shine where photographs from near saturate in all of it,
+ * but others, which do not, show that the sky is brighter. */
 #include "server/light/emitters.h"
 
 #include "tests/unit/plane_rig.h"
@@ -14,7 +14,9 @@
 #define NEAR 3.0f /* times */
 #define BRIGHT 4.0f
 
-enum around { AROUND_DARK, AROUND_TUBE, AROUND_SKY, AROUND_BRIGHT };
+#define OFF_PX 3.0f
+
+enum around { AROUND_DARK, AROUND_DARK_BY_WRONG_POSES, AROUND_TUBE, AROUND_SKY, AROUND_BRIGHT };
 
 /* The dark pixel of the sky is below. */
 static rgb shown(void *user, vec3 place) {
@@ -33,10 +35,12 @@ static struct emitter_evidence look(enum around around) {
     plane_rig_init(&rig, PHOTOGRAPHS, 1);
     for (int i = 0; i < PHOTOGRAPHS; i++) {
         float x = 0.5f * (float)(i % 4 - 2), y = 0.5f * (float)(i / 4 - 2);
-        bool is_near = around == AROUND_BRIGHT && i % 4 == 0, is_short = around == AROUND_BRIGHT && !is_near;
+        bool is_near = around == AROUND_BRIGHT && i % 2 == 0, is_short = around == AROUND_BRIGHT && !is_near;
         plane_rig_add(&rig, (vec3){x, y, 90.0f}, (vec3){0.1f, 0.2f, 0.0f}, is_near ? PIXEL_M / NEAR : PIXEL_M, shown,
                       &around)
             ->clip = is_short ? 2.0f * BRIGHT : CLIP;
+        if (around == AROUND_DARK_BY_WRONG_POSES && i % 4 == 0)
+            rig.scene.photograph[i].camera.cx += OFF_PX; /* and what is dark beside it is taken for it */
     }
     plane_rig_look(&rig, 0.01f);
     emitters_observe(&rig.r, &rig.views, rig.r.evidence);
@@ -47,8 +51,9 @@ static struct emitter_evidence look(enum around around) {
 
 int main(void) {
     struct emitter_evidence dark = look(AROUND_DARK), tube = look(AROUND_TUBE), sky = look(AROUND_SKY);
-    struct emitter_evidence bright = look(AROUND_BRIGHT);
+    struct emitter_evidence bright = look(AROUND_BRIGHT), wrong = look(AROUND_DARK_BY_WRONG_POSES);
     CHECK(dark.is_seen && dark.saturated[0]);
+    CHECK(wrong.is_seen && wrong.saturated[0]);
     CHECK(tube.is_seen && tube.saturated[0]);
     CHECK(!sky.is_seen && sky.is_outshone);
     CHECK(!bright.is_seen && bright.is_outshone && rgb_is_black(bright.radiance));
