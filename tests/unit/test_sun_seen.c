@@ -1,7 +1,7 @@
 /* sun_seen.h: a sun that was drawn into a map of distant light is taken out of it again, as strong, as wide and where
  * it was, also blurred as photographs blur it, and the sky about it is what it was; at a pole, around the seam. Where
  * photographs saturate in it, it is as strong as that at least. What is cut by unseen directions, wide or weak stays,
- * and so does what saturates below the horizon. */
+ * and so do what saturates below the horizon and what is in a map of near things. */
 #include "common/mem.h"
 #include "server/light/sun/sun_seen.h"
 #include "server/scene/latlong.h"
@@ -95,7 +95,7 @@ static void check_clipped(struct sun drawn) {
 }
 
 /* What is done to the pixel in the sun's middle, and to a map. */
-enum harm { UNSEEN, SATURATED, NOTHING };
+enum harm { UNSEEN, SATURATED, NEAR, NOTHING };
 
 static void check_left(struct sun drawn, enum harm harm) {
     struct environment e;
@@ -107,6 +107,11 @@ static void check_left(struct sun drawn, enum harm harm) {
         e.confidence.pixel[2 * (middle + 1)] = 0.0f;
     if (harm == SATURATED)
         saturate(&e);
+    for (size_t i = 0; i < WIDTH * HEIGHT && harm == NEAR; i++) {
+        e.confidence.pixel[2 * i] = 2.0f;
+        e.confidence.pixel[2 * i + 1] = i % 2 ? 0.3f : 0.5f;
+    }
+    environment_update_figures(&e);
     float before = e.map.pixel[3 * middle];
     CHECK(!sun_seen_take(&e, &taken) && !taken.is_there);
     CHECK(e.map.pixel[3 * middle] == before);
@@ -124,6 +129,7 @@ int main(void) {
     check_left(sun_at(40.0, 35.0, 1.5, 1.0f), UNSEEN);
     check_clipped(sun_at(40.0, 35.0, 1.5, 1.0f));
     check_left(sun_at(40.0, -35.0, 1.5, 1.0f), SATURATED);
+    check_left(sun_at(40.0, 35.0, 1.5, 1.0f), NEAR);
     check_left(sun_at(40.0, 35.0, 6.0, 20.0f), NOTHING);
     check_left(sun_at(40.0, 35.0, 1.0, 0.01f), NOTHING); /* a hundredth of the sky's light */
     return check_result();

@@ -13,6 +13,9 @@
  * that if it is 30 times as bright; the sun is 100,000 times as bright as a clear sky, 100 times through thin
  * clouds. */
 #define MIN_SHARE 0.02
+/* Median standard deviation of log radiance among photographs of a direction, beyond which the map shows what is near:
+ * exposures and vignettes leave .05, radiances in a room have 1; as likely by either. */
+#define MOST_SPREAD 0.12
 /* Photographs and map spread the disc over so many pixels of the map beyond its edge: the width of a bilinear pixel,
  * twice. What is around it lies as far away again. */
 #define BLUR_PIXELS 2.0
@@ -111,7 +114,7 @@ static rgb take_excess(const struct seen_sun *s, struct environment *e) {
 bool sun_seen_take(struct environment *e, struct sun *sun) {
     struct seen_sun s = {.e = e};
     bool is_clipped;
-    if (!e->map.pixel)
+    if (!e->map.pixel || e->median_spread > MOST_SPREAD)
         return false;
     size_t brightest = brightest_pixel(e);
     find_disc(&s, brightest);

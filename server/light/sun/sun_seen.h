@@ -13,8 +13,8 @@
 #include "server/gather/sun.h"
 
 /* Fills *sun by the brightest disc of the map, and gives its pixels the radiance of what is around it. False, and both
- * unchanged, where it is no sun: not small, not seen as a whole, measured to be of little light, or saturated below the
- * horizon: a glint. */
+ * unchanged, where it is no sun: not small, not seen as a whole, measured to be of little light, saturated below the
+ * horizon (a glint), or in a map about which photographs disagree, which shows what is near. */
 bool sun_seen_take(struct environment *environment, struct sun *sun);
 
 #endif
