@@ -67,7 +67,10 @@ static struct arrives arrives_at(const struct yard *y, const struct probes *prob
 }
 
 static struct arrives mirrored(struct yard *y, float roughness, float specular, int64_t object, int threads) {
-    struct sun sun = {true, false, false, vec3_normalize((vec3){-1, 1, 0}), 0.005f, {10.0f, 8.0f, 5.0f}};
+    struct sun sun = {.is_there = true,
+                      .direction = vec3_normalize((vec3){-1, 1, 0}),
+                      .radius_rad = 0.005f,
+                      .irradiance = {10.0f, 8.0f, 5.0f}};
     struct parallel *pool = parallel_new(threads);
     struct probes probes;
     y->model.materials.roughness[0] = roughness;
