@@ -9,7 +9,7 @@
 #include "server/capture/fill.h"
 
 /* A photograph tells what lies beyond a bound if it saturates at so many times that; photographs of one exposure
- * saturate within less, by their gains and vignettes. */
+ * saturate within less, by their gains and vignettes; +25 %: no change. */
 #define TELLS 1.5f
 
 /* Bounds of like level, at least 2^octave and less than twice that, in a half of the sphere. */
