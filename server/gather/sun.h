@@ -7,7 +7,7 @@
 
 #include <stdbool.h>
 
-#include "server/capture/environment.h"
+#include "server/capture/distant/environment.h"
 #include "server/gather/irradiance.h"
 #include "server/render/accel.h"
 #include "server/scene/surface.h"

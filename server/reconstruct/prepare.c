@@ -5,7 +5,7 @@
 
 #include "common/mem.h"
 #include "server/capture/clip.h"
-#include "server/capture/environment_gather.h"
+#include "server/capture/distant/environment_gather.h"
 #include "server/capture/fireflies.h"
 #include "server/capture/orient.h"
 #include "server/capture/radiance_preview.h"

@@ -9,7 +9,7 @@
 #include "common/json.h"
 #include "common/parallel.h"
 #include "common/settings.h"
-#include "server/capture/environment.h"
+#include "server/capture/distant/environment.h"
 #include "server/capture/fuse.h"
 #include "server/capture/grey_card.h"
 #include "server/gather/sun.h"

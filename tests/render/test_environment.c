@@ -2,7 +2,7 @@
  * whatever their exposures and faults; samples go where its light finds a way in. */
 #include "common/rng.h"
 #include "common/sha256.h"
-#include "server/capture/environment_gather.h"
+#include "server/capture/distant/environment_gather.h"
 #include "server/relight/environment.h"
 #include "tests/render/open_room.h"
 

@@ -1,7 +1,7 @@
 /* environment.h: on a scan photographs look out through a window, and onto the wall where the mesh has a gap. What the
  * gap shows stays, but the sky beside it, which nothing shows, follows the window. */
 #include "common/rng.h"
-#include "server/capture/environment_gather.h"
+#include "server/capture/distant/environment_gather.h"
 #include "server/reconstruct/reconstruct.h"
 #include "tests/render/open_room.h"
 #include "tests/render/scanned_mesh.h"

@@ -2,7 +2,7 @@
  * where these continue beyond the bound, else as bright as what exceeds it. One exposure tells nothing, nor does the
  * ground tell of the sky; a sun stays a bound. */
 #include "common/mem.h"
-#include "server/capture/environment_bounds.h"
+#include "server/capture/distant/environment_bounds.h"
 #include "tests/check.h"
 
 #define WIDTH 128

@@ -1,6 +1,6 @@
 /* environment.h: of photographs that look out and agree each weighs by its exposure; one that saturates bounds what it
  * shows; a direction of the map is the one in which they look. */
-#include "server/capture/environment_gather.h"
+#include "server/capture/distant/environment_gather.h"
 #include "server/scene/latlong.h"
 #include "tests/unit/plane_rig.h"
 

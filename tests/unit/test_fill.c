@@ -3,7 +3,7 @@
  * render/test_environment.) */
 #include "common/mem.h"
 #include "common/vec.h"
-#include "server/capture/fill.h"
+#include "server/capture/distant/fill.h"
 #include "server/scene/latlong.h"
 #include "tests/check.h"
 

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "common/mem.h"
-#include "server/capture/fill.h"
+#include "server/capture/distant/fill.h"
 
 /* At this many radians from what is seen 1/e of the fill is kept: 6 degrees, what a window's frame hides. */
 #define NEAR_RAD 0.1f

@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#include "server/capture/environment.h"
+#include "server/capture/distant/environment.h"
 
 struct sun_candidate {
     vec3 direction; /* unit, towards it */

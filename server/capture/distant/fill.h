@@ -6,8 +6,8 @@
  * solid angle and periodic in azimuth, then smoothed by diffusion with the sphere's metric: the fill continues known
  * pixels next to them and tends to the row's colour far away. Highlights are clamped first: a sun at the rim of a
  * window would otherwise light half of the sky. */
-#ifndef UNBAKE_CAPTURE_FILL_H
-#define UNBAKE_CAPTURE_FILL_H
+#ifndef UNBAKE_CAPTURE_DISTANT_FILL_H
+#define UNBAKE_CAPTURE_DISTANT_FILL_H
 
 #include <stdbool.h>
 

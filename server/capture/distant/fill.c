@@ -1,5 +1,5 @@
 /* fill.c -- see fill.h. */
-#include "server/capture/fill.h"
+#include "server/capture/distant/fill.h"
 
 #include <math.h>
 #include <stddef.h>

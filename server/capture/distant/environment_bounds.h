@@ -5,12 +5,12 @@
  * the bound, the bound tells nothing, and the direction counts as unseen. Elsewhere, as beside the edge of a house, it
  * is as bright as the median of those of its half that exceed the bound. Where nothing tells of it, as with a single
  * exposure or in a sun, it stays a bound. */
-#ifndef UNBAKE_CAPTURE_ENVIRONMENT_BOUNDS_H
-#define UNBAKE_CAPTURE_ENVIRONMENT_BOUNDS_H
+#ifndef UNBAKE_CAPTURE_DISTANT_ENVIRONMENT_BOUNDS_H
+#define UNBAKE_CAPTURE_DISTANT_ENVIRONMENT_BOUNDS_H
 
 #include <stdint.h>
 
-#include "server/capture/environment.h"
+#include "server/capture/distant/environment.h"
 
 /* What a map is gathered with, of each direction: [height][width]. */
 struct environment_ceiling {

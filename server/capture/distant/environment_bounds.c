@@ -1,12 +1,12 @@
 /* environment_bounds.c -- see environment_bounds.h. */
-#include "server/capture/environment_bounds.h"
+#include "server/capture/distant/environment_bounds.h"
 
 #include <math.h>
 #include <string.h>
 
 #include "common/mem.h"
 #include "common/quantile.h"
-#include "server/capture/fill.h"
+#include "server/capture/distant/fill.h"
 
 /* A photograph tells what lies beyond a bound if it saturates at so many times that; photographs of one exposure
  * saturate within less, by their gains and vignettes; +25 %: no change. */

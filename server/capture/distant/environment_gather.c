@@ -4,7 +4,7 @@
  * the pixel where the photograph is finer than the map. Observations are combined for each channel: the median, with
  * saturated values as lower bounds (censored.h), then the mean of the inliers. A photograph weighs by its exposure, the
  * precision of a photon count; weights by the value itself would favour noise that is too bright. */
-#include "server/capture/environment_gather.h"
+#include "server/capture/distant/environment_gather.h"
 
 #include <math.h>
 
@@ -12,7 +12,7 @@
 #include "common/mem.h"
 #include "common/quantile.h"
 #include "server/capture/censored.h"
-#include "server/capture/environment_bounds.h"
+#include "server/capture/distant/environment_bounds.h"
 #include "server/scene/latlong.h"
 
 /* Metres: distance of a point that every camera of a room sees in the same direction; +25 %: no change. */

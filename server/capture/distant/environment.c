@@ -1,11 +1,11 @@
 /* environment.c -- see environment.h. */
-#include "server/capture/environment.h"
+#include "server/capture/distant/environment.h"
 
 #include <string.h>
 
 #include "common/mem.h"
 #include "common/quantile.h"
-#include "server/capture/fill.h"
+#include "server/capture/distant/fill.h"
 #include "server/scene/latlong.h"
 
 void environment_make_empty(struct environment *e, uint32_t width) {

@@ -1,9 +1,9 @@
 /* environment_gather.h -- makes the map of distant light (environment.h) from all photographs that look out of the
  * room. */
-#ifndef UNBAKE_CAPTURE_ENVIRONMENT_GATHER_H
-#define UNBAKE_CAPTURE_ENVIRONMENT_GATHER_H
+#ifndef UNBAKE_CAPTURE_DISTANT_ENVIRONMENT_GATHER_H
+#define UNBAKE_CAPTURE_DISTANT_ENVIRONMENT_GATHER_H
 
-#include "server/capture/environment.h"
+#include "server/capture/distant/environment.h"
 #include "server/capture/views.h"
 
 /* The map has about the angular resolution of the photographs: its width is the largest power of two up to 2 pi x the

@@ -10,8 +10,8 @@
  * (environment_bounds.h). Unseen directions are filled in smoothly from their surroundings (fill.h), which is a guess;
  * a sun among them is searched for by what it lights (sun_find.h). Through the gaps of a scan and beside its rounded
  * edges photographs show the room itself: that lights what it lights, but nothing is filled in from it. */
-#ifndef UNBAKE_CAPTURE_ENVIRONMENT_H
-#define UNBAKE_CAPTURE_ENVIRONMENT_H
+#ifndef UNBAKE_CAPTURE_DISTANT_ENVIRONMENT_H
+#define UNBAKE_CAPTURE_DISTANT_ENVIRONMENT_H
 
 #include <stdbool.h>
 
