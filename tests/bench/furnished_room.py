@@ -23,9 +23,12 @@ import rooms_choice  # noqa: E402
 import rooms_report  # noqa: E402
 from furniture import join  # noqa: E402
 from photographs import checked, write_exposures, write_hdr  # noqa: E402
-from rendering import choose_poses, render, scene_of, spectrum, texture_of  # noqa: E402
+from rendering import (HEIGHT, WIDTH, Numbers, base_color, choose_poses, colors_of, intersect, rays_of, render,  # noqa: E402
+                       scene_of)
 
 DEPTH = 16
+SUBPIXELS = 8  # each way, over which base colours are averaged
+TRUTH = [*(f"{what}.{c}" for what in ("base_color", "emission") for c in "RGB"), "roughness", "specular", "object_id", "depth"]
 FRAMES = {**dict.fromkeys(rooms_boxes.ROOMS, (72, 8)), **dict.fromkeys((*rooms_choice.ROOMS, *rooms_report.ROOMS), (54, 6))}
 MAKE = {**rooms_boxes.ROOMS, **rooms_choice.ROOMS, **rooms_report.ROOMS}
 
@@ -43,28 +46,28 @@ def write_mesh(room, path):
         out.write("\n".join(header).encode() + vertices.tobytes() + faces.tobytes())
 
 
-def pictures_of(room, shines, test, views):
-    """Of each of the poses `test` the views (spp, integrator, seed) of the room as it shines."""
-    scene = scene_of(room, shines)
-    return [[render(scene, pose, *view) for view in views] for pose in test]
+def truth_of(room, scene, pose):
+    """The channels of TRUTH of one pose, [HEIGHT][WIDTH][]. Surfaces have two sides, as in photographs: models have
+    coincident faces of either, of which a ray finds any. Only emitters have one."""
+    numbers, steps = Numbers(scene), (np.arange(SUBPIXELS) + 0.5) / SUBPIXELS
+    color = 0.0
+    for offset in ((x, y) for y in steps for x in steps):
+        hit = intersect(scene, *rays_of(pose, 1, offset))
+        color = color + colors_of(room, numbers(hit), np.array(hit.uv).T, base_color) / SUBPIXELS**2
+    hit = intersect(scene, *rays_of(pose))
+    number, uv = numbers(hit), np.array(hit.uv).T
+    front = np.array(hit.wi.z) > 0
+    light = colors_of(room, np.where(front, number, -1), uv, lambda of: of.emission)
+    gloss = colors_of(room, number, uv, lambda of: (of.roughness, of.specular, 0.0))[:, :2]
+    distance = np.where(number < 0, 0.0, np.array(hit.t))
+    return np.hstack([color, light, gloss, number[:, None], distance[:, None]]).reshape(HEIGHT, WIDTH, len(TRUTH))
 
 
-def write_truth(room, test, first, out):
-    """test: poses, whose numbers begin at `first`. Base colour averaged over the pixel; all else at one random place of
-    it, the same for all."""
-    emitted = {"type": "path", "max_depth": 1}
-    colors = pictures_of(room, lambda number, part: texture_of(part.material), test, [(64, emitted, 1)])
-    # A shape whose light is black would be no emitter: numbers from 1, all else a little more than 0.
-    others = pictures_of(room, lambda number, part: spectrum((part.material.roughness, part.material.specular + 1e-9,
-                                                              number + 1)), test, [(1, emitted, 2), (1, {"type": "depth"}, 2)])
-    lights = pictures_of(room, lambda number, part: spectrum(np.array(part.material.emission) + 1e-9), test,
-                         [(1, emitted, 2)])
-    names = [f"{what}.{c}" for what in ("base_color", "emission") for c in "RGB"]
-    for k, ((color,), (other, depth), (light,)) in enumerate(zip(colors, others, lights)):
-        light[light < 1e-6] = 0.0
-        channels = np.dstack([color, light, other[..., :2], np.round(other[..., 2:]) - 1, depth[..., :1]]).astype(np.float32)
-        mi.Bitmap(channels, pixel_format=mi.Bitmap.PixelFormat.MultiChannel, channel_names=names + [
-            "roughness", "specular", "object_id", "depth"]).write(f"{out}/truth/{first + k:03d}.exr")
+def write_truth(room, scene, test, first, out):
+    """test: poses, whose numbers begin at `first`. Base colour averaged over the pixel; all else at its centre."""
+    for k, pose in enumerate(test):
+        mi.Bitmap(truth_of(room, scene, pose).astype(np.float32), pixel_format=mi.Bitmap.PixelFormat.MultiChannel,
+                  channel_names=TRUTH).write(f"{out}/truth/{first + k:03d}.exr")
     with open(out + "/truth/objects.json", "w") as file:
         json.dump([{"id": k, "name": p.name, "roughness": p.material.roughness, "specular": p.material.specular,
                     "emission": np.reshape(p.material.emission, (-1, 3)).mean(0).tolist(),
@@ -83,7 +86,7 @@ def write_bundle(room, out, spp, train, test):
     write_hdr(images, poses, train, out)
     write_exposures(images, poses, train, out, room.single_exposure)
     light_truth.write(room, scene, poses[:train], out, max(16, spp // 4))
-    write_truth(room, poses[train:], train, out)
+    write_truth(room, scene, poses[train:], train, out)
 
 
 def main():

@@ -125,7 +125,7 @@ def write(room, scene, poses, out, samples):
         mi.Bitmap(room.sky.astype(np.float32)).write(out + "/truth/environment.exr")
     if room.sun:
         lights["sun"] = (set(), room.sun["disc"])
-    by_light = {name: irradiance(scene_of(room, None, *light), points, samples, len(room.parts))
+    by_light = {name: irradiance(scene_of(room, *light), points, samples, len(room.parts))
                 for name, light in lights.items()}
     total = sum(by_light.values())
     measured = np.bincount(points[2], minlength=len(room.parts))

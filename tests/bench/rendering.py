@@ -1,4 +1,5 @@
 """Pictures of a room by Mitsuba 3, and rays into it."""
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 
@@ -13,29 +14,23 @@ def spectrum(color):
     return {"type": "bitmap", "bitmap": mi.Bitmap(color.astype(np.float32)), "raw": True}
 
 
-def texture_of(of):
-    return spectrum(of.color if of.texture is None else of.texture)
+def base_color(of):
+    """Its colour, or its texture."""
+    return of.color if of.texture is None else of.texture
 
 
-def scene_of(room, shines=None, lit=ALL, sky=ALL):
-    """The room as it is, or with only the parts `lit` and the map `sky` as its light; or, where shines(number, part)
-    gives a texture, black and shining by that."""
+def scene_of(room, lit=ALL, sky=ALL):
+    """The room as it is, or with only the parts `lit` and the map `sky` as its light."""
     scene = {"type": "scene"}
     sky = room.sky if sky is ALL else sky
-    if shines is None and sky is not None:
+    if sky is not None:
         scene["sky"] = {"type": "envmap", "bitmap": mi.Bitmap(sky.astype(np.float32))}
     for number, part in enumerate(room.parts):
         of, props = part.material, mi.Properties()
-        radiance = spectrum(of.emission)
-        bsdf = {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}}
-        if shines:
-            radiance = shines(number, part)
-        else:
-            bsdf = {"type": "twosided", "bsdf": {"type": "principled", "base_color": texture_of(of),
-                                                 "roughness": of.roughness, "specular": of.specular}}
-        props["bsdf"] = mi.load_dict(bsdf)
-        if shines or (np.max(of.emission) > 0 and (lit is ALL or number in lit)):
-            props["emitter"] = mi.load_dict({"type": "area", "radiance": radiance})
+        props["bsdf"] = mi.load_dict({"type": "twosided", "bsdf": {
+            "type": "principled", "base_color": spectrum(base_color(of)), "roughness": of.roughness, "specular": of.specular}})
+        if np.max(of.emission) > 0 and (lit is ALL or number in lit):
+            props["emitter"] = mi.load_dict({"type": "area", "radiance": spectrum(of.emission)})
         mesh = mi.Mesh(f"part{number}", len(part.positions), len(part.faces), has_vertex_normals=True,
                        has_vertex_texcoords=True, props=props)
         params = mi.traverse(mesh)
@@ -79,7 +74,6 @@ class Numbers:
     """Numbers of parts by what was hit."""
 
     def __init__(self, scene):
-        import drjit as dr
         self.of_index = lambda shape: np.array(dr.reinterpret_array(mi.UInt32, shape))
         found = {int(self.of_index(mi.ShapePtr(s))[0]): int(s.id()[len("part"):]) for s in scene.shapes()}
         self.table = np.full(max(found) + 1, -1)
@@ -94,6 +88,24 @@ class Numbers:
         """The same, -1 for what is seen from behind, where parts do not emit."""
         front = (np.array(hit.n).reshape(3, -1).T * direction).sum(1) < 0
         return np.where(front, self(hit), -1)
+
+
+def looked_up(of, uv):
+    """The colours [count][3] of a colour, or of a texture at [count][2]."""
+    if np.ndim(of) == 1:
+        return np.broadcast_to(np.array(of, float), (len(uv), 3))
+    at = dr.zeros(mi.SurfaceInteraction3f, len(uv))
+    at.uv = mi.Point2f(np.ascontiguousarray(uv.T, np.float32))
+    return np.array(mi.load_dict(spectrum(of)).eval(at)).reshape(3, -1).T
+
+
+def colors_of(room, number, uv, color_of):
+    """What color_of(material) is at each hit [count][3]; black where number is -1."""
+    colors = np.zeros((len(number), 3))
+    for part in np.unique(number[number >= 0]):
+        there = number == part
+        colors[there] = looked_up(color_of(room.parts[part].material), uv[there])
+    return colors
 
 
 def choose_poses(room, scene, count):
