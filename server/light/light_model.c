@@ -14,6 +14,8 @@
 /* Errors of patches agree up to this distance, in edges of patches: about 1 m, as far as a lamp near a surface
  * lights. */
 #define ALIKE_EDGES 3.5f
+/* Of a point that tells nothing. */
+#define UNTOLD_DEVIATION 1e3f
 
 void light_model_init(struct light_model *m, struct reconstruction *r, const struct views *views, bool again) {
     *m = (struct light_model){.r = r, .albedo = mem_array(r->segments.count + 1, sizeof *m->albedo)};
@@ -28,7 +30,7 @@ void light_model_init(struct light_model *m, struct reconstruction *r, const str
     }
     m->sky.is_dark = r->is_surrounded;
     if (r->sun.is_clipped) {
-        sunlit_init(&m->sunlit, r);
+        sunlit_init(&m->sunlit, r, views);
         sunlit_mark(&m->sunlit);
         rgb least = sunlit_least(&m->sunlit), shown = rgb_scale(r->sun.least, 1.0f / BSDF_PI);
         least = rgb_make(fmaxf(least.r, shown.r), fmaxf(least.g, shown.g), fmaxf(least.b, shown.b));
@@ -223,6 +225,15 @@ static void add_lamps(struct light_model *m, bool by_albedo) {
     }
 }
 
+/* Takes points that cannot tell how strong the sun is out of the fit. */
+static void look_at_sun(struct light_model *m) {
+    bool *is_told = mem_array(m->points.count + 1, sizeof *is_told);
+    sunlit_look(&m->sunlit, m->points.point, m->points.count, is_told);
+    for (size_t i = 0; i < m->points.count; i++)
+        m->joint[i].deviation = is_told[i] ? m->joint[i].deviation : UNTOLD_DEVIATION;
+    mem_free(is_told);
+}
+
 static void make_fit(struct light_model *m) {
     bool any_escapes = false;
     for (size_t s = 0; s < m->r->segments.count; s++)
@@ -234,6 +245,8 @@ static void make_fit(struct light_model *m) {
             p->segment, p->patch, rgb_mean(p->observed), rgb_mean(p->known), p->deviation, p->is_bound, p->is_lamp};
         any_escapes = any_escapes || p->escaping > 0.0f;
     }
+    if (m->r->sun.is_clipped)
+        look_at_sun(m);
     joint_fit_init(&m->fit, m->joint, m->points.count, 1 + LIGHT_LAMPS_MAX + LIGHT_CELLS + LIGHT_REGIONS, m->r->pool);
     add_lamps(m, false);
     m->fit.tie = m->tie;

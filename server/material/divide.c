@@ -53,10 +53,15 @@ bool divide_light_without_sun(const struct divide *d, uint32_t texel, struct sur
     return true;
 }
 
+void divide_add_sun(const struct divide *d, const struct surface_point *at, float fraction, struct irradiance *light) {
+    if (fraction != 0.0f)
+        irradiance_add(light, at->shading, d->sun->direction, rgb_scale(d->sun->irradiance, fraction));
+}
+
 static bool light_at(const struct divide *d, uint32_t texel, struct surface_point *at, struct irradiance *light) {
     if (!divide_light_without_sun(d, texel, at, light))
         return false;
-    sun_add_light(d->sun, d->accel, at, light);
+    divide_add_sun(d, at, sun_shadows_at(d->shadows, texel), light);
     return true;
 }
 
@@ -103,17 +108,41 @@ static bool is_saturated(const struct divide_candidate *c) {
     return c->saturated[0] || c->saturated[1] || c->saturated[2];
 }
 
+/* What the diffuse lobe shows of the light in a photograph. */
+static rgb unit_diffuse_of(const struct divide *d, uint32_t texel, const struct surface_point *at,
+                           const struct irradiance *light, const struct view *view) {
+    float roughness = d->materials->roughness[surface_segment(&d->surface, texel)];
+    return irradiance_diffuse(light, at->shading, roughness, views_direction(d->views, view->train, at->position));
+}
+
+/* Near the edge of a shadow of the sun, as the photograph shows it, unit_diffuse has as much of the sun as it averages
+ * there; false elsewhere. */
+static bool blur_shadow(const struct divide *d, uint32_t texel, const struct surface_point *at,
+                        const struct irradiance *light, struct divide_candidate *c) {
+    const struct surface *s = &d->surface;
+    struct irradiance blurred = *light;
+    struct footprint pixel;
+    float seen;
+    if (!sun_shadows_blurs(d->shadows, texel) ||
+        !footprint_of_triangle(&pixel, s->mesh, s->atlas, &photograph_of(d, c->view.train)->camera, (uint32_t)c->view.x,
+                               (uint32_t)c->view.y, s->inverse->triangle[texel]) ||
+        !sun_shadows_seen(d->shadows, texel, &pixel, &seen))
+        return false;
+    divide_add_sun(d, at, seen - sun_shadows_at(d->shadows, texel), &blurred);
+    c->unit_diffuse = unit_diffuse_of(d, texel, at, &blurred, &c->view);
+    return true;
+}
+
 /* Adds photograph `train` of the texel if it has a sample there and is among the best. One at the end of half precision
  * is none: no surface reflects that much. */
-static void add_candidate(const struct divide *d, uint32_t segment, const struct surface_point *at,
+static void add_candidate(const struct divide *d, uint32_t texel, const struct surface_point *at,
                           const struct irradiance *light, uint32_t train, struct divide_candidates *of) {
     const struct photograph *photo = photograph_of(d, train);
     struct divide_candidate c;
     struct photograph_sample s;
     if (!views_faces(d->views, train, at->position, at->normal, &c.view))
         return;
-    c.unit_diffuse = irradiance_diffuse(light, at->shading, d->materials->roughness[segment],
-                                        views_direction(d->views, train, at->position));
+    c.unit_diffuse = unit_diffuse_of(d, texel, at, light, &c.view);
     rgb typical = rgb_scale(c.unit_diffuse, TYPICAL_BASE_COLOR);
     /* An upper bound of the weight: edges and mixing only lower it. Saves the visibility ray. */
     if (!top_k_takes(&of->best, c.view.weight * noise_weight(d->noise, d->views, &c.view, typical, 0.0f), train) ||
@@ -124,7 +153,8 @@ static void add_candidate(const struct divide *d, uint32_t segment, const struct
     c.observed = s.radiance;
     memcpy(c.saturated, s.saturated, sizeof c.saturated);
     c.mixing = views_mixing(d->views, &c.view, at->triangle, c.observed);
-    c.sharp = !is_saturated(&c) && sharpen(d, &c.view, at->triangle, &c.observed);
+    bool is_blurred = blur_shadow(d, texel, at, light, &c);
+    c.sharp = !is_blurred && !is_saturated(&c) && sharpen(d, &c.view, at->triangle, &c.observed);
     float times_typical = rgb_mean(c.observed) / fmaxf(rgb_mean(typical), MIN_LAMBERT * d->views->median_radiance);
     c.weight = c.view.weight * views_edge_weight(d->views, &c.view, at->triangle) *
                noise_weight(d->noise, d->views, &c.view, typical, c.mixing * times_typical * times_typical);
@@ -210,7 +240,7 @@ static uint8_t observe_all(const struct divide *d, uint32_t texel, struct incide
         return 0;
     top_k_init(&candidates.best, candidates.item, MEASUREMENT_OBSERVATIONS);
     for (uint32_t t = 0; t < d->views->train_count; t++)
-        add_candidate(d, surface_segment(&d->surface, texel), &at, light, t, &candidates);
+        add_candidate(d, texel, &at, light, t, &candidates);
     for (; observations->count < candidates.best.count; observations->count++)
         observations->observation[observations->count] =
             observation_of(d, texel, &at, &candidates.candidate[observations->count], scratch);

@@ -1,7 +1,8 @@
 /* divide.h -- base colour in closed form: reflected radiance over that of a Lambertian surface of albedo 1.
  *
  * Each observation of a texel gives a base colour, (observed - highlight) / lambert. Their robust mean is taken,
- * weighted as in fuse.h, and lower where the highlight is a large part of the observation. Of more than
+ * weighted as in fuse.h, and lower where the highlight is a large part of the observation. What the sun adds to lambert
+ * is averaged over what each photograph averages (sun_shadows.h). Of more than
  * MEASUREMENT_OBSERVATIONS photographs those of the greatest weights are used, without regard to highlights. The
  * result is denoised (denoise.h); texels that were not measured are filled in from their neighbours or their prior
  * (color_prior.h). */
@@ -18,6 +19,7 @@
 #include "server/gather/probes.h"
 #include "server/gather/sun.h"
 #include "server/material/denoise.h"
+#include "server/material/sun_shadows.h"
 #include "server/scene/materials.h"
 #include "server/scene/surface.h"
 
@@ -30,9 +32,10 @@ struct divide {
     const struct probes *probes;     /* light that arrives, but for the sun's */
     const struct light_field *field; /* for highlights */
     const struct sun *sun;
-    const struct accel *accel;   /* for shadows of the sun */
-    const bool *is_emitter;      /* [segment_count] */
-    struct materials *materials; /* base_color and deviation are written, roughness and specular are read */
+    const struct sun_shadows *shadows; /* of it, on all texels */
+    const struct accel *accel;         /* for its shadows elsewhere */
+    const bool *is_emitter;            /* [segment_count] */
+    struct materials *materials;       /* base_color and deviation are written, roughness and specular are read */
     struct parallel *pool;
     bool denoises;                /* else base colour is as measured */
     size_t highlight_samples;     /* directions of one highlight (divide_highlight_samples) */
@@ -72,6 +75,9 @@ rgb divide_color(const struct divide *d, uint32_t texel);
 /* The point of a texel and its irradiance without the sun's; false where the texel is not valid. */
 bool divide_light_without_sun(const struct divide *d, uint32_t texel, struct surface_point *at,
                               struct irradiance *light);
+
+/* Adds a fraction of the sun's light to the irradiance at a point. */
+void divide_add_sun(const struct divide *d, const struct surface_point *at, float fraction, struct irradiance *light);
 
 /* Calls of(job, texel) for each valid texel, in any order and on all threads. */
 void divide_each(const struct divide *d, void (*of)(const void *job, uint32_t texel), const void *job);

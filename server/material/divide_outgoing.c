@@ -32,7 +32,7 @@ static void find_outgoing(const void *user, uint32_t texel) {
         return;
     bool mirrors = job->outgoing->lobe[segment].specular > 0.0f;
     rgb flux = irradiance_flux(&light);
-    sun_add_light(d->sun, d->accel, &at, &light);
+    divide_add_sun(d, &at, sun_shadows_at(d->shadows, texel), &light);
     if (!mirrors)
         flux = irradiance_flux(&light);
     float known = m->weight > 0.0f ? MIXING_HALF / (MIXING_HALF + image_float_from_half(m->mixing)) : 0.0f;

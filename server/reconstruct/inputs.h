@@ -17,7 +17,8 @@ static inline struct emission_pattern_input inputs_of_pattern(const struct recon
 }
 
 static inline struct divide inputs_of_divide(struct reconstruction *r, const struct views *views,
-                                             const struct probes *probes, const struct light_field *field) {
+                                             const struct probes *probes, const struct light_field *field,
+                                             const struct sun_shadows *shadows) {
     return (struct divide){.surface = reconstruction_surface(r),
                            .views = views,
                            .fused = &r->fused,
@@ -25,6 +26,7 @@ static inline struct divide inputs_of_divide(struct reconstruction *r, const str
                            .probes = probes,
                            .field = field,
                            .sun = &r->sun,
+                           .shadows = shadows,
                            .accel = r->world.accel,
                            .is_emitter = r->is_emitter,
                            .materials = &r->materials,

@@ -39,6 +39,7 @@ struct solve {
     struct light_field field;        /* of probes: rays continue from polished surfaces by their lobes */
     struct light_field isotropic;    /* of highlights: radiance is taken as equal in all directions */
     struct probes probes;
+    struct sun_shadows shadows;
     struct divide divide;
     struct solve_emitters emitters;
     double texels_per_pixel; /* detail_texels_per_pixel */
@@ -190,7 +191,8 @@ static void solve_init(struct solve *s, struct reconstruction *r, const struct v
                 &r->scene->mesh, &r->atlas, &r->inverse, &r->fused);
     const struct surface surface = reconstruction_surface(r);
     s->texels_per_pixel = detail_texels_per_pixel(&surface, views);
-    s->divide = inputs_of_divide(r, views, &s->probes, &s->isotropic);
+    sun_shadows_init(&s->shadows, &surface, &r->sun, r->world.accel, r->pool);
+    s->divide = inputs_of_divide(r, views, &s->probes, &s->isotropic, &s->shadows);
     s->divide.denoises = settings_bool(r->settings, "denoise");
     s->divide.highlight_samples = divide_highlight_samples(s->texels_per_pixel);
     s->divide.scratch = mem_array((size_t)parallel_thread_count(r->pool), sizeof *s->divide.scratch);
@@ -208,6 +210,7 @@ static void solve_release(struct solve *s) {
     mem_free(s->divide.typical);
     mem_free(s->divide.measured);
     mem_free(s->divide.scratch);
+    sun_shadows_release(&s->shadows);
     probes_release(&s->probes);
     solve_emitters_release(&s->emitters);
     mem_free(s->outgoing.lobe);

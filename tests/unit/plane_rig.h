@@ -1,7 +1,8 @@
 /* plane_rig.h -- a plane of 10 x 10 m in z = 0 that faces +z, of one segment and one chart of PLANE_SIDE x PLANE_SIDE
  * texels, and any number of photographs of it: for tests in closed form of what is made of photographs.
  *
- * Beside the plane there is nothing, and no light but what the test sets. */
+ * Beside the plane there is nothing, but a roof above one half of it where the test wants one, and no light but what the
+ * test sets. */
 #ifndef UNBAKE_TESTS_UNIT_PLANE_RIG_H
 #define UNBAKE_TESTS_UNIT_PLANE_RIG_H
 
@@ -28,10 +29,13 @@ struct plane_rig {
     size_t capacity; /* photographs */
 };
 
-static inline void plane_rig_init(struct plane_rig *rig, size_t photographs, int threads) {
-    static vec3 position[4] = {{-5, -5, 0}, {5, -5, 0}, {5, 5, 0}, {-5, 5, 0}};
-    static uint32_t index[2][3] = {{0, 1, 2}, {0, 2, 3}}, of_triangle[2], chart_of_triangle[2];
-    static vec2 corner[2][3];
+/* The first `triangles` of the plane's two and of those of a roof 3 m above its half of negative x, which faces down and
+ * has no texels. */
+static inline void plane_rig_init_triangles(struct plane_rig *rig, size_t photographs, int threads, size_t triangles) {
+    static vec3 position[8] = {{-5, -5, 0}, {5, -5, 0}, {5, 5, 0}, {-5, 5, 0},
+                               {-5, -5, 3}, {0, -5, 3}, {0, 5, 3}, {-5, 5, 3}};
+    static uint32_t index[4][3] = {{0, 1, 2}, {0, 2, 3}, {4, 6, 5}, {4, 7, 6}}, of_triangle[4], chart_of_triangle[4];
+    static vec2 corner[4][3];
     static bool is_emitter[1];
     static struct emitter_evidence evidence[1];
     *rig = (struct plane_rig){.pool = parallel_new(threads), .capacity = photographs};
@@ -39,7 +43,8 @@ static inline void plane_rig_init(struct plane_rig *rig, size_t photographs, int
         for (size_t k = 0; k < 3; k++)
             corner[t][k] = (vec2){(position[index[t][k]].x / PLANE_METRES + 0.5f) * PLANE_SIDE,
                                   (position[index[t][k]].y / PLANE_METRES + 0.5f) * PLANE_SIDE};
-    rig->scene.mesh = (struct mesh){.vertex_count = 4, .position = position, .triangle_count = 2, .index = index};
+    rig->scene.mesh =
+        (struct mesh){.vertex_count = 2 * triangles, .position = position, .triangle_count = triangles, .index = index};
     rig->scene.photograph = mem_calloc(photographs, sizeof *rig->scene.photograph);
     struct reconstruction *r = &rig->r;
     *r = (struct reconstruction){
@@ -56,6 +61,14 @@ static inline void plane_rig_init(struct plane_rig *rig, size_t photographs, int
     struct error err;
     CHECK(world_init(&r->world, &rig->scene.mesh, &r->segments, &r->atlas, &r->materials, NULL, rig->pool, &err) ==
           STATUS_OK);
+}
+
+static inline void plane_rig_init(struct plane_rig *rig, size_t photographs, int threads) {
+    plane_rig_init_triangles(rig, photographs, threads, 2);
+}
+
+static inline void plane_rig_init_roofed(struct plane_rig *rig, size_t photographs, int threads) {
+    plane_rig_init_triangles(rig, photographs, threads, 4);
 }
 
 /* Adds a photograph from a place above that looks at another; its middle pixel covers `pixel_m` at that distance, and
@@ -125,7 +138,8 @@ static inline const struct measurement *plane_rig_divide(struct plane_rig *rig, 
                                                          float *typical, struct divide *divide) {
     static const uint32_t texel = PLANE_MIDDLE;
     *typical = 0.5f;
-    *divide = inputs_of_divide(&rig->r, &rig->views, probes, NULL);
+    static const struct sun_shadows no_shadows;
+    *divide = inputs_of_divide(&rig->r, &rig->views, probes, NULL, &no_shadows);
     divide->stride = 1;
     divide->typical = typical;
     divide->highlight_samples = 4;

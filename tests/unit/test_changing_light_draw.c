@@ -43,7 +43,8 @@ static float changes(const struct image *sky, int mirrors) {
     uint16_t(*sent)[3] = mem_calloc(PLANE_TEXELS, sizeof *sent);
     struct light_field field = {&r->world, (const uint16_t(*)[3])sent, NULL, NULL};
     struct incident *scratch = mem_alloc(sizeof *scratch);
-    struct divide divide = inputs_of_divide(r, &rig.views, &probes, &field);
+    static const struct sun_shadows no_shadows;
+    struct divide divide = inputs_of_divide(r, &rig.views, &probes, &field, &no_shadows);
     divide.scratch = scratch;
     uint32_t texel[TEXELS_A_SIDE * TEXELS_A_SIDE];
     for (uint32_t i = 0; i < TEXELS_A_SIDE * TEXELS_A_SIDE; i++)

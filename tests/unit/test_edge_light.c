@@ -61,7 +61,8 @@ int main(void) {
     probes_init(&probes, 8, &rig.scene.mesh, &rig.r.atlas, &rig.r.inverse, &rig.r.fused);
     for (size_t i = 0; i < probes.count; i++)
         irradiance_add(&probes.probe[i].light, (vec3){0, 0, 1}, (vec3){0, 0, 1}, rgb_gray((float)PI * FRONT));
-    struct divide divide = inputs_of_divide(&rig.r, &rig.views, &probes, &field);
+    static const struct sun_shadows no_shadows;
+    struct divide divide = inputs_of_divide(&rig.r, &rig.views, &probes, &field, &no_shadows);
     divide.scratch = mem_alloc(sizeof *divide.scratch);
 
     float beside = ratio(&rig, &divide, 1, 0.02f); /* .47 m from the edge; reach .6 m */

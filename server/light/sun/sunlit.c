@@ -7,12 +7,15 @@
 #include "common/quantile.h"
 #include "common/spaced.h"
 #include "server/light/light_priors.h"
+#include "server/light/sun/sun_blur.h"
+#include "server/render/sampler.h"
 
-#define DISCS 512 /* that stand for all sunlit texels, for time */
+#define DISCS 512       /* that stand for all sunlit texels, for time */
+#define KEY_BLUR 0x5b1u /* keeps these random numbers apart from others of the point */
 
-static float part_of(const struct reconstruction *r, const struct surface_point *at) {
+static float part_of(const struct reconstruction *r, const struct surface_point *at, float visibility) {
     float cosine = vec3_dot(r->sun.direction, at->shading);
-    return sun_visibility(&r->sun, r->world.accel, at, 0) * fmaxf(cosine, 0.0f) * irradiance_matt(cosine);
+    return visibility * fmaxf(cosine, 0.0f) * irradiance_matt(cosine);
 }
 
 static void find_part(void *user, size_t index, int thread) {
@@ -22,7 +25,7 @@ static void find_part(void *user, size_t index, int thread) {
     struct sunlit_texel *t = &s->texel[index];
     struct surface_point at;
     bool is_there = surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, t->texel, &at);
-    t->part = is_there ? part_of(r, &at) : 0.0f;
+    t->part = is_there ? part_of(r, &at, sun_visibility(&r->sun, r->world.accel, &at, 0)) : 0.0f;
 }
 
 /* Mean measured radiance of each segment, of parts of which nothing is that of another part of the object; black where
@@ -48,9 +51,9 @@ static rgb *mean_radiances(const struct reconstruction *r) {
     return mean;
 }
 
-void sunlit_init(struct sunlit *s, struct reconstruction *r) {
+void sunlit_init(struct sunlit *s, struct reconstruction *r, const struct views *views) {
     size_t reached = 0;
-    *s = (struct sunlit){.r = r, .texel = mem_array(r->inverse.valid_count + 1, sizeof *s->texel)};
+    *s = (struct sunlit){.r = r, .views = views, .texel = mem_array(r->inverse.valid_count + 1, sizeof *s->texel)};
     for (size_t i = 0; i < r->inverse.valid_count; i++) {
         uint32_t texel = r->inverse.valid[i];
         if (r->fused.is_bound[texel])
@@ -70,6 +73,7 @@ void sunlit_init(struct sunlit *s, struct reconstruction *r) {
 }
 
 void sunlit_release(struct sunlit *s) {
+    mem_free(s->visibility);
     mem_free(s->texel);
     *s = (struct sunlit){0};
 }
@@ -123,23 +127,33 @@ static size_t find_discs(const struct sunlit *s, const float *albedo, struct seg
     return found;
 }
 
-struct responding {
-    const struct sunlit *s;
+struct looking {
+    struct sunlit *s;
     const struct light_point *point;
-    float *column;
+    bool *is_told;
 };
 
-static void add_direct(void *user, size_t index, int thread) {
+static void look_at_point(void *user, size_t index, int thread) {
     (void)thread;
-    const struct responding *job = user;
-    job->column[index] += part_of(job->s->r, &job->point[index].at);
+    const struct looking *job = user;
+    const struct reconstruction *r = job->s->r;
+    const struct surface_point *at = &job->point[index].at;
+    float seen = sun_blur_visibility(&r->sun, job->s->views, at, sampler_key(KEY_BLUR, (uint32_t)index, 0));
+    bool is_bound = job->point[index].is_bound;
+    job->s->visibility[index] = is_bound ? ceilf(seen) : sun_visibility(&r->sun, r->world.accel, at, 0);
+    job->is_told[index] = is_bound || seen == job->s->visibility[index];
+}
+
+void sunlit_look(struct sunlit *s, const struct light_point *point, size_t count, bool *is_told) {
+    s->visibility = mem_array(count + 1, sizeof *s->visibility);
+    parallel_for(s->r->pool, count, look_at_point, &(struct looking){s, point, is_told});
 }
 
 void sunlit_respond(const struct sunlit *s, const struct segment_light *light, const struct light_point *point,
                     size_t count, const float *albedo, float *column) {
     struct segment_light_disc *disc = mem_array(DISCS, sizeof *disc);
-    struct responding job = {s, point, column};
-    parallel_for(s->r->pool, count, add_direct, &job);
+    for (size_t i = 0; i < count; i++)
+        column[i] += part_of(s->r, &point[i].at, s->visibility[i]);
     segment_light_add_discs(light, point, count, disc, find_discs(s, albedo, disc), column);
     mem_free(disc);
 }

@@ -7,6 +7,7 @@
 #ifndef UNBAKE_LIGHT_SUN_SUNLIT_H
 #define UNBAKE_LIGHT_SUN_SUNLIT_H
 
+#include "server/capture/views.h"
 #include "server/light/segment_light.h"
 #include "server/state/reconstruction.h"
 
@@ -18,12 +19,14 @@ struct sunlit_texel {
 };
 
 struct sunlit {
-    struct reconstruction *r; /* borrowed */
+    struct reconstruction *r;  /* borrowed */
+    const struct views *views; /* borrowed */
     size_t count;
     struct sunlit_texel *texel; /* [count] saturated, and reached by r->sun; owned */
+    float *visibility;          /* of its disc, at the points of sunlit_look; owned */
 };
 
-void sunlit_init(struct sunlit *s, struct reconstruction *r);
+void sunlit_init(struct sunlit *s, struct reconstruction *r, const struct views *views);
 void sunlit_release(struct sunlit *s);
 
 /* Sets is_sunlit of the evidence of each segment of which more than half of what saturates is sunlit. */
@@ -35,8 +38,13 @@ void sunlit_shade(const struct sunlit *s, uint16_t (*radiance)[3]);
 /* The strength at which half of them would saturate if all were white paint: a lower bound. */
 rgb sunlit_least(const struct sunlit *s);
 
+/* How much of the sun each point sees. False in is_told[count] where photographs show the blurred edge of a shadow
+ * (sun_blur.h) that they measure: what does not saturate there is what is dark. What saturates there may get all of the
+ * sun. */
+void sunlit_look(struct sunlit *s, const struct light_point *point, size_t count, bool *is_told);
+
 /* Adds to column[count] what a surface of albedo 1 at each point would send of the sun at strength 1, and of what these
- * texels reflect of it. */
+ * texels reflect of it. After sunlit_look. */
 void sunlit_respond(const struct sunlit *s, const struct segment_light *light, const struct light_point *point,
                     size_t count, const float *albedo, float *column);
 
