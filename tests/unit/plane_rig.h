@@ -29,8 +29,8 @@ struct plane_rig {
     size_t capacity; /* photographs */
 };
 
-/* The first `triangles` of the plane's two and of those of a roof 3 m above its half of negative x, which faces down and
- * has no texels. */
+/* The first `triangles` of the plane's two and of those of a roof 3 m above its half of negative x, which faces down
+ * and has no texels. */
 static inline void plane_rig_init_triangles(struct plane_rig *rig, size_t photographs, int threads, size_t triangles) {
     static vec3 position[8] = {{-5, -5, 0}, {5, -5, 0}, {5, 5, 0}, {-5, 5, 0},
                                {-5, -5, 3}, {0, -5, 3}, {0, 5, 3}, {-5, 5, 3}};

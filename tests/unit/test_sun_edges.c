@@ -1,6 +1,6 @@
-/* sun_blur.h, sun_shadows.h, sunlit.h: the edge of a roof's shadow, on a plane that photographs show with pixels of half a metre.
- * The sun that is seen around a point is what a bilinear look-up of such pixels shows of it; base colour is the same on
- * both sides of the edge; and how strong the sun is is not asked there. */
+/* sun_blur.h, sun_shadows.h, sunlit.h: the edge of a roof's shadow, on a plane that photographs show with pixels of
+ * half a metre. The sun that is seen around a point is what a bilinear look-up of such pixels shows of it; base colour
+ * is the same on both sides of the edge; and how strong the sun is is not asked there. */
 #include <math.h>
 
 #include "server/light/light_model.h"
