@@ -17,8 +17,8 @@ struct held_out_means {
 void held_out_means_add(struct held_out_means *means, const struct held_out *view);
 
 /* Root of the mean square of what whole views are too bright or too dark by, relative; 0 of no views. A view of which
- * much is not measured counts little: where a photograph saturates is also where its noise is high, so that what is left
- * to compare is darker than the view. */
+ * much is not measured counts little: where a photograph saturates is also where its noise is high, so that what is
+ * left to compare is darker than the view. */
 double held_out_means_brightness(const struct held_out_means *means);
 
 /* Adds "metrics" to the report. */

@@ -1,8 +1,8 @@
 /* plane_rig.h -- a plane of 10 x 10 m in z = 0 that faces +z, of one segment and one chart of PLANE_SIDE x PLANE_SIDE
  * texels, and any number of photographs of it: for tests in closed form of what is made of photographs.
  *
- * Beside the plane there is nothing, but a roof above one half of it where the test wants one, and no light but what the
- * test sets. */
+ * Beside the plane there is nothing, but a roof above one half of it where the test wants one, and no light but what
+ * the test sets. */
 #ifndef UNBAKE_TESTS_UNIT_PLANE_RIG_H
 #define UNBAKE_TESTS_UNIT_PLANE_RIG_H
 
