@@ -94,6 +94,7 @@ static void weigh_by_noise(const struct fuse_job *job, struct fuse_observations 
 
 static void observe_all(const struct fuse_job *job, const struct surface_point *p, struct fuse_observations *l) {
     const struct views *v = job->views;
+    float texel_m2 = surface_texel_m2(&v->scene->mesh, job->atlas, p->triangle);
     l->is_measured = false;
     l->seen = l->clean = 0;
     l->gray_sum = l->gray_square_sum = 0.0;
@@ -102,9 +103,11 @@ static void observe_all(const struct fuse_job *job, const struct surface_point *
         const struct photograph *photo = &v->scene->photograph[v->train[t]];
         struct view view;
         struct photograph_sample s;
-        if (views_sees(v, t, p->position, p->normal, &view) && !photograph_has_firefly(photo, view.x, view.y) &&
-            photograph_sample(photo, view.x, view.y, &s))
-            add_observation(job, l, &s, &view, p->triangle);
+        if (!views_sees(v, t, p->position, p->normal, &view) || photograph_has_firefly(photo, view.x, view.y) ||
+            !photograph_sample(photo, view.x, view.y, &s))
+            continue;
+        views_weigh(v, texel_m2, &view);
+        add_observation(job, l, &s, &view, p->triangle);
     }
 }
 

@@ -120,6 +120,11 @@ bool views_faces(const struct views *v, uint32_t train, vec3 point, vec3 normal,
     return true;
 }
 
+void views_weigh(const struct views *v, float texel_m2, struct view *view) {
+    const struct camera *camera = &v->scene->photograph[v->train[view->train]].camera;
+    view->weight /= 1.0f + view->weight * camera->fx * camera->fy * texel_m2;
+}
+
 bool views_unoccluded(const struct views *v, uint32_t train, vec3 point, vec3 normal) {
     vec3 to_camera = vec3_sub(camera_origin(&v->scene->photograph[v->train[train]].camera), point);
     float distance = vec3_length(to_camera);

@@ -74,6 +74,10 @@ bool views_sees(const struct views *v, uint32_t train, vec3 point, vec3 geometri
 bool views_faces(const struct views *v, uint32_t train, vec3 point, vec3 geometric_normal, struct view *view);
 bool views_unoccluded(const struct views *v, uint32_t train, vec3 point, vec3 geometric_normal);
 
+/* Lowers a view's weight among others of a texel of that many square metres to what it can tell of it: one over the
+ * area of pixel and texel together. A look-up reads single pixels; of many that cover the texel it has one's noise. */
+void views_weigh(const struct views *v, float texel_m2, struct view *view);
+
 /* Unit direction from a point to the camera of training photograph `train`. */
 vec3 views_direction(const struct views *v, uint32_t train, vec3 point);
 

@@ -142,6 +142,7 @@ static void add_candidate(const struct divide *d, uint32_t texel, const struct s
     struct photograph_sample s;
     if (!views_faces(d->views, train, at->position, at->normal, &c.view))
         return;
+    views_weigh(d->views, surface_texel_m2(d->surface.mesh, d->surface.atlas, at->triangle), &c.view);
     c.unit_diffuse = unit_diffuse_of(d, texel, at, light, &c.view);
     rgb typical = rgb_scale(c.unit_diffuse, TYPICAL_BASE_COLOR);
     /* An upper bound of the weight: edges and mixing only lower it. Saves the visibility ray. */

@@ -96,8 +96,10 @@ static void observe_all(const struct emitter *e, uint32_t texel, struct measurem
         const struct photograph *photo = &views->scene->photograph[views->train[t]];
         struct view view;
         struct photograph_sample sample;
-        if (!views_faces(views, t, at.position, at.normal, &view) ||
-            !top_k_takes(&best, weight_of(e, &view, 0.0f), t) ||
+        if (!views_faces(views, t, at.position, at.normal, &view))
+            continue;
+        views_weigh(views, surface_texel_m2(s->mesh, s->atlas, at.triangle), &view);
+        if (!top_k_takes(&best, weight_of(e, &view, 0.0f), t) ||
             views_edge(views, &view, at.triangle) >= VIEWS_EDGE - 1 ||
             !views_unoccluded(views, t, at.position, at.normal) || !photograph_sample(photo, view.x, view.y, &sample))
             continue;
