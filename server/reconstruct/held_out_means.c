@@ -5,24 +5,18 @@
 
 #include "common/json.h"
 
-/* Of the pixels of a view, whose loss leaves an error of its brightness of as much, beside what others leave. */
-#define LEAST_LOSS 0.01
-
-static void mean_add_weighted(struct metric_mean *mean, double value, double weight) {
+static void mean_add(struct metric_mean *mean, double value) {
     if (isnan(value))
         return;
-    mean->sum += weight * value;
-    mean->count += weight;
+    mean->sum += value;
+    mean->count += 1.0;
 }
-
-static void mean_add(struct metric_mean *mean, double value) { mean_add_weighted(mean, value, 1.0); }
 
 void held_out_means_add(struct held_out_means *means, const struct held_out *view) {
     mean_add(&means->msre, view->msre);
     mean_add(&means->at_outlines, view->msre_at_outlines);
     mean_add(&means->outline_share, view->outline_share);
-    double loss = LEAST_LOSS + 1.0 - view->measured_share;
-    mean_add_weighted(&means->brightness_error, view->brightness_error, LEAST_LOSS * LEAST_LOSS / (loss * loss));
+    mean_add(&means->brightness_error, view->brightness_error);
     mean_add(&means->noise_left, view->msre_noise_left * view->msre_noise_left);
     mean_add(&means->render_noise, view->msre_render_noise);
     mean_add(&means->photograph_noise, view->msre_photograph_noise);

@@ -4,9 +4,9 @@
 
 #include "server/state/reconstruction.h"
 
-/* Weighted mean over the views that have a value; a view without valid pixels has none. */
+/* Mean over the views that have a value; a view without valid pixels has none. */
 struct metric_mean {
-    double sum, count; /* of weights; mostly 1 */
+    double sum, count;
 };
 
 struct held_out_means {
@@ -16,9 +16,7 @@ struct held_out_means {
 
 void held_out_means_add(struct held_out_means *means, const struct held_out *view);
 
-/* Root of the mean square of what whole views are too bright or too dark by, relative; 0 of no views. A view of which
- * much is not measured counts little: where a photograph saturates is also where its noise is high, so that what is
- * left to compare is darker than the view. */
+/* Root of the mean square of what whole views are too bright or too dark by, relative; 0 of no views. */
 double held_out_means_brightness(const struct held_out_means *means);
 
 /* Adds "metrics" to the report. */

@@ -72,13 +72,6 @@ double metrics_brightness_error(const struct image *photograph, const struct ima
     return of_photograph > 0.0 && a > 0.0 && b > 0.0 ? log(a / of_photograph) * log(b / of_photograph) : (double)NAN;
 }
 
-double metrics_measured_share(const struct image *photograph) {
-    size_t pixels = (size_t)photograph->width * photograph->height, measured = 0;
-    for (size_t i = 0; i < pixels; i++)
-        measured += pixel_is_finite(photograph->pixel + 3 * i, 3);
-    return pixels > 0 ? (double)measured / (double)pixels : 0.0;
-}
-
 /* Half of the difference, twice. */
 static struct error_pair relative_noise(float photograph, float a, float b, double median) {
     double half = 0.5 * ((double)a - (double)b) * relative_to((double)photograph, median);

@@ -31,9 +31,6 @@ double metrics_msre_of_photograph(const struct image *photograph, const struct i
  * than that. NaN also where either is not positive. */
 double metrics_brightness_error(const struct image *photograph, const struct image *halves);
 
-/* The share of a photograph's pixels that have a value, of all that there are. */
-double metrics_measured_share(const struct image *photograph);
-
 /* Peak signal-to-noise ratio in dB of the displayed pictures: sRGB of radiance x exposure, clamped to [0, 1]. Infinite
  * for equal pictures. Where the mean squared error is below its own standard error it is taken for that: then the ratio
  * is at least what is returned. */

@@ -145,7 +145,6 @@ static void measure_view(const struct reconstruction *r, const struct photograph
     view->msre_at_outlines = outlines.msre_part;
     view->outline_share = outlines.pixel_share;
     view->brightness_error = metrics_brightness_error(&view->photograph, halves);
-    view->measured_share = metrics_measured_share(&view->photograph);
     image_release(&noise);
 }
 

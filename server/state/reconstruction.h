@@ -35,7 +35,6 @@ struct held_out {
     double msre_photograph_noise;               /* what the photograph's noise adds */
     double msre_at_outlines, outline_share;     /* part of msre and of the pixels that lie beside outlines */
     double brightness_error;                    /* squared, of the whole view, relative (metrics_brightness_error) */
-    double measured_share;                      /* of its pixels: the others saturate or are masked */
 };
 
 /* Segments from `first` on. */

@@ -1,9 +1,7 @@
-/* metrics.h against values worked out by hand, and on pictures of known error under noise of a known size; the
- * brightness of held-out views, held_out_means.h. */
+/* metrics.h against values worked out by hand, and on pictures of known error under noise of a known size. */
 #include "server/reconstruct/metrics.h"
 
 #include "common/rng.h"
-#include "server/reconstruct/held_out_means.h"
 #include "tests/check.h"
 
 static const char *const half_names[] = {"a.R", "a.G", "a.B", "b.R", "b.G", "b.B"};
@@ -41,9 +39,7 @@ static void test_by_hand(void) {
     CHECK_NEAR(metrics_brightness_error(&photograph, &halves), log(1.2) * log(0.8), 1e-6);
     /* A pixel that cannot be used does not count. */
     fill(&halves, 0.6f);
-    CHECK(metrics_measured_share(&photograph) == 1.0);
     photograph.pixel[0] = NAN;
-    CHECK_NEAR(metrics_measured_share(&photograph), 255.0 / 256.0, 1e-9);
     halves.pixel[1] = halves.pixel[5] = 1e9f;
     CHECK_NEAR(metrics_msre(&photograph, &halves, 2.0).value, 0.01 / 0.29, 1e-6);
     CHECK_NEAR(metrics_brightness_error(&photograph, &halves), log(1.2) * log(1.2), 1e-6);
@@ -119,21 +115,7 @@ static void test_free_of_noise(void) {
     image_release(&k.halves);
 }
 
-/* Views that saturate in much of what they show, and seem too bright in the rest, count little beside one that does
- * not, and as ever where there is no other. */
-static void test_brightness_of_views(void) {
-    struct held_out_means all = {0}, saturated = {0};
-    const struct held_out dark = {.brightness_error = 0.02 * 0.02, .measured_share = 1.0};
-    const struct held_out bright = {.brightness_error = 0.5 * 0.5, .measured_share = 0.7};
-    held_out_means_add(&all, &dark);
-    held_out_means_add(&all, &bright);
-    held_out_means_add(&saturated, &bright);
-    CHECK_THAT(held_out_means_brightness(&all) < 0.03, "%g", held_out_means_brightness(&all));
-    CHECK_NEAR(held_out_means_brightness(&saturated), 0.5, 1e-9);
-}
-
 int main(void) {
-    test_brightness_of_views();
     test_by_hand();
     test_free_of_noise();
     return check_result();
