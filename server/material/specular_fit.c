@@ -173,6 +173,7 @@ static void make_room(struct specular_job *job, size_t segments) {
     job->used = mem_array(total, sizeof *job->used);
     for (size_t i = 0; i < segments; i++) {
         job->points[i].points.sample = &job->sample[first];
+        job->points[i].points.median = job->observer.in.views->median_radiance;
         first += specular_points_wanted(&job->observer, i);
     }
 }

@@ -6,13 +6,15 @@
 #include "common/image.h"
 #include "common/mem.h"
 
-/* Scale of the robust residual (weight 1/4 at one scale): parts of the texel's radiance and of the room's median. */
+/* What the model is expected to miss: parts of the texel's radiance and of the room's median. With noise, the scale of
+ * the robust residual (weight 1/4 at one scale). */
 #define SCALE_RELATIVE 0.12f /* +25 %: 0 dB, roughness -0.22, specular -0.28 */
 #define SCALE_MEDIAN 0.005f  /* +25 %: 0 dB */
 /* Upper bound of base colour in the fit. Above 1 because incident light may be underestimated: with a bound of 1 white
  * surfaces would be explained by highlights that do not exist. */
 #define MAX_BASE_COLOR 1.25f /* +25 %: +0.04 dB, roughness +0.05 */
 #define SWEEPS 4
+#define LEAST 1e-20f    /* of what is divided by */
 #define CHANNELS 3      /* red, green, blue */
 #define MAX_SCALES 1e3f /* bound of a residual, whose robust misfit is 1 by then: what half precision holds */
 /* Regions along the greatest extent of a segment. With 5, 8 and 16 specular comes out at 17.6, 16.7 and 13.9 dB for
@@ -27,32 +29,44 @@ struct channel_sums {
     float misfit[SPECULAR_VIEWS], residual[SPECULAR_VIEWS];
 };
 
+static float mean_of_channel(const struct specular_sample *s, int channel) {
+    float mean = 0.0f;
+    for (size_t i = 0; i < s->count; i++)
+        mean += (&s->view[i].observed.r)[channel] / (float)s->count;
+    return mean;
+}
+
+static float model_variance(float mean, float median) {
+    float scale = SCALE_RELATIVE * mean + SCALE_MEDIAN * median;
+    return scale * scale;
+}
+
 /* Adds one channel under roughness k and specular m, with the base colour that fits the views of a sample best
  * (iteratively reweighted least squares; Geman and McClure's function). */
 static void add_channel(const struct specular_sample *s, const struct specular_prediction *prediction, size_t k,
                         size_t m, int channel, float median, struct channel_sums *sums) {
     float diffuse[SPECULAR_VIEWS], unit_diffuse[SPECULAR_VIEWS], weight[SPECULAR_VIEWS], e[SPECULAR_VIEWS];
-    float mean = 0.0f;
+    float variance[SPECULAR_VIEWS], model = model_variance(mean_of_channel(s, channel), median);
     for (size_t i = 0; i < s->count; i++) {
         const struct specular_prediction *p = &prediction[i];
         float highlight = m == 0 ? 0.0f : (&p->highlight.radiance[k][m - 1].r)[channel];
+        float noise = (&s->view[i].deviation.r)[channel];
         diffuse[i] = (&s->view[i].observed.r)[channel] - highlight;
         unit_diffuse[i] = (&p->unit_diffuse[k].r)[channel];
-        weight[i] = 1.0f;
-        mean += (&s->view[i].observed.r)[channel] / (float)s->count;
+        variance[i] = fmaxf(model + noise * noise, LEAST);
+        weight[i] = 1.0f / variance[i];
     }
-    float scale = SCALE_RELATIVE * mean + SCALE_MEDIAN * median;
     for (int sweep = 0; sweep < SWEEPS; sweep++) {
-        float over = 0.0f, under = 1e-20f;
+        float over = 0.0f, under = LEAST;
         for (size_t i = 0; i < s->count; i++) {
             over += weight[i] * unit_diffuse[i] * diffuse[i];
             under += weight[i] * unit_diffuse[i] * unit_diffuse[i];
         }
         float base = clampf(over / under, 0.0f, MAX_BASE_COLOR);
         for (size_t i = 0; i < s->count; i++) {
-            e[i] = clampf((diffuse[i] - base * unit_diffuse[i]) / scale, -MAX_SCALES, MAX_SCALES);
+            e[i] = clampf((diffuse[i] - base * unit_diffuse[i]) / sqrtf(variance[i]), -MAX_SCALES, MAX_SCALES);
             float influence = 1.0f / (1.0f + e[i] * e[i]);
-            weight[i] = influence * influence;
+            weight[i] = influence * influence / variance[i];
         }
     }
     for (size_t i = 0; i < s->count; i++) {
@@ -148,9 +162,21 @@ static size_t region_of(const struct region_grid *r, vec3 p) {
            step_of(d.z, r->side_m);
 }
 
+/* Part of an observation's variance that is not noise. */
+static double model_part(const struct specular_sample *s, size_t view, float median) {
+    double model = 0.0, noise = 0.0;
+    for (int c = 0; c < CHANNELS; c++) {
+        double deviation = (double)(&s->view[view].deviation.r)[c];
+        model += (double)model_variance(mean_of_channel(s, c), median);
+        noise += deviation * deviation;
+    }
+    return model > 0.0 ? model / (model + noise) : 1.0;
+}
+
 /* Sums over the observations. */
 struct gain_sums {
-    double total, gain, gain_squares;    /* misfit of a; gain; squares of the gains of points */
+    double total, beyond_noise;          /* misfit of a; what noise does not explain of it */
+    double gain, gain_squares;           /* gain; squares of the gains of points */
     double count, effects;               /* observations, effects of errors */
     double squares;                      /* of the effects on observations */
     struct cluster *point, *photograph;  /* [points->count], [photograph_count] effects; owned */
@@ -170,6 +196,7 @@ static void add_point(const struct specular_points *points, size_t i, size_t fir
         cluster_add(&sums->point[i], effect, 1.0);
         cluster_add(&sums->photograph[points->sample[i].view[v].train], effect, 1.0);
         sums->total += without;
+        sums->beyond_noise += without * model_part(&points->sample[i], v, points->median);
         sums->squares += effect * effect;
     }
     cluster_add(&sums->region[region], sums->point[i].sum, count);
@@ -205,7 +232,7 @@ struct specular_gain specular_misfit_gain(const struct specular_points *points, 
     sums.photograph = mem_calloc(sums.photograph_count, sizeof *sums.photograph);
     for (size_t i = 0, at = 0; i < points->count; at += points->sample[i++].count)
         add_point(points, i, at, region_of(&grid, points->sample[i].position), a, b, &sums);
-    double floor = points->floor * sums.total;
+    double floor = points->floor * sums.beyond_noise;
     double variance = sums.gain_squares - sums.gain * sums.gain / (double)points->count + floor * floor +
                       shared_variance(&sums, points->count);
     mem_free(sums.photograph);

@@ -9,7 +9,10 @@
  * photographs and in one region. An error is what neither candidate explains, the smaller of both residuals, and its
  * effect is what the difference would be less without it:
  *
- *      u = rho(e_a) - rho(e_b) - rho(e_a - e_b)     where e_b is the smaller one; + where e_a is */
+ *      u = rho(e_a) - rho(e_b) - rho(e_a - e_b)     where e_b is the smaller one; + where e_a is
+ *
+ * Residuals are in units of what the model is expected to miss and of the photographs' noise together, and what all
+ * points of a segment share is a part of the misfit that noise does not explain. */
 #ifndef UNBAKE_MATERIAL_SPECULAR_MISFIT_H
 #define UNBAKE_MATERIAL_SPECULAR_MISFIT_H
 
@@ -35,7 +38,8 @@ typedef struct specular_residual specular_residuals[HIGHLIGHT_ROUGHNESSES][SPECU
 /* Points of one segment. All borrowed. */
 struct specular_points {
     size_t count;
-    double floor; /* standard error, as a part of the misfit, of what all points of the segment share */
+    float median;                   /* radiance of the photographs */
+    double floor;                   /* standard error of what all points share, as a part of the misfit beyond noise */
     struct specular_sample *sample; /* [count] */
     specular_residuals *residual;   /* of the observations of sample 0, of sample 1, ... */
 };

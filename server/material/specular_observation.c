@@ -70,11 +70,37 @@ static void light_at(const struct specular_observer *l, const struct specular_pa
     sun_add_light(l->in.sun, l->in.field->world->accel, &patch->at[i], light);
 }
 
-/* Mean radiance of the patch in a photograph. False unless every place faces the camera, has a valid sample and is no
- * nearer to an edge than class `edge`. */
-static bool patch_observed(const struct views *views, const struct view *view, const struct specular_patch *patch,
-                           int edge, rgb *observed) {
+/* Sums over the positions at which a photograph is read, pixels. */
+struct read_places {
+    double count, x, y, xx, xy, yy;
+};
+
+static void read_at(struct read_places *sums, double x, double y) {
+    sums->count += 1.0;
+    sums->x += x;
+    sums->y += y;
+    sums->xx += x * x;
+    sums->xy += x * y;
+    sums->yy += y * y;
+}
+
+/* As many independent pixels have the variance of the look-ups' mean. An even distribution over an area A has a
+ * covariance of determinant A^2 / 144. The interpolation of one look-up spreads over 9/4 pixels. */
+static double pixels_read(const struct read_places *sums) {
+    const double one = 9.0 / 4.0, spread = one / 12.0;
+    double x = sums->x / sums->count, y = sums->y / sums->count, xy = sums->xy / sums->count - x * y;
+    double xx = fmax(sums->xx / sums->count - x * x, 0.0), yy = fmax(sums->yy / sums->count - y * y, 0.0);
+    double area = 12.0 * sqrt(fmax((xx + spread) * (yy + spread) - xy * xy, spread * spread));
+    return fmin(area, one * sums->count);
+}
+
+/* Mean radiance of the patch in a photograph, and its noise. False unless every place faces the camera, has a valid
+ * sample and is no nearer to an edge than class `edge`. */
+static bool patch_observed(const struct specular_input *in, const struct view *view, const struct specular_patch *patch,
+                           int edge, rgb *observed, rgb *deviation) {
+    const struct views *views = in->views;
     const struct photograph *photo = &views->scene->photograph[views->train[view->train]];
+    struct read_places places = {0};
     *observed = rgb_gray(0.0f);
     for (size_t i = 0; i < patch->count; i++) {
         const struct surface_point *at = &patch->at[i];
@@ -87,8 +113,13 @@ static bool patch_observed(const struct views *views, const struct view *view, c
             !photograph_sample(photo, place.x, place.y, &s) || photograph_sample_saturates(&s))
             return false;
         *observed = rgb_mad(*observed, 1.0f / (float)patch->count, s.radiance);
+        read_at(&places, (double)place.x, (double)place.y);
     }
-    return patch->count > 0;
+    if (patch->count == 0)
+        return false;
+    *deviation =
+        rgb_scale(noise_deviation(in->noise, views, view, *observed), (float)(1.0 / sqrt(pixels_read(&places))));
+    return true;
 }
 
 /* Adds what each candidate reflects towards a photograph from a place of the patch, times `share`. */
@@ -135,8 +166,10 @@ static bool observe_texel(const struct specular_observer *l, uint32_t texel, str
     sample->position = middle->position;
     size_t view_count = views_pick(l->in.views, middle->position, middle->normal, texel, VIEWS_TRIED, view);
     for (size_t i = 0; i < view_count && sample->count < SPECULAR_VIEWS; i++) {
-        if (patch_observed(l->in.views, &view[i], &patch, criteria.edge, &sample->view[sample->count].observed))
-            sample->view[sample->count++].train = view[i].train;
+        size_t k = sample->count;
+        sample->view[k].train = view[i].train;
+        sample->count += patch_observed(&l->in, &view[i], &patch, criteria.edge, &sample->view[k].observed,
+                                        &sample->view[k].deviation);
     }
     return sample->count >= criteria.least;
 }

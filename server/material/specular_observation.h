@@ -1,15 +1,16 @@
 /* specular_observation.h -- observations of sample points of a segment, and the radiance that each candidate material
  * would reflect there.
  *
- * A photograph is averaged over a patch around a texel, which reduces its noise; base colour may vary over the patch,
- * but is the same in all photographs. The diffuse lobe and the highlight of every candidate are gathered at the same
- * places of the patch, since it may be curved. */
+ * A photograph is averaged over a patch around a texel, which reduces its noise to what is stated; base colour may vary
+ * over the patch, but is the same in all photographs. The diffuse lobe and the highlight of every candidate are
+ * gathered at the same places of the patch, since it may be curved. */
 #ifndef UNBAKE_MATERIAL_SPECULAR_OBSERVATION_H
 #define UNBAKE_MATERIAL_SPECULAR_OBSERVATION_H
 
 #include <stddef.h>
 #include <stdint.h>
 
+#include "server/capture/noise.h"
 #include "server/capture/views.h"
 #include "server/gather/highlight.h"
 #include "server/gather/probes.h"
@@ -34,6 +35,7 @@ struct specular_sample {
     struct {
         uint32_t train; /* index into views.train */
         rgb observed;
+        rgb deviation; /* standard, of `observed` by the photograph's noise */
     } view[SPECULAR_VIEWS];
 };
 
@@ -48,6 +50,7 @@ struct specular_input {
     struct surface surface;
     const struct fused *fused;
     const struct views *views;
+    const struct noise *noise; /* of the views' photographs */
     const struct probes *probes;
     const struct light_field *field; /* light from all surfaces */
     const struct sun *sun;

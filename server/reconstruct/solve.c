@@ -234,8 +234,8 @@ static void refit_light(struct solve *s, int pass) {
 static enum status fit(struct solve *s, int pass, struct error *err) {
     solve_emitters_decide(&s->emitters);
     if (pass != PASS_LIGHT) {
-        specular_fit(&(struct specular_input){reconstruction_surface(s->r), &s->r->fused, s->views, &s->probes,
-                                              &s->isotropic, &s->r->sun},
+        specular_fit(&(struct specular_input){reconstruction_surface(s->r), &s->r->fused, s->views, &s->r->noise,
+                                              &s->probes, &s->isotropic, &s->r->sun},
                      s->r->is_emitter, &s->r->materials, s->r->pool);
         s->divide.stride = 1;
         sun_refit(&s->divide, &s->r->sun);

@@ -1,6 +1,9 @@
 /* specular_fit.h: roughness and specular of a plane under a disc of distant light, from photographs that show what the
- * reflection model says, integrated over the disc: a polished, a satin, an eggshell and a matt one come back. */
+ * reflection model says, integrated over the disc: a polished, a satin, an eggshell and a matt one come back.
+ * specular_observation.h: means over a patch have the noise that is stated, whether they read some pixels or a part of
+ * one. */
 #include "server/material/specular_fit.h"
+#include "common/rng.h"
 #include "server/render/bsdf.h"
 #include "server/scene/latlong.h"
 #include "tests/unit/plane_rig.h"
@@ -10,6 +13,7 @@
 #define DISC_COSINE 0.97f /* 14 degrees */
 #define RADIANCE 30.0f
 #define PHOTOGRAPHS 30
+#define NOISE 0.1f /* deviation, as a part of what is shown */
 
 static const rgb base_color = {0.4f, 0.3f, 0.2f};
 
@@ -77,7 +81,8 @@ static void test_fit(const struct image *sky, const struct disc *disc, float rou
                            rgb_gray(RADIANCE * disc->angle[k]));
     uint16_t(*sent)[3] = mem_calloc(PLANE_TEXELS, sizeof *sent);
     struct light_field field = {&r->world, (const uint16_t(*)[3])sent, NULL, NULL};
-    const struct specular_input input = {reconstruction_surface(r), &r->fused, &rig.views, &probes, &field, &r->sun};
+    const struct specular_input input = {
+        reconstruction_surface(r), &r->fused, &rig.views, &r->noise, &probes, &field, &r->sun};
     specular_fit(&input, r->is_emitter, &r->materials, r->pool);
     printf("roughness %.3f specular %.3f, true %.3f %.3f\n", (double)r->materials.roughness[0],
            (double)r->materials.specular[0], (double)roughness, (double)specular);
@@ -95,7 +100,49 @@ static void test_fit(const struct image *sky, const struct disc *disc, float rou
     plane_rig_release(&rig);
 }
 
+static rgb paint_noise(void *user, vec3 place) {
+    uint32_t *drawn = user;
+    (void)place;
+    return rgb_gray(1.0f + NOISE * sqrtf(3.0f) * (2.0f * rng_to_float(rng_mix32((*drawn)++)) - 1.0f));
+}
+
+/* Mean square of the errors of patches of so many texels, in stated deviations. */
+static void test_noise(float patch_texels, float pixel_m) {
+    struct plane_rig rig;
+    struct specular_observer observer;
+    uint32_t drawn = 0;
+    double squares = 0.0, count = 0.0;
+    plane_rig_init(&rig, PHOTOGRAPHS, 1);
+    for (int i = 0; i < PHOTOGRAPHS; i++)
+        plane_rig_add(&rig, (vec3){0.3f * (float)(i % 6 - 3), 0.3f * (float)(i / 6 - 3), 7.0f},
+                      (vec3){0.1f, 0.2f, 0.0f}, pixel_m, paint_noise, &drawn);
+    plane_rig_look(&rig, NOISE);
+    struct reconstruction *r = &rig.r;
+    const struct specular_input input = {
+        .surface = reconstruction_surface(r), .fused = &r->fused, .views = &rig.views, .noise = &r->noise};
+    specular_observer_init(&observer, &input, 1);
+    for (size_t attempt = 0; attempt < PLANE_TEXELS; attempt++) {
+        struct specular_sample sample;
+        if (!specular_observe(&observer, 0, attempt, (struct specular_criteria){patch_texels, 0, 1}, &sample))
+            continue;
+        for (size_t v = 0; v < sample.count; v++) {
+            double e = (double)((sample.view[v].observed.g - 1.0f) / sample.view[v].deviation.g);
+            squares += e * e;
+            count += 1.0;
+        }
+    }
+    printf("patches of %.1f texels, %.2f pixels a side: errors of %.2f deviations\n", (double)patch_texels,
+           (double)(patch_texels * PLANE_METRES / PLANE_SIDE / pixel_m), sqrt(squares / count));
+    CHECK(count > 100.0);
+    CHECK_NEAR(sqrt(squares / count), 1.0, 0.25);
+    specular_observer_release(&observer);
+    plane_rig_release(&rig);
+}
+
 int main(void) {
+    test_noise(1.0f, 1.0f);
+    test_noise(8.0f, 1.0f);
+    test_noise(13.0f, 0.5f);
     struct image sky;
     struct disc disc;
     make_sky(&sky, &disc);

@@ -1,5 +1,6 @@
 /* specular_misfit.h: how sure a gain is where errors are shared by the observations of a photograph, by those of a
- * region, or by none; and that of a highlight that few photographs show. */
+ * region, or by none; and that of a highlight that few photographs show. Noise of a photograph is no misfit of a
+ * material, and no part of what all points share. */
 #include "server/material/specular_misfit.h"
 
 #include <math.h>
@@ -36,7 +37,7 @@ static struct specular_residual residual_of(double e) {
 }
 
 /* Standard errors of the gain of b over a: nothing but errors, or a highlight that b explains. */
-static double gain_of(uint32_t key, const struct errors *errors, bool has_highlight) {
+static double gain_of(uint32_t key, const struct errors *errors, bool has_highlight, float noise, double floor) {
     struct specular_sample *sample = mem_calloc(POINTS, sizeof *sample);
     specular_residuals *residual = mem_calloc(POINTS * VIEWS, sizeof *residual);
     for (uint32_t i = 0; i < POINTS; i++) {
@@ -49,11 +50,13 @@ static double gain_of(uint32_t key, const struct errors *errors, bool has_highli
                        errors->own * draw(key, at, 3);
             double half = 0.5 * DIFFERENCE * ((errors->region > 0.0 ? region : photograph) % 2 ? 1.0 : -1.0);
             sample[i].view[v].train = photograph;
+            sample[i].view[v].observed = rgb_gray(1.0f);
+            sample[i].view[v].deviation = rgb_gray(noise);
             residual[at][a.k][a.m] = residual_of(has_highlight ? e + (photograph < 3 ? HIGHLIGHT : 0.0) : e + half);
             residual[at][b.k][b.m] = residual_of(has_highlight ? e : e - half);
         }
     }
-    struct specular_points points = {POINTS, 0.0, sample, residual};
+    struct specular_points points = {POINTS, 1.0f, floor, sample, residual};
     struct specular_gain gain = specular_misfit_gain(&points, a, b);
     double sum = specular_misfit_sum(&points, a);
     CHECK_NEAR(gain.part * sum, sum - specular_misfit_sum(&points, b), 1e-6 * sum);
@@ -66,17 +69,43 @@ static double gain_of(uint32_t key, const struct errors *errors, bool has_highli
 static void test_calibrated(struct errors errors) {
     double squares = 0.0;
     for (uint32_t key = 0; key < DRAWS; key++) {
-        double e = gain_of(key, &errors, false);
+        double e = gain_of(key, &errors, false, 0.0f, 0.0);
         squares += e * e / DRAWS;
     }
-    double highlight = gain_of(1, &errors, true);
+    double highlight = gain_of(1, &errors, true, 0.0f, 0.0);
     printf("photograph %.2f, region %.2f, own %.2f: %.2f, highlight %.1f\n", errors.photograph, errors.region,
            errors.own, sqrt(squares), highlight);
     CHECK_THAT(sqrt(squares) > 0.7 && sqrt(squares) < 1.4, "standard errors deviate by %.2f", sqrt(squares));
     CHECK_THAT(highlight > 5.0, "a highlight is told by %.1f standard errors", highlight);
 }
 
+/* Of three looks at one paint, one is half as bright again by noise that is known: the paint is that of the others. */
+static void test_noisy_look(void) {
+    struct specular_sample sample = {.count = 3};
+    struct specular_prediction prediction[3] = {0};
+    specular_residuals residual[3];
+    for (size_t v = 0; v < 3; v++) {
+        sample.view[v].observed = rgb_gray(v == 2 ? 0.6f : 0.4f);
+        sample.view[v].deviation = rgb_gray(v == 2 ? 0.3f : 0.0f);
+        for (size_t k = 0; k < HIGHLIGHT_ROUGHNESSES; k++)
+            prediction[v].unit_diffuse[k] = rgb_gray(1.0f);
+    }
+    specular_misfit_find(&sample, prediction, 1.0f, residual);
+    for (size_t v = 0; v < 3; v++)
+        CHECK_NEAR(image_float_from_half(residual[v][a.k][a.m].mean), v == 2 ? 0.65f : -0.1f, 0.1f);
+}
+
+/* What all points share is small where noise is most of the misfit. */
+static void test_shared(void) {
+    static const struct errors errors = {0.0, 0.0, 0.3};
+    double clean = gain_of(1, &errors, true, 0.0f, 0.3), noisy = gain_of(1, &errors, true, 1.0f, 0.3);
+    printf("a highlight where a third of the misfit is shared: %.1f, with noise %.1f\n", clean, noisy);
+    CHECK(clean < 5.0 && noisy > 2.0 * clean);
+}
+
 int main(void) {
+    test_noisy_look();
+    test_shared();
     test_calibrated((struct errors){0.0, 0.0, 0.3});
     test_calibrated((struct errors){0.3, 0.0, 0.1});
     test_calibrated((struct errors){0.0, 0.3, 0.1});
