@@ -2,6 +2,7 @@
 #include "server/light/emitters.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "common/mem.h"
 #include "common/quantile.h"
@@ -162,9 +163,36 @@ static size_t outshone_count(const struct edge_class *class) {
     return count;
 }
 
-/* The class farthest from edges that has enough observations. */
+/* Adds the observations of a class to another. */
+static void add_class(struct edge_class *to, const struct edge_class *from) {
+    for (int c = 0; c < 3; c++) {
+        struct channel_values *into = &to->channel[c];
+        memcpy(&into->value[into->count], from->channel[c].value,
+               from->channel[c].count * sizeof *from->channel[c].value);
+        into->count += from->channel[c].count;
+    }
+    to->outshone_count += from->outshone_count;
+}
+
+/* Whether no class but that of mixed pixels has enough observations, but all of these together do. */
+static bool is_scattered(const struct edge_class *class) {
+    size_t most = 0, all = 0;
+    for (int edge = 0; edge < VIEWS_EDGE; edge++) {
+        most = most > class[edge].channel[0].count ? most : class[edge].channel[0].count;
+        all += class[edge].channel[0].count;
+    }
+    return most < MIN_OBSERVATIONS && all >= MIN_OBSERVATIONS;
+}
+
+/* The class farthest from edges that has enough observations. Those of a small lamp may be scattered over classes: then
+ * they are taken together, as class 1. */
 static struct edge_class *choose_class(struct edge_class *class) {
     struct edge_class *best = class;
+    if (is_scattered(class)) {
+        for (int edge = 0; edge < VIEWS_EDGE; edge++)
+            if (edge != 1)
+                add_class(&class[1], &class[edge]);
+    }
     for (int edge = 1; edge <= VIEWS_EDGE && best->channel[0].count < MIN_OBSERVATIONS; edge++)
         best = &class[edge];
     return best;
@@ -193,10 +221,11 @@ static void take_medians(struct emitter_evidence *e, struct edge_class *class) {
 }
 
 static void fill_evidence(struct emitter_evidence *e, struct edge_class *class) {
+    size_t outshone = outshone_count(class);
     struct edge_class *best = choose_class(class);
     size_t least = best == &class[VIEWS_EDGE] ? MIN_OBSERVATIONS_MIXED : 1;
     e->is_seen = best->channel[0].count >= least && is_own(best->channel[0].count, best->outshone_count);
-    e->is_outshone = !e->is_seen && outshone_count(class) >= MIN_OBSERVATIONS;
+    e->is_outshone = !e->is_seen && outshone >= MIN_OBSERVATIONS;
     if (!e->is_seen)
         best = class; /* mostly outshone: no value */
     e->only_mixed = best == &class[VIEWS_EDGE];
