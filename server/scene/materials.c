@@ -6,7 +6,9 @@
 #include "common/image.h"
 #include "common/mem.h"
 
-#define MAX_POLISHED_ROUGHNESS 0.5f /* roughness, at most */
+/* Roughness, at most. Above that of a segment of which nothing is known (specular_posterior.h), .5: a little doubt is
+ * not to take away what it mirrors. */
+#define MAX_POLISHED_ROUGHNESS 0.55f
 
 void materials_init(struct materials *m, const struct inverse_uv *inverse, size_t segment_count, rgb base_color,
                     float roughness, float specular) {
