@@ -90,8 +90,10 @@ float sun_shadows_at(const struct sun_shadows *s, uint32_t texel) {
 }
 
 bool sun_shadows_blurs(const struct sun_shadows *s, uint32_t texel) {
+    if (!s->visible)
+        return false;
     uint32_t width = s->surface.atlas->width;
-    return s->visible && s->is_mixed[tile_of(s, texel % width, texel / width)];
+    return s->is_mixed[tile_of(s, texel % width, texel / width)];
 }
 
 /* Mean over the texels of the chart at `scale` times the places of a look-up, and whether they differ from its own. */
